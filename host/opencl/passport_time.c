@@ -2,7 +2,7 @@
 
 #include <math.h>
 
-enum { TIMED_ITEMS = 64 };
+enum { TIMED_ITEMS = 64, TIMED_ROUNDS_MAX = 1 << 26 };
 static const double timed_seconds_wanted = 2e-3;
 
 // Returns the least time by the host's clock that a chain takes in several launches.
@@ -15,30 +15,55 @@ static double chain_seconds(Measurement *measurement, cl_uint probe, cl_uint rou
     return least;
 }
 
-double fma_cost(Measurement *measurement)
+// The least times of two chains.
+typedef struct {
+    double fused, separate;
+} ChainTimes;
+
+// Doubles the rounds until the slower chain seems to take `wanted` seconds more than an empty launch.
+static cl_uint rounds_find(Measurement *measurement, cl_uint rounds, double launch, double wanted)
 {
-    enum { TURNS_MIN = 4, TURNS_MAX = 16 };
-    const Operands chain = operands_of(measurement, (Reals){0.75, 0.5, 0.5});
-    operands_write(measurement, &chain, 1);
-    const double launch = chain_seconds(measurement, PROBE_TIME_SEPARATE, 0, TURNS_MIN);
-    // at PASSPORT_FMA_COST_MAX the faster of the two then takes as long as an empty launch
-    const double wanted = fmax(timed_seconds_wanted, PASSPORT_FMA_COST_MAX * launch);
-    cl_uint rounds = 8;
-    for (; compute_ok(measurement->compute) && rounds < 1u << 26; rounds *= 2) {
+    for (; compute_ok(measurement->compute) && rounds < TIMED_ROUNDS_MAX; rounds *= 2) {
         const double slower = fmax(chain_seconds(measurement, PROBE_TIME_FMA, rounds, 2),
                                    chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 2));
         if (slower - launch >= wanted) break;
     }
-    measurement->timed_rounds = rounds;
-    double fused = INFINITY, separate = INFINITY;
+    return rounds;
+}
+
+// Times both chains in turn, longer where fma seems slow.
+static ChainTimes chains_time(Measurement *measurement, cl_uint rounds, double launch, double wanted)
+{
+    enum { TURNS_MIN = 4, TURNS_MAX = 16 };
+    ChainTimes times = {INFINITY, INFINITY};
     for (int turn = 1; turn <= TURNS_MAX && compute_ok(measurement->compute); turn++) {
-        fused = fmin(fused, chain_seconds(measurement, PROBE_TIME_FMA, rounds, 1));
-        separate = fmin(separate, chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 1));
-        const bool seems_slow = fused - launch >= PASSPORT_FMA_COST_MAX * (separate - launch);
-        if ((turn >= TURNS_MIN && !seems_slow) || fmax(fused, separate) > 50 * wanted) break;
+        times.fused = fmin(times.fused, chain_seconds(measurement, PROBE_TIME_FMA, rounds, 1));
+        times.separate = fmin(times.separate, chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 1));
+        const bool seems_slow = times.fused - launch >= PASSPORT_FMA_COST_MAX * (times.separate - launch);
+        if ((turn >= TURNS_MIN && !seems_slow) || fmax(times.fused, times.separate) > 50 * wanted) break;
     }
+    return times;
+}
+
+double fma_cost(Measurement *measurement)
+{
+    enum { EMPTY_LAUNCHES = 4 };
+    const Operands chain = operands_of(measurement, (Reals){0.75, 0.5, 0.5});
+    operands_write(measurement, &chain, 1);
+    const double launch = chain_seconds(measurement, PROBE_TIME_SEPARATE, 0, EMPTY_LAUNCHES);
+    // at PASSPORT_FMA_COST_MAX the faster of the two then takes as long as an empty launch
+    const double wanted = fmax(timed_seconds_wanted, PASSPORT_FMA_COST_MAX * launch);
+    cl_uint rounds = rounds_find(measurement, 8, launch, wanted);
+    ChainTimes times = chains_time(measurement, rounds, launch, wanted);
+    // on a busy machine a few rounds may have waited rather than calculated
+    while (fmax(times.fused, times.separate) - launch < 0.5 * wanted && rounds < TIMED_ROUNDS_MAX &&
+           compute_ok(measurement->compute)) {
+        rounds = rounds_find(measurement, 2 * rounds, launch, wanted);
+        times = chains_time(measurement, rounds, launch, wanted);
+    }
+    measurement->timed_rounds = rounds;
     const double separate_min = 0.01 * wanted; // what is less is the launches' noise
-    return (fused - launch) / fmax(separate - launch, separate_min);
+    return (times.fused - launch) / fmax(times.separate - launch, separate_min);
 }
 
 static uint64_t greatest_divisor(uint64_t a, uint64_t b)
@@ -73,7 +98,7 @@ void timer_measure(Measurement *measurement)
     cl_uint rounds = measurement->timed_rounds;
     for (int i = 0; i < TRIES && timer_ratio(measurement) < 0.5 && rounds > 0; i++) {
         const double seconds = chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 1);
-        if (seconds < 20 * timed_seconds_wanted && rounds < 1u << 26) rounds *= 2;
+        if (seconds < 20 * timed_seconds_wanted && rounds < TIMED_ROUNDS_MAX) rounds *= 2;
     }
     bool is_absent = true, is_counter = true, goes_back = false;
     for (size_t i = 0; i < measurement->launches.count; i++) {
