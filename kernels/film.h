@@ -12,8 +12,10 @@ typedef struct {
 
 typedef struct {
     Pixels pixels;
-    mask inside;
-    integer index; // of each pixel within the band
+    mask inside;   // pixels inside the band
+    bool whole;    // all are inside the band, which is not a list
+    integer index; // of each pixel within a list
+    uint first;    // of the tile's pixels, its index within the band
     uint width;    // of the band
     uint number;   // of the tile, in the order of work-items
 } Tile;
@@ -55,7 +57,7 @@ static inline Tile list_tile(const Band *band, uint which)
         x.each[lane] = band->pixels[2 * at];
         y.each[lane] = band->pixels[2 * at + 1];
     }
-    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), index.all, 0, 0};
+    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), false, index.all, 0, 0, 0};
     if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
@@ -65,13 +67,13 @@ static inline Tile band_tile(const Band *band, uint which)
 {
     if (IS_PIXEL_LIST) return list_tile(band, which);
     Tile tile;
-    uint column = (uint)get_global_id(0) * MACRO_TILE_COLUMNS + which % MACRO_TILE_COLUMNS;
-    uint row = (uint)get_global_id(1) * MACRO_TILE_ROWS + (which >> MACRO_TILE_COLUMNS_LOG2);
-    integer x = (integer)((scalar_integer)(column * TILE_WIDTH)) + LANE_X;
-    integer y = (integer)((scalar_integer)(row * TILE_HEIGHT)) + LANE_Y;
+    uint left = ((uint)get_global_id(0) * MACRO_TILE_COLUMNS + which % MACRO_TILE_COLUMNS) * TILE_WIDTH;
+    uint top = ((uint)get_global_id(1) * MACRO_TILE_ROWS + (which >> MACRO_TILE_COLUMNS_LOG2)) * TILE_HEIGHT;
+    integer x = (integer)((scalar_integer)left) + LANE_X, y = (integer)((scalar_integer)top) + LANE_Y;
     tile.inside =
         (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
-    tile.index = y * (integer)((scalar_integer)band->width) + x;
+    tile.whole = left + TILE_WIDTH <= band->width && top + TILE_HEIGHT <= band->height;
+    tile.first = top * band->width + left;
     tile.width = band->width;
     const uint item_width = MACRO_TILE_COLUMNS * TILE_WIDTH;
     const uint of_row = (band->width + item_width - 1) / item_width;
@@ -83,11 +85,18 @@ static inline Tile band_tile(const Band *band, uint which)
     return tile;
 }
 
+// Returns the index of each pixel within the band.
+static inline integer tile_index(const Tile *tile)
+{
+    if (IS_PIXEL_LIST) return tile->index;
+    return (integer)((scalar_integer)tile->first) + LANE_Y * (integer)((scalar_integer)tile->width) + LANE_X;
+}
+
 // Stores or loads one of `stride` values per pixel.
 static inline void film_store(global scalar *film, const Tile *tile, uint stride, uint channel, real value)
 {
     RealLanes values = {value};
-    IntegerLanes inside = {tile->inside}, index = {tile->index};
+    IntegerLanes inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++)
         if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = values.each[lane];
 }
@@ -95,42 +104,95 @@ static inline void film_store(global scalar *film, const Tile *tile, uint stride
 static inline void film_store_integer(global int *film, const Tile *tile, uint stride, uint channel,
                                       integer value)
 {
-    IntegerLanes values = {value}, inside = {tile->inside}, index = {tile->index};
+    IntegerLanes values = {value}, inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++)
         if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = (int)values.each[lane];
 }
 
-#if TILE_WIDTH == 4
-// Four neighboring pixels' colors, interleaved.
-static inline void film_store_row(global scalar *film, scalar4 r, scalar4 g, scalar4 b)
+// Shuffles each row of four lanes of two vectors: i, j, k and l are lanes of the first row, LANES being the
+// second vector's first lane.
+#if LANES == 16 && defined(__clang__)
+#define SHUFFLE_ROWS(a, b, i, j, k, l)                                                                       \
+    __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8,        \
+                            i + 12, j + 12, k + 12, l + 12)
+#elif LANES == 8 && defined(__clang__)
+#define SHUFFLE_ROWS(a, b, i, j, k, l) __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4)
+#endif
+
+#ifdef SHUFFLE_ROWS
+// Interleaves a tile's colors: `parts` of a row of four pixels are r g b r, g b r g and b r g b.
+static inline void color_interleave(Vector color, real *parts)
 {
-    vstore4((scalar4)(r.x, g.x, b.x, r.y), 0, film);
-    vstore4((scalar4)(g.y, b.y, r.z, g.z), 1, film);
-    vstore4((scalar4)(b.z, r.w, g.w, b.w), 2, film);
+    const real r = color.x, g = color.y, b = color.z;
+    const real rgrg01 = SHUFFLE_ROWS(r, g, 0, LANES, 1, LANES + 1),
+               rgrg23 = SHUFFLE_ROWS(r, g, 2, LANES + 2, 3, LANES + 3),
+               gb1 = SHUFFLE_ROWS(g, b, 1, LANES + 1, 1, LANES + 1);
+    parts[0] = SHUFFLE_ROWS(rgrg01, b, 0, 1, LANES, 2);
+    parts[1] = SHUFFLE_ROWS(gb1, rgrg23, 0, 1, LANES, LANES + 1);
+    parts[2] = SHUFFLE_ROWS(rgrg23, b, LANES + 2, 2, 3, LANES + 3);
 }
 #endif
 
 static inline void film_store_color(global scalar *film, const Tile *tile, Vector color)
 {
-#if TILE_WIDTH == 4
-    if (!IS_PIXEL_LIST && lanes_all(tile->inside)) {
-        global scalar *row = film + (size_t)tile->index.s0 * 3;
-        size_t next = (size_t)tile->width * 3;
-#if LANES == 16
-        film_store_row(row, color.x.s0123, color.y.s0123, color.z.s0123);
-        film_store_row(row + next, color.x.s4567, color.y.s4567, color.z.s4567);
-        film_store_row(row + 2 * next, color.x.s89ab, color.y.s89ab, color.z.s89ab);
-        film_store_row(row + 3 * next, color.x.scdef, color.y.scdef, color.z.scdef);
-#else
-        film_store_row(row, color.x.lo, color.y.lo, color.z.lo);
-        film_store_row(row + next, color.x.hi, color.y.hi, color.z.hi);
-#endif
+#ifdef SHUFFLE_ROWS
+    if (tile->whole) {
+        real parts[3];
+        color_interleave(color, parts);
+        global scalar *row = film + (size_t)tile->first * 3;
+#pragma unroll
+        for (uint lane = 0; lane < LANES; lane += 4, row += (size_t)tile->width * 3)
+#pragma unroll
+            for (uint part = 0; part < 3; part++)
+                vstore4(vload4(0, (const scalar *)&parts[part] + lane), part, row);
         return;
     }
 #endif
     film_store(film, tile, 3, 0, color.x);
     film_store(film, tile, 3, 1, color.y);
     film_store(film, tile, 3, 2, color.z);
+}
+
+#if LANES == 16 && defined(SHUFFLE_ROWS)
+typedef real UnalignedReal __attribute__((aligned(sizeof(scalar)))); // PoCL's vstore16 stores halves
+
+// Rows i and j of a, and then of b.
+#define SELECT_ROWS(a, b, i, j)                                                                              \
+    __builtin_shufflevector(a, b, 4 * (i), 4 * (i) + 1, 4 * (i) + 2, 4 * (i) + 3, 4 * (j), 4 * (j) + 1,      \
+                            4 * (j) + 2, 4 * (j) + 3, 4 * (i) + 16, 4 * (i) + 17, 4 * (i) + 18,              \
+                            4 * (i) + 19, 4 * (j) + 16, 4 * (j) + 17, 4 * (j) + 18, 4 * (j) + 19)
+
+// Stores the colors of four neighboring tiles, whose rows together fill cache lines.
+static inline void film_store_four(global scalar *film, const Tile *tile, const Vector *colors)
+{
+    real parts[12];
+    const size_t next_row = (size_t)tile->width * 3;
+    film += (size_t)tile->first * 3;
+#pragma unroll
+    for (uint i = 0; i < 4; i++)
+        color_interleave(colors[i], &parts[3 * i]);
+#pragma unroll
+    for (uint i = 0; i < 12; i += 4, film += LANES) {
+        real a = SELECT_ROWS(parts[i], parts[i + 1], 0, 1), b = SELECT_ROWS(parts[i + 2], parts[i + 3], 0, 1);
+        real c = SELECT_ROWS(parts[i], parts[i + 1], 2, 3), d = SELECT_ROWS(parts[i + 2], parts[i + 3], 2, 3);
+        *(global UnalignedReal *)film = SELECT_ROWS(a, b, 0, 2);
+        *(global UnalignedReal *)(film + next_row) = SELECT_ROWS(a, b, 1, 3);
+        *(global UnalignedReal *)(film + 2 * next_row) = SELECT_ROWS(c, d, 0, 2);
+        *(global UnalignedReal *)(film + 3 * next_row) = SELECT_ROWS(c, d, 1, 3);
+    }
+}
+#endif
+
+// Stores the colors of PACKETS tiles.
+static inline void film_store_tiles(global scalar *film, const Tile *tiles, const Vector *colors)
+{
+    uint i = 0;
+#if LANES == 16 && defined(SHUFFLE_ROWS)
+    for (; i + 4 <= PACKETS && tiles[i + 3].whole; i += 4) // the last one is whole: so are the others
+        film_store_four(film, &tiles[i], &colors[i]);
+#endif
+    for (; i < PACKETS; i++)
+        film_store_color(film, &tiles[i], colors[i]);
 }
 
 // Notes the lanes in doubt: in a word per tile, as bits; of a list in its pixels' counts. `is_first`:
@@ -143,7 +205,7 @@ static inline void film_note_doubts(global int *doubts, const Tile *tile, mask d
         doubts[tile->number] = before | (int)lanes_bits(doubt & tile->inside);
         return;
     }
-    IntegerLanes counted = {doubt}, inside = {tile->inside}, index = {tile->index};
+    IntegerLanes counted = {doubt}, inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;
         int before = is_first ? 0 : doubts[index.each[lane]];
@@ -154,7 +216,7 @@ static inline void film_note_doubts(global int *doubts, const Tile *tile, mask d
 static inline Vector film_load_color(global const scalar *film, const Tile *tile)
 {
     RealLanes x = {(real)(0)}, y = x, z = x;
-    IntegerLanes inside = {tile->inside}, index = {tile->index};
+    IntegerLanes inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;
         x.each[lane] = film[(size_t)index.each[lane] * 3];

@@ -17,8 +17,10 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
     Ray rays[PACKETS];
     ShadedHit hits[PACKETS];
     Color3 sums[PACKETS], lost[PACKETS];
+    const uint count = scene->header->image.z;
     for (uint i = 0; i < PACKETS; i++) {
         tiles[i] = band_tile(band, first_tile + i);
+        if (count == 1) continue;
         sums[i] = lost[i] = (Color3){(real)(0), (real)(0), (real)(0)};
         if (first_sample > 0) {
             sums[i] = film_load_color(film, &tiles[i]);
@@ -38,22 +40,23 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
             mask doubt;
             Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path, &doubt);
             if (IS_CERTIFIED) film_note_doubts(doubts, &tiles[i], doubt, sample == 0);
+            if (count == 1) {
+                sums[i] = traced;
+                continue;
+            }
             Color3 color = vector_subtract(traced, lost[i]);
             Color3 next = vector_add(sums[i], color);
             lost[i] = vector_subtract(vector_subtract(next, sums[i]), color);
             sums[i] = next;
         }
     }
-    const uint count = scene->header->image.z;
-    for (uint i = 0; i < PACKETS; i++) {
-        if (last_sample < count) film_store_color(compensation, &tiles[i], lost[i]);
-        if (count > 1 && last_sample == count) {
-            real divisor = (real)((scalar)count);
-            sums[i] = (Color3){real_divide(sums[i].x, divisor), real_divide(sums[i].y, divisor),
-                               real_divide(sums[i].z, divisor)};
-        }
-        film_store_color(film, &tiles[i], sums[i]);
+    if (last_sample < count) film_store_tiles(compensation, tiles, lost);
+    for (uint i = 0; i < PACKETS && count > 1 && last_sample == count; i++) {
+        real divisor = (real)((scalar)count);
+        sums[i] = (Color3){real_divide(sums[i].x, divisor), real_divide(sums[i].y, divisor),
+                           real_divide(sums[i].z, divisor)};
     }
+    film_store_tiles(film, tiles, sums);
 }
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *sample_offsets, global scalar *film,
