@@ -158,50 +158,98 @@ static Scene scene_attacking(double scale)
 }
 
 // How many pixels see an object, and how many of those are in the shadow of a light.
-static void count_seen(const Film *film, size_t *seen, size_t *shadowed)
+static void count_seen(const Film *film, const Scene *scene, size_t *seen, size_t *shadowed)
 {
-    const size_t light_count = ORIGINS - 1;
+    const size_t light_count = scene->lights.count;
     *seen = *shadowed = 0;
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
-        *seen += film->object[i] < OBJECTS;
+        *seen += film->object[i] < scene->objects.count &&
+                 scene->objects.items[film->object[i]].kind != SHAPE_PLANE;
         for (size_t light = 0; light < light_count; light++)
             *shadowed += film->shadow[i * light_count + light] == 1;
     }
 }
 
+static void assert_same_with_the_bvh(const Scene *scene, Precision precision)
+{
+    for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
+        if (*lanes == 1) continue; // has no macro-tiles
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+        settings.lanes = *lanes;
+        settings.bvh = BVH_OFF;
+        Film expected = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW);
+        settings.bvh = BVH_ON;
+        Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW);
+        film_assert_same(&film, &expected, precision_names[precision]);
+        size_t seen, shadowed;
+        count_seen(&expected, scene, &seen, &shadowed);
+        assert_true(seen >= WIDTH * HEIGHT / 8 && seen <= WIDTH * HEIGHT * 7 / 8);
+        assert_true(shadowed >= 16);
+        film_free(&film);
+        film_free(&expected);
+    }
+}
+
+static bool is_tested(Precision precision)
+{
+    return probe_has(precision) && (tests_are_long() || precision <= PRECISION_SINGLE);
+}
+
 static void no_pixel_depends_on_the_bvh(void **state)
 {
     (void)state;
-    static const double scales[] = {1, 0x1p-30, 0x1p30};
+    static const double scales[] = {1, 0x1p-30, 0x1p26}; // beyond, the scene's unit changes
     const size_t scene_count = tests_are_long() ? 60 : 12;
-    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
-        if (!probe_has(precision) || (!tests_are_long() && precision > PRECISION_SINGLE)) continue;
-        for (size_t i = 0; i < scene_count; i++) {
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++)
+        for (size_t i = 0; i < scene_count && is_tested(precision); i++) {
             random_state.state = i + 1;
             Scene scene = scene_attacking(scales[i % 3]);
-            for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
-                if (*lanes == 1) continue; // has no macro-tiles
-                RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
-                settings.lanes = *lanes;
-                settings.bvh = BVH_OFF;
-                Film expected = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
-                settings.bvh = BVH_ON;
-                Film film = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
-                film_assert_same(&film, &expected, precision_names[precision]);
-                size_t seen, shadowed;
-                count_seen(&expected, &seen, &shadowed);
-                assert_true(seen >= WIDTH * HEIGHT / 8 && seen <= WIDTH * HEIGHT * 7 / 8);
-                assert_true(shadowed > WIDTH * HEIGHT / 8);
-                film_free(&film);
-                film_free(&expected);
-            }
+            assert_same_with_the_bvh(&scene, precision);
             scene_free(&scene);
         }
+}
+
+static void sheet_add(Scene *scene, double z, bool has_holes)
+{
+    enum { COLUMNS = 20, ROWS = 12 };
+    const double cell = 0.1;
+    for (int i = 0; i < COLUMNS * ROWS; i++) {
+        const double x = (i % COLUMNS - COLUMNS / 2) * cell, y = (double)(i / COLUMNS - ROWS / 2) * cell;
+        const Vector3 a = {x, y, z}, b = {x + cell, y, z}, c = {x, y + cell, z}, d = {x + cell, y + cell, z};
+        for (int half = 0; half < 2; half++) {
+            if (has_holes && random_coin(&random_state)) continue;
+            array_push(scene->objects,
+                       ((Object){.kind = SHAPE_TRIANGLE,
+                                 .as.triangle.vertices = {half ? d : a, half ? c : b, half ? b : c}}));
+        }
+    }
+}
+
+// Light of a lamp that is so far off that a vertex seen from there is rounded by more than two sheets of
+// triangles are apart, the nearer with holes.
+static void no_shadow_of_a_far_lamp_depends_on_the_bvh(void **state)
+{
+    (void)state;
+    for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+        if (!is_tested(precision)) continue;
+        random_state.state = 1;
+        Scene scene = {.camera = {.look_at = {0, 0, -1},
+                                  .up = {0, 1, 0},
+                                  .field_axis = FIELD_HORIZONTAL,
+                                  .half_tangent = half_tangent}};
+        array_push(scene.materials, material_default());
+        array_push(scene.lights,
+                   ((Light){.kind = LIGHT_POINT, .color = {1, 1, 1}, .position = {9e3, 3e3, 3.5e3}}));
+        sheet_add(&scene, -1.5, false);
+        sheet_add(&scene, -1.498, true);
+        assert_same_with_the_bvh(&scene, precision);
+        scene_free(&scene);
     }
 }
 
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(no_pixel_depends_on_the_bvh)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(no_pixel_depends_on_the_bvh),
+                                       cmocka_unit_test(no_shadow_of_a_far_lamp_depends_on_the_bvh)};
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

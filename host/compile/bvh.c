@@ -12,7 +12,7 @@
 
 enum {
     // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
-    // 2^28 primitives, and at most 7 cuts by kind follow; or 26 leave 4, and 3 follow.
+    // 2^28 primitives, and at most 7 cuts by kind follow; or 26 leave 4, and 3 follow; or 24 leave 16, and 8.
     HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
     THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };

@@ -20,8 +20,8 @@ typedef struct {
 
 typedef struct {
     unsigned size_max; // primitives per leaf
-    // Whether a leaf is tested as one, at one cost whatever its size. Then all primitives are of one kind,
-    // and what fits a leaf is not split.
+    // Whether leaves count as tested at one cost whatever their size, and what fits one is split by kinds
+    // alone.
     bool are_blocks;
 } BvhLeaves;
 

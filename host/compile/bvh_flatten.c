@@ -311,13 +311,13 @@ static void blocks_fill(CompiledScene *compiled)
 }
 
 // Leaves as large as measurement found best. With several lanes a leaf of triangles is a block, which costs
-// the same whatever its size; where all primitives are triangles the tree is built for that.
+// the same whatever its size; where most primitives are triangles the tree is built for that.
 static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
 {
     enum { LEAF_SIZE_MAX = 8 };
     const size_t triangle_count = bounded->kind_counts[KIND_TRIANGLES];
     const bool has_blocks = lanes > 1 && triangle_count > 0;
-    if (has_blocks && triangle_count == bounded->count) return (BvhLeaves){lanes, true};
+    if (has_blocks && triangle_count > bounded->count / 2) return (BvhLeaves){lanes, true};
     return (BvhLeaves){has_blocks && lanes < LEAF_SIZE_MAX ? lanes : LEAF_SIZE_MAX, false};
 }
 

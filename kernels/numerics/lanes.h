@@ -61,7 +61,7 @@ typedef int scalar_integer;
 #define OUT_OF_LINE __attribute__((noinline))
 #endif
 
-// For a function of which constant arguments leave a part.
+// Forces inlining where constant arguments remove part of the function.
 #define ALWAYS_INLINE __attribute__((always_inline))
 
 #define JOIN_TOKENS(a, b) a##b

@@ -20,15 +20,17 @@ typedef struct {
     RealLanes error;  // of the edge values
     RealLanes w_near; // the w from which it may be hit
     real u_min, u_max, v_min, v_max;
-    // Of shadow rays: the w before which all of it lies, LARGEST where it may reach the light. `vertex` is
-    // seen from the eye of the scene; the normal leads away from the light.
+    // For shadow rays: an upper bound on the triangle's w, LARGEST where it may reach the light; a vertex on
+    // the frame's axes, but not from its origin; the normal, to either side.
     RealLanes w_far;
     Vector vertex, normal;
     real normal_squared, longest;
 } BlockView;
 
-// Whether a shadow ray needs no full test where the block's answer is certain.
-#define BLOCKS_OCCLUDE (!HAS_TRANSMISSION && !IS_CERTIFIED)
+// Whether shadow rays that certainly miss a triangle's plane, and those that certainly hit it, need no full
+// test.
+#define BLOCKS_TEST_SIDES (!IS_CERTIFIED)
+#define BLOCKS_OCCLUDE    (BLOCKS_TEST_SIDES && !HAS_TRANSMISSION)
 
 // A vertex of all triangles: 0, 1 or 2.
 static inline Vector block_vertices(const OriginFrame *frame, global const TriangleBlock *block, uint vertex)
@@ -72,7 +74,7 @@ typedef struct {
     real low, high, longest; // w of the vertices; the longest edge
     real to_vertices;        // from the common origin to those of a triangle that is hit
     real distance;           // the same, or to the rays' starts, where they are farther
-    mask is_near;            // it reaches so near to the common origin that it may be seen anywhere
+    mask is_near;            // too close to the common origin for its slopes to be bounded
 } BlockVertices;
 
 static inline BlockVertices block_load(const MacroTile *tile, global const TriangleBlock *block)
@@ -80,13 +82,15 @@ static inline BlockVertices block_load(const MacroTile *tile, global const Trian
     const OriginFrame *frame = &tile->frame;
     const Vector origin = {(real)(frame->u), (real)(frame->v), (real)(frame->w)};
     BlockVertices at;
+    const Vector b = block_vertices(frame, block, 1), c = block_vertices(frame, block, 2);
     at.vertex = block_vertices(frame, block, 0);
+    // not from the differences below: from a far origin these are rounded by more than the edges are long
+    at.ab = vector_subtract(b, at.vertex);
+    at.bc = vector_subtract(c, b);
+    at.ca = vector_subtract(at.vertex, c);
     at.a = vector_subtract(at.vertex, origin);
-    at.b = vector_subtract(block_vertices(frame, block, 1), origin);
-    at.c = vector_subtract(block_vertices(frame, block, 2), origin);
-    at.ab = vector_subtract(at.b, at.a);
-    at.bc = vector_subtract(at.c, at.b);
-    at.ca = vector_subtract(at.a, at.c);
+    at.b = vector_subtract(b, origin);
+    at.c = vector_subtract(c, origin);
     at.low = real_min_of_3(at.a.z, at.b.z, at.c.z);
     at.high = real_max_of_3(at.a.z, at.b.z, at.c.z);
     real longest_squared =
@@ -126,16 +130,17 @@ static inline uint block_see(BlockView *view, const MacroTile *tile, const Block
 static inline real block_vertex_error(const MacroTile *tile, const BlockVertices *at)
 {
     real distance = at->distance;
-    if (IS_CERTIFIED) return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
+    if (IS_CERTIFIED | IS_FAST)
+        return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
     // the full test's error counts from the ray's start
     real from_start = tile->frame.leaving ? distance : real_fma(at->low, (real)(-tile->ray_per_w), distance);
     return real_fma(from_start, (real)(VERTEX_TEST_ERROR * UNIT_ROUNDOFF),
                     distance * (real)(VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF));
 }
 
-// Sets the edges and their error, and with `occludes` what occlusion without a full test needs.
+// Sets the edges and their error, and for shadow rays what certain answers need.
 static inline void block_set_edges(BlockView *view, const MacroTile *tile, const BlockVertices *at,
-                                   bool occludes)
+                                   bool is_shadow)
 {
     Vector edge = block_cross(at->a, at->ab);
     real volume = vector_dot(edge, at->c);
@@ -147,15 +152,16 @@ static inline void block_set_edges(BlockView *view, const MacroTile *tile, const
     if (IS_CERTIFIED) width = real_fma((real)(4), vertex_error, width);
     real error = real_fma(vertex_error * (real)(tile->ray_per_w), width, (real)(SMALLEST_RATIO));
     // edge-on the sign is that of rounding, and values inside are small: docs/numerics.md
-    mask has_sign =
-        fabs(volume) > (real)(8 * UNIT_ROUNDOFF) * at->longest * at->to_vertices * at->to_vertices;
-    real signless_error = lanes_select(at->is_near, (real)(LARGEST), (real)(20) * error);
+    real volume_error = (real)(12 * UNIT_ROUNDOFF) * at->longest * at->to_vertices * at->to_vertices;
+    mask in_range = (volume_error > (real)(SMALLEST_RATIO)) & (fabs(volume) < (real)(LARGEST));
+    mask has_sign = in_range & (fabs(volume) > volume_error);
+    real signless_error = lanes_select(in_range & !at->is_near, (real)(24) * error, (real)(LARGEST));
     view->error.all = lanes_select(has_sign, error, signless_error);
-    if (!occludes) return;
+    if (!is_shadow || !BLOCKS_TEST_SIDES) return;
     const real slack = (real)(tile->slack);
     view->w_far.all = lanes_select(at->low > slack + slack, at->high + slack, (real)(LARGEST));
     view->vertex = at->vertex;
-    view->normal = vector_flip(block_cross(at->ab, at->bc), sign);
+    view->normal = block_cross(at->ab, at->bc);
     view->normal_squared = vector_dot(view->normal, view->normal);
     view->longest = at->longest;
 }
@@ -171,19 +177,19 @@ static inline real edge_value(Vector edge, real u, real v)
     return real_fma(u, edge.x, real_fma(v, edge.y, edge.z));
 }
 
-// The lanes whose shadow rays certainly start on the light's side of a triangle's plane: they miss it.
-// `to_plane`: from the start to a vertex.
+// Returns the lanes whose shadow rays certainly start on the light's side of a triangle's plane, which they
+// miss. `to_plane`: from the start to a vertex.
 static inline mask starts_before(Vector normal, real normal_squared, real longest, real u, real v,
                                  Vector to_plane)
 {
     real along = edge_value(normal, u, v), height = vector_dot(normal, to_plane);
     real squared =
         real_max(normal_squared, (real)(SMALLEST_RATIO)) * real_fma(u, u, real_fma(v, v, (real)(1)));
-    // the full test's own condition is 1/16
-    mask is_faced = along * fabs(along) > (real)(0.07f) * squared;
+    // the full test asks for 1/16, of a normal that may differ by a sixth where the height is barely enough
+    mask is_faced = along * along > (real)(0.18f) * squared;
     // in this order the product underflows only where the square on the left does
     real error = (real)(24 * UNIT_ROUNDOFF) * longest * longest;
-    return is_faced & (height > (real)(0)) &
+    return is_faced & (along * height > (real)(0)) &
            (height * height > vector_dot(to_plane, to_plane) * error * error);
 }
 
@@ -197,7 +203,7 @@ static inline void tile_occlude(MacroTile *tile, uint packet, uint lanes)
     if (!lanes_any(traversal->active)) tile->active &= ~(1u << packet);
 }
 
-// From a packet's rays' starts, on the frame's axes.
+// Returns the origins of a packet's rays on the frame's axes.
 static inline Vector packet_starts(const MacroTile *tile, uint packet)
 {
     const OriginFrame *frame = &tile->frame;
@@ -206,13 +212,14 @@ static inline Vector packet_starts(const MacroTile *tile, uint packet)
                     *vector_component(origin, frame->w_axis) * (real)(frame->side)};
 }
 
-// The triangles, of those given as bits, whose full test a packet needs: ray by ray, a lane per triangle.
+// Returns the triangles, of those given as bits, whose full test a packet needs. Loops over the rays, with
+// one triangle per lane.
 static inline ALWAYS_INLINE uint block_test_rays(MacroTile *tile, const BlockView *view, uint packet,
-                                                 uint rays, uint triangles, bool occludes)
+                                                 uint rays, uint triangles, bool is_shadow)
 {
     uint remaining = 0, occluded = 0;
     Vector starts;
-    if (occludes) starts = packet_starts(tile, packet);
+    if (is_shadow) starts = packet_starts(tile, packet);
     for (; rays != 0; rays &= rays - 1) {
         const uint lane = lowest_bit(rays);
         real u = real_of_lane(&tile->u[packet], lane), v = real_of_lane(&tile->v[packet], lane),
@@ -221,11 +228,12 @@ static inline ALWAYS_INLINE uint block_test_rays(MacroTile *tile, const BlockVie
                                    edge_value(view->edges[2], u, v));
         uint perhaps = triangles & lanes_bits(!(least < -view->error.all) & (view->w_near.all <= reach));
         if (perhaps == 0) continue;
-        if (occludes) {
-            if (perhaps & lanes_bits((least > view->error.all) & (view->w_far.all < reach))) {
-                occluded |= 1u << lane;
-                continue;
-            }
+        if (is_shadow && BLOCKS_OCCLUDE &&
+            (perhaps & lanes_bits((least > view->error.all) & (view->w_far.all < reach)))) {
+            occluded |= 1u << lane;
+            continue;
+        }
+        if (is_shadow && BLOCKS_TEST_SIDES) {
             Vector to_plane = vector_subtract(view->vertex, vector_of_lane(&starts, lane));
             perhaps &=
                 ~lanes_bits(starts_before(view->normal, view->normal_squared, view->longest, u, v, to_plane));
@@ -236,9 +244,9 @@ static inline ALWAYS_INLINE uint block_test_rays(MacroTile *tile, const BlockVie
     return tile->active >> packet & 1 ? remaining : 0;
 }
 
-// The same triangle by triangle, a lane per ray.
+// Returns the triangles whose full test a packet needs. Loops over the triangles, with one ray per lane.
 static inline ALWAYS_INLINE uint block_test_triangles(MacroTile *tile, const BlockView *view, uint packet,
-                                                      uint triangles, bool occludes)
+                                                      uint triangles, bool is_shadow)
 {
     uint remaining = 0;
     const real u = tile->u[packet], v = tile->v[packet];
@@ -250,20 +258,20 @@ static inline ALWAYS_INLINE uint block_test_triangles(MacroTile *tile, const Blo
                                    edge_value(vector_of_lane(&view->edges[2], lane), u, v));
         uint perhaps = lanes_bits(!(least < -error) & ((real)(view->w_near.each[lane]) <= reach));
         if (perhaps == 0) continue;
-        if (occludes) {
+        if (is_shadow && BLOCKS_OCCLUDE) {
             const uint occluded = lanes_bits((least > error) & ((real)(view->w_far.each[lane]) < reach));
             if (occluded != 0) tile_occlude(tile, packet, occluded);
             if (!(tile->active >> packet & 1)) return 0;
             perhaps &= ~occluded;
-            if (perhaps == 0) continue;
+        }
+        if (is_shadow && BLOCKS_TEST_SIDES && perhaps != 0) {
             Vector to_plane =
                 vector_subtract(vector_of_lane(&view->vertex, lane), packet_starts(tile, packet));
             perhaps &= ~lanes_bits(starts_before(vector_of_lane(&view->normal, lane),
                                                  real_of_lane(&view->normal_squared, lane),
                                                  real_of_lane(&view->longest, lane), u, v, to_plane));
-            if (perhaps == 0) continue;
         }
-        remaining |= 1u << lane;
+        if (perhaps != 0) remaining |= 1u << lane;
     }
     return remaining;
 }
@@ -280,13 +288,12 @@ static inline void triangles_prefetch(const Scene *scene, uint first, uint trian
 static inline ALWAYS_INLINE void tile_visit_block(MacroTile *tile, const Scene *scene, uint block, uint count,
                                                   const SeenRectangle *seen, uint packets, bool is_shadow)
 {
-    const bool occludes = is_shadow && BLOCKS_OCCLUDE;
     if (tile->has_shrunk) tile_bound_reach(tile);
     BlockView view;
     const BlockVertices vertices = block_load(tile, &scene->triangle_blocks[block]);
     const uint triangles = block_see(&view, tile, &vertices, count);
     if (triangles == 0) return;
-    block_set_edges(&view, tile, &vertices, occludes);
+    block_set_edges(&view, tile, &vertices, is_shadow);
     const uint first = block_first(scene, block);
     uint prefetched = is_shadow ? 0 : triangles; // many of a shadow ray's are missed
     triangles_prefetch(scene, first, prefetched);
@@ -302,8 +309,8 @@ static inline ALWAYS_INLINE void tile_visit_block(MacroTile *tile, const Scene *
                                                  (view.w_near.all <= (real)(tile->reach_max.each[packet])));
         if (near == 0) continue;
         const uint left = popcount(rays) <= popcount(near)
-                              ? block_test_rays(tile, &view, packet, rays, near, occludes)
-                              : block_test_triangles(tile, &view, packet, near, occludes);
+                              ? block_test_rays(tile, &view, packet, rays, near, is_shadow)
+                              : block_test_triangles(tile, &view, packet, near, is_shadow);
         if (left == 0) continue;
         remaining[packet] = (ushort)left;
         tested |= 1u << packet;
