@@ -40,7 +40,9 @@ static ChainTimes chains_time(Measurement *measurement, cl_uint rounds, double l
         times.fused = fmin(times.fused, chain_seconds(measurement, PROBE_TIME_FMA, rounds, 1));
         times.separate = fmin(times.separate, chain_seconds(measurement, PROBE_TIME_SEPARATE, rounds, 1));
         const bool seems_slow = times.fused - launch >= PASSPORT_FMA_COST_MAX * (times.separate - launch);
-        if ((turn >= TURNS_MIN && !seems_slow) || fmax(times.fused, times.separate) > 50 * wanted) break;
+        // the first turn alone may have waited for a processor
+        const bool takes_long = turn > 1 && fmax(times.fused, times.separate) > 50 * wanted;
+        if ((turn >= TURNS_MIN && !seems_slow) || takes_long) break;
     }
     return times;
 }
