@@ -1,0 +1,135 @@
+// Whole scenes as glint certify judges them: double and certified decide as the reference does, and the
+// reference raises no false alarms. tests/test_certify.py has the command. run_tests: sanitize-long-only
+#include "host/verify/certify.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include "tests/scene_reading.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 96, HEIGHT = 64, PIXELS = WIDTH * HEIGHT };
+
+// Renders the scene, `scale` times as wide and high as WIDTH and HEIGHT, and compares about `count` pixels.
+// `doubts` is of pixels undecided at certified; NULL: not wanted.
+static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t scale, size_t count,
+                             CertifyDoubts *doubts)
+{
+    const RenderSettings settings = film_settings(WIDTH * scale, HEIGHT * scale, precision);
+    CertifySample reference;
+    assert_true(certify_sample_open(&reference, scene, settings.width, settings.height, count,
+                                    settings.bounce_count, NULL));
+    Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT);
+    const CertifyErrors errors = certify_compare(&reference, &film);
+    size_t undecided = 0;
+    for (size_t i = 0; i < reference.count; i++)
+        undecided += reference_is_undecided(&reference.pixels[i]);
+    assert_int_equal(errors.compared, reference.count - undecided);
+    assert_true(undecided < reference.count / 10);
+    if (doubts) *doubts = certify_doubts(scene, &film, count / 10 + 1, settings.bounce_count, NULL);
+    film_free(&film);
+    certify_sample_close(&reference);
+    return errors;
+}
+
+static size_t wrong_pixels(const CertifyErrors *errors)
+{
+    return errors->object + errors->shadow + errors->path + errors->color;
+}
+
+// Scenes of every shape, light and kind of bounce. The largest error of double is 3e-12.
+static void the_best_precision_is_right(void **state)
+{
+    (void)state;
+    const bool has_double = probe_has(PRECISION_DOUBLE);
+    const char *const paths[] = {"scenes/demo.yaml", "scenes/mirror-glass.yaml", "scenes/paraboloids.yaml",
+                                 "scenes/triangles.yaml"};
+    for (size_t i = 0; i < (tests_are_long() ? 4 : 3); i++) {
+        Scene scene = scene_of_file(paths[i]);
+        const CertifyErrors errors =
+            certify(&scene, has_double ? PRECISION_DOUBLE : PRECISION_STRICT, 1, 600, NULL);
+        print_message("%s\n", paths[i]);
+        assert_true(wrong_pixels(&errors) <= (has_double ? 0 : 2));
+        assert_true(!has_double || errors.right_color < 1e-10);
+        scene_free(&scene);
+    }
+}
+
+// By a smooth triangle's normals the reflected ray would run through it, and a light behind it shine on it.
+static void tilted_normals_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    Scene scene = scene_of_text(
+        "tilted.yaml",
+        "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
+        "lights: [{point: {position: [8, 0, 2]}}, {point: {position: [3, 1, -4]}}]\n"
+        "objects:\n"
+        "  - triangle: {vertices: [[-2, -1, 0], [0, 2, 0], [2, -1, 0]], material: {reflection: 0.5},\n"
+        "               normals: [[3, 0, -1], [3, 1, -1], [1, 0, -1]]}\n"
+        "  - sphere: {center: [3, 0, 3], radius: 2}\n");
+    const CertifyErrors errors = certify(&scene, PRECISION_DOUBLE, 1, 600, NULL);
+    assert_int_equal(wrong_pixels(&errors), 0);
+    assert_true(errors.right_color < 1e-10);
+    const CertifyErrors certified = certify(&scene, PRECISION_CERTIFIED, 1, 600, NULL);
+    assert_int_equal(wrong_pixels(&certified), 0);
+    scene_free(&scene);
+}
+
+static void colors_compare(const Scene *scene, uint32_t scale)
+{
+    const size_t count = PIXELS * (size_t)scale * scale;
+    const CertifyErrors single = certify(scene, PRECISION_SINGLE, scale, count, NULL),
+                        certified = certify(scene, PRECISION_CERTIFIED, scale, count, NULL);
+    assert_int_equal(single.color + certified.color, 0);
+    assert_true(certified.right_color <= 2 * single.right_color);
+}
+
+// They are as exact as those of single, even at the edges of round shapes.
+static void colors_of_certified_are_exact(void **state)
+{
+    (void)state;
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    Scene scene = scene_of_file("scenes/article.yaml");
+    if (tests_are_long()) colors_compare(&scene, 6);
+    scene.camera.look_at = (Vector3){-1.6947, 1.4227, 0.2414}; // the edge of the cone
+    scene.camera.half_tangent /= 30;
+    colors_compare(&scene, 1);
+    scene_free(&scene);
+}
+
+// A camera whose vectors rounding turns by a ten-thousandth, a blocker just before a light, and glass just
+// above a floor. The reference starts from the vectors of double, and neither skips nor joins surfaces that
+// are close to each other.
+static void there_are_no_false_alarms(void **state)
+{
+    (void)state;
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    Scene scene = scene_of_text(
+        "near.yaml",
+        "camera: {position: [0.3, 2.1, -5], look_at: [1, 0.4, 0.7], up: [0.7, -1.7, 5.70000000005], fov: "
+        "50}\n"
+        "lights: [{point: {position: [1, 5, 0]}}, {point: {position: [-3, 4, -6]}}]\n"
+        "materials:\n"
+        "  tiles: {checker: {colors: [[1, 1, 1], [0.2, 0.2, 0.2]], size: 0.05}}\n"
+        "  glass: {transmission: 0.8, ior: 1.1}\n"
+        "objects:\n"
+        "  - plane: {point: [0, 0, 0], normal: [0.1, 1, 0.2], material: tiles}\n"
+        "  - disc: {center: [1, 4.999999999999, 0], normal: [0, 1, 0], radius: 1}\n"
+        "  - disc: {center: [0, 1e-10, 0], normal: [0.1, 1, 0.2], radius: 2, material: glass}\n");
+    CertifyDoubts doubts;
+    const CertifyErrors errors = certify(&scene, PRECISION_CERTIFIED, 1, PIXELS, &doubts);
+    assert_int_equal(errors.wrong_decided + errors.unconfirmed + errors.contradicted, 0);
+    assert_true(errors.compared > 6000 && doubts.count < 600);
+    scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_best_precision_is_right), cmocka_unit_test(tilted_normals_are_decided),
+        cmocka_unit_test(colors_of_certified_are_exact), cmocka_unit_test(there_are_no_false_alarms)};
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
