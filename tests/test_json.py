@@ -138,7 +138,7 @@ class Json(TestCase):
                            self.json("diff a.t.npy a.t.npy --max-ulp 0 --json"))
 
     def test_bench(self):
-        bench = self.glint(f"bench plain.yaml strong.yaml {SMALL} {QUICK} --bvh auto,on --launches --json")
+        bench = self.glint(f"bench plain.yaml strong.yaml {SMALL} {QUICK} --samples 1,2 --launches --json")
         baseline = json.loads(bench.stdout)
         for run in baseline["runs"]:
             if "status" not in run:
@@ -148,14 +148,14 @@ class Json(TestCase):
             run["frame_samples_ms"] = run.get("frame_samples_ms", [])[:5]  # too few
         write("bench.json", json.dumps(baseline))
         self.check_members("glint bench", self.json(
-            f"bench plain.yaml {SMALL} {QUICK} --bvh off,on --json --compare bench.json", status=4),
+            f"bench plain.yaml {SMALL} {QUICK} --samples 2,3 --json --compare bench.json", status=4),
             json.loads(bench.stdout))
         self.check_members("glint bench --against", self.json(
             f"bench plain.yaml {SMALL} {QUICK} --json --against {PROGRAM}", status=4))
 
     def test_certify(self):
         self.check_members("glint certify", self.json(f"certify plain.yaml {SMALL} --precision single,certified --json"),
-                           self.json(f"certify plain.yaml {SMALL} --precision single,certified --json --perturb 1"))
+                           self.json(f"certify plain.yaml {SMALL} --precision single --json --perturb 1:1000"))
 
     def test_verify(self):
         """Cases with a measure and without, one of them an image."""
