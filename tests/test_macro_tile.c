@@ -214,7 +214,8 @@ static void sheet_add(Scene *scene, double z, bool has_holes)
     enum { COLUMNS = 20, ROWS = 12 };
     const double cell = 0.1;
     for (int i = 0; i < COLUMNS * ROWS; i++) {
-        const double x = (i % COLUMNS - COLUMNS / 2) * cell, y = (double)(i / COLUMNS - ROWS / 2) * cell;
+        const int column = i % COLUMNS - COLUMNS / 2, row = i / COLUMNS - ROWS / 2;
+        const double x = column * cell, y = row * cell;
         const Vector3 a = {x, y, z}, b = {x + cell, y, z}, c = {x, y + cell, z}, d = {x + cell, y + cell, z};
         for (int half = 0; half < 2; half++) {
             if (has_holes && random_coin(&random_state)) continue;
