@@ -157,7 +157,8 @@ static inline void block_set_edges(BlockView *view, const MacroTile *tile, const
     mask has_sign = in_range & (fabs(volume) > volume_error);
     real signless_error = lanes_select(in_range & !at->is_near, (real)(24) * error, (real)(LARGEST));
     view->error.all = lanes_select(has_sign, error, signless_error);
-    if (!is_shadow || !BLOCKS_TEST_SIDES) return;
+    if (IS_CERTIFIED) return;
+    if (!is_shadow) return;
     const real slack = (real)(tile->slack);
     view->w_far.all = lanes_select(at->low > slack + slack, at->high + slack, (real)(LARGEST));
     view->vertex = at->vertex;
