@@ -114,7 +114,8 @@ failing         := $(wildcard tests/failing/*.c)
 failing_objects := $(failing:%.c=$(BUILD)/%.o)
 failing_tests   := $(addprefix $(BUILD)/tests/,test_opencl_failure test_device_loss test_command_failure)
 
-$(failing_tests): private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=pthread_create
+$(failing_tests): private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=statvfs64 \
+                             -Wl,--wrap=pthread_create
 $(failing_tests): $(failing_objects)
 
 # The paces of its workers are exact.
