@@ -91,7 +91,9 @@ def terminal_run(command):
 
 def shim_build(name, source, *flags):
     """Builds a library that a test preloads from C; returns its path."""
-    command = [*shlex.split(os.environ.get("CC", "cc")), "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", name, *flags]
+    compiler = shlex.split(os.environ.get("CC", "cc"))
+    # before C23, a function declared with () takes any arguments
+    command = [*compiler, "-std=gnu11", "-w", "-shared", "-fPIC", "-x", "c", "-", "-o", name, *flags]
     subprocess.run(command, input=source, text=True, check=True)
     return os.path.abspath(name)
 
