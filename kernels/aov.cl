@@ -3,7 +3,7 @@
 #include "film.h"
 #include "shading/phong.h"
 
-// Infinity on a miss, from bits, since `fast` assumes there are none.
+// Returns infinity on a miss, from bits, since -cl-finite-math-only (--build-options) assumes there is none.
 static inline real hit_distance(const Hit *hit)
 {
     return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));

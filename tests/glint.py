@@ -35,7 +35,7 @@ lights:
 objects:
   - sphere: {center: [0, 0, 0], radius: 1}
 """
-# At fast shadow rays start meters off the ground, so that a small sphere has no shadow.
+# With errors a thousand times a device's, shadow rays start meters off the ground, so that a small sphere has no shadow.
 PLANET = """\
 camera: {position: [0, 6371001.7, 0], look_at: [0, 6371000, 1], fov: 60}
 lights: [{point: {position: [2, 6371001, -1]}}]

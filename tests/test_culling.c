@@ -182,7 +182,7 @@ static cl_program culling_program(bool is_double)
 {
     Text prelude = {0};
     text_appendf(&prelude,
-                 "#define LANES 1\n#define IS_FAST 0\n#define IS_STRICT 0\n#define IS_CERTIFIED 0\n#define "
+                 "#define LANES 1\n#define IS_STRICT 0\n#define IS_CERTIFIED 0\n#define "
                  "IS_DOUBLE %d\n"
                  "#define REPAIRS_DIVIDE 0\n#define HAS_FMA 1\n#define IS_COUNTING 0\n#define PERTURB "
                  "0\n#define PERTURB_SEED "

@@ -64,7 +64,7 @@ def leaks(program, name):
 
 
 def glint_peer_cases():
-    counts = {peer_cases(f"glint {precision}")[:2] for precision in ("fast", "single", "strict", "double")}
+    counts = {peer_cases(f"glint {precision}")[:2] for precision in ("single", "strict", "double")}
     (both,) = counts
     return both
 
@@ -93,7 +93,7 @@ def rungs(*forms, shapes=None, distances=lambda distance: True):
             if rung["form"] in forms and (not shapes or rung["shape"] in shapes) and distances(rung["distance"])]
 
 
-OWN = "fast", "single", "strict", "double"
+OWN = "single", "strict", "double"
 ROUND = "sphere", "cylinder", "cone"
 
 
@@ -195,9 +195,9 @@ def perturbed(precision, case):
 
 
 def perturbed_others():
-    """What fails other than R6 at fast, and R7 at fast and single."""
+    """What fails other than R7 at single."""
     return [(run["precision"], run["seed"], failure["name"]) for run in measured("perturb")["runs"] for failure in run["failures"]
-            if (run["precision"], failure["name"]) not in (("fast", "R6"), ("fast", "R7"), ("single", "R7"))]
+            if (run["precision"], failure["name"]) != ("single", "R7")]
 
 
 def perturbed_seeds(precision):
@@ -244,13 +244,9 @@ CLAIMS = [  # N stands for a number
               passed_elsewhere("verify-everywhere", "oclgrind")[0])),
     ("docs/verify.md", "today's N cases", lambda: (verify_counts(),)),
     ("docs/verify.md", "M6 takes it N to N minutes", lambda: (min(rusticl_m6_minutes()), max(rusticl_m6_minutes()))),
-    ("docs/verify.md", "R6 at `fast` loses N to N of N pixels",
-     lambda: (min(case["differing"] for case in perturbed("fast", "R6")), max(case["differing"] for case in perturbed("fast", "R6")),
-              perturbed("fast", "R6")[0]["rays"])),
-    ("docs/verify.md", "R7 exceeds its 1e-5: N at `fast`, N at `single`",
-     lambda: (max(case["worst"] for case in perturbed("fast", "R7")), max(case["worst"] for case in perturbed("single", "R7")))),
-    ("docs/verify.md", r"perturb\.json single:(\S+) fast:(\S+) strict:(\S+) double:(\S+)",
-     lambda: tuple(map(perturbed_seeds, ("single", "fast", "strict", "double")))),
+    ("docs/verify.md", "R7 exceeds its 1e-5: N at `single`", lambda: (max(case["worst"] for case in perturbed("single", "R7")),)),
+    ("docs/verify.md", r"perturb\.json single:(\S+) strict:(\S+) double:(\S+)",
+     lambda: tuple(map(perturbed_seeds, ("single", "strict", "double")))),
     ("docs/verify.md", r"\| glint, each precision \| N of N \|", glint_peer_cases),
     ("docs/verify.md", r"\| Embree \| N of N \| C3, C4, C7: .*?; M1: N of N rays leak .*?; C6, P3, S6: one ray each",
      lambda: (*peer_cases("Embree")[:2], *leaks("Embree", "M1"))),
@@ -273,7 +269,7 @@ CLAIMS = [  # N stands for a number
 # Document, a sentence, and whether the measurements hold it up.
 FACTS = [
     ("docs/accuracy.md", "Every image keeps its budget.", lambda: all(row["error"] <= float(row["budget"]) for *_, row in budgets())),
-    ("docs/verify.md", "Seeds 1 to 20 hold at `fast` and `single`, but R6 at `fast`", lambda: perturbed_others() == []),
+    ("docs/verify.md", "Seeds 1 to 20 hold at `single`", lambda: perturbed_others() == []),
     ("docs/verify.md", "| C3, C4, C7: cones", lambda: peer_cases("Embree")[2] == ["C3", "C4", "C6", "C7", "M1", "P3", "S6"]),
     ("docs/verify.md", "| these and P5 |",
      lambda: set(peer_cases("Embree without its robust flag")[2]) == {*peer_cases("Embree")[2], "P5"}),

@@ -189,7 +189,7 @@ class Html(TestCase):
     def test_two_scenes(self):
         name = f"<!--<script>&\"é{'-long' * 40}.yaml"
         shutil.copy("spheres16.yaml", name)
-        page, report = self.page(f"spheres16.yaml '{name}' --precision fast,strict,certified,double")
+        page, report = self.page(f"spheres16.yaml '{name}' --precision single,strict,certified,double")
         self.assertEqual(len(report["scenes"][0]["picks"]), 3)
         self.check_drawn(page, report)
 
@@ -202,7 +202,7 @@ class Html(TestCase):
     def test_reference_from_a_file(self):
         """It has colors only, and no errors of distances and normals."""
         self.glint("render spheres16.yaml --size 120x80 --precision double -o reference.npy")
-        page, report = self.page("spheres16.yaml --precision fast,double --reference reference.npy")
+        page, report = self.page("spheres16.yaml --precision single,double --reference reference.npy")
         self.check_drawn(page, report)
 
     def test_refused_before_measuring(self):

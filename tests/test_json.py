@@ -167,13 +167,12 @@ class Json(TestCase):
         write("planet.yaml", PLANET)
         # which of two is nearer is lost at single
         write("twins.yaml", PLAIN + "  - sphere: {center: [1e-9, 0.5, 0], radius: 0.5}\n")
-        # of BALLS paths are wrong at fast
         common = f"--size 96x64 {QUICK} --bounces 16 --json"
         self.check_members(
             "glint accuracy",
-            self.json(f"accuracy planet.yaml {BALLS} strong.yaml {common} --precision fast,double --save saved"),
+            self.json(f"accuracy planet.yaml {BALLS} strong.yaml {common} --precision single,double --save saved"),
             self.json(f"accuracy twins.yaml {common} --precision single --perturb 1:1000"),
-            self.json(f"accuracy {BALLS} {common} --precision fast --reference saved/1-mirror-balls-reference.color.npy"))
+            self.json(f"accuracy {BALLS} {common} --precision single --perturb 1:1000 --reference saved/1-mirror-balls-reference.color.npy"))
 
 
 def write_page():

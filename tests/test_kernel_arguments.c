@@ -70,9 +70,8 @@ static Arguments arguments_of(cl_kernel kernel, const char *name)
 static cl_program program_with_arguments(const char *text)
 {
     Text prelude = {0};
-    static const char *const zeros[] = {"IS_FAST",      "IS_STRICT",     "IS_DOUBLE",
-                                        "IS_CERTIFIED", "IS_PIXEL_LIST", "REPAIRS_DIVIDE",
-                                        "IS_COUNTING",  "PERTURB",       "PERTURB_SEED"};
+    static const char *const zeros[] = {"IS_STRICT",      "IS_DOUBLE",   "IS_CERTIFIED", "IS_PIXEL_LIST",
+                                        "REPAIRS_DIVIDE", "IS_COUNTING", "PERTURB",      "PERTURB_SEED"};
     static const char *const ones[] = {"LANES", "HAS_FMA", "PENDING_MAX", "PERTURB_SCALE"};
     for (size_t i = 0; i < sizeof zeros / sizeof *zeros; i++)
         text_appendf(&prelude, "#define %s 0\n", zeros[i]);

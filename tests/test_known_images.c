@@ -110,7 +110,7 @@ static void light_above_plane(Precision precision)
                  "objects: [{plane: {point: [0, 0, 0], normal: [0, 3, 0], material: {color: [0.5, 1, 0.5], "
                  "diffuse: [0.5, 0.25, 1]}}}]\n");
     Film film = render(&scene, 33, 33, precision, AOV_POSITION);
-    double tolerance = precision == PRECISION_FAST ? 1e-5 : precision == PRECISION_DOUBLE ? 1e-14 : 3e-7;
+    double tolerance = precision == PRECISION_DOUBLE ? 1e-14 : 3e-7;
     for (size_t i = 0; i < (size_t)33 * 33; i++) {
         Vector3 p = film_place(&film, &scene, i);
         // one pixel spans 4/33 on the plane
@@ -122,7 +122,7 @@ static void light_above_plane(Precision precision)
         check(near(film.color[3 * i + 2], 0.0625 * facing, tolerance));
     }
     size_t middle = 16 * 33 + 16;
-    if (precision != PRECISION_FAST) check(film.color[3 * middle] == 0.125);
+    check(film.color[3 * middle] == 0.125);
     film_free(&film);
 
     scene.materials.items[scene.objects.items[0].material].specular = 0.75;
@@ -253,7 +253,7 @@ static void highlight(Precision precision)
             // where the light only grazes, its own sign is a matter of rounding
             if (exponents[e] >= 1 || value != 0) check(near(value, expected, tolerance));
         }
-        if (precision != PRECISION_FAST) check(brightest > 1 - 1e-3);
+        check(brightest > 1 - 1e-3);
         film_free(&film);
     }
     scene_free(&scene);

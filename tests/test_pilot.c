@@ -193,7 +193,7 @@ static void pilot_chooses(void **state)
     (void)state;
     if (!probe_compute.device->fp64) skip();
     Scene scene = scene_of_file("scenes/globe.yaml");
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_FAST);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     MessageList messages = {0};
     Pilot pilot;
     assert_true(
@@ -216,7 +216,7 @@ static void pilot_chooses(void **state)
 
     // a highlight of less than a pixel may be anywhere: what is not sampled may be as bright as it
     const ErrorBudget budget = {0.1, ERROR_RMSE};
-    settings = film_settings(320, 240, PRECISION_FAST);
+    settings = film_settings(320, 240, PRECISION_SINGLE);
     assert_true(pilot_run(&pilot, &budget, &probe_compute, &scene, &settings, &messages));
     assert_true(pilot.chosen != PRECISION_DOUBLE && pilot.candidates[pilot.chosen].verdict.bound <= 0.1);
     for (size_t i = 0; i < scene.materials.count; i++) {

@@ -37,10 +37,8 @@ typedef struct {
 } Tolerance;
 
 // Those of `single` and `strict` are the tiers B and C of the hard cases, with the slack at every angle,
-// since near a surface no bound can be an ulp of a small t after a subtraction of larger numbers; those of
-// `fast` are twice `single`'s.
+// since near a surface no bound can be an ulp of a small t after a subtraction of larger numbers.
 static const Tolerance tolerances[ARITHMETIC_COUNT] = {
-    [PRECISION_FAST] = {16, 32, 10, 32, false},
     [PRECISION_SINGLE] = {8, 16, 5, 16, false},
     [PRECISION_STRICT] = {4, 4, 16, 16, true},
     [PRECISION_DOUBLE] = {4, 4, 16, 16, true},

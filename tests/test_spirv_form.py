@@ -8,7 +8,7 @@ SCENES = ["bunny"]
 if glint.IS_LONG:
     SCENES = [f"{scene}:{precision}"
               for scene in ("spheres16", "bunny", "mirror-glass", f"{glint.ROOT}/tests/scenes/every_shape.yaml")
-              for precision in ("fast", "single", "strict", "double", "certified")]
+              for precision in ("single", "strict", "double", "certified")]
 POINTER_ARRAY = """\
 kernel void pointer_array(global int *a, global int *b, global int *c, uint n)
 {

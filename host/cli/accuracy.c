@@ -44,7 +44,7 @@ static const char help_text[] =
     "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
     "      --save FOLDER     write all compared arrays there, as .npy\n"
     "      --html FILE       self-contained HTML report\n"
-    "      --precision LIST  of fast, single, strict, double, certified (default: the first four)\n" //
+    "      --precision LIST  of single, strict, double, certified (default: the first three)\n" //
     HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {

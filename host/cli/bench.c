@@ -46,7 +46,7 @@ static const char help_text[] =
     "with --compare)\n"
     "      --worker          answer another glint's --against\n"
     "      --launches        list the kernel launches of each row's last run\n"
-    "      --precision LIST  of fast, single, strict, double, certified (default: single)\n"
+    "      --precision LIST  of single, strict, double, certified (default: single)\n"
     "      --samples LIST    per pixel, one row each (default: 1)\n" //
     HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_JSON HELP_HELP;
 

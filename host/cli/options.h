@@ -97,7 +97,7 @@ enum {
 #define HELP_HELP "  -h, --help            print this help\n"
 
 // Help on COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES and a --precision.
-#define HELP_PRECISION "      --precision P     fast, single, strict, double or certified (default: single)\n"
+#define HELP_PRECISION "      --precision P     single, strict, double or certified (default: single)\n"
 #define HELP_COMMON                                                                                          \
     HELP_LANES                                                                                               \
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \

@@ -35,7 +35,7 @@ static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\
                                 "decimal or C hexadecimal; - is\n"
                                 "                        standard input; # starts a comment\n"
                                 "  -o, --output FILE     CSV file (default: standard output)\n" //
-    HELP_DEVICE "      --precision P     fast, single, strict or double (default: single)\n"    //
+    HELP_DEVICE "      --precision P     single, strict or double (default: single)\n"          //
     HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
 typedef struct {

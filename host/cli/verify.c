@@ -36,7 +36,7 @@ static const char help_text[] =
     "usage: glint verify [CASE...] [OPTIONS]\n\n"
     "Runs the hard cases, or those named, on a device and checks each against its bound; exit status 3 if "
     "any fails.\n\n"
-    "      --precision P     fast, single, strict or double (default: all that the device has)\n"
+    "      --precision P     single, strict or double (default: all that the device has)\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
     HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_JSON HELP_HELP;
@@ -308,7 +308,7 @@ static int device_verify(Verification *verification, Compute *compute)
 {
     const VerifyOptions *options = verification->options;
     VerifyJournal *journal = verification->journal;
-    Precision first = options->every_precision ? PRECISION_FAST : options->common.precision;
+    Precision first = options->every_precision ? PRECISION_SINGLE : options->common.precision;
     Precision last = options->every_precision ? PRECISION_DOUBLE : options->common.precision;
     if (!compute->device->fp64 && last == PRECISION_DOUBLE) {
         if (!options->every_precision) {

@@ -5,7 +5,7 @@
 #include "host/compile/stages.h"
 #include "host/compile/transform.h"
 
-const char *const precision_names[PRECISION_COUNT] = {"fast", "single", "strict", "double", "certified"};
+const char *const precision_names[PRECISION_COUNT] = {"single", "strict", "double", "certified"};
 
 const char *const bvh_choice_names[BVH_CHOICE_COUNT] = {"auto", "on", "off"};
 

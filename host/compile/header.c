@@ -3,7 +3,7 @@
 #include <float.h>
 #include <string.h>
 
-// Kernels at `fast` need not know infinities.
+// Kernels built with -cl-finite-math-only need not know infinities.
 static scalar4 scalar4_within_floats(Vector3 v)
 {
     return scalar4_of(vector_max(vector_min(v, vector_all(FLT_MAX)), vector_all(-FLT_MAX)), 0);

@@ -5,7 +5,6 @@
 #include "host/compile/features.h"
 
 typedef enum {
-    PRECISION_FAST,   // float, relaxed math and native functions
     PRECISION_SINGLE, // float, uncontracted; divisions and roots as the device has them
     PRECISION_STRICT, // float, compensated and correctly rounded: the same bits on every device
     PRECISION_DOUBLE, // double

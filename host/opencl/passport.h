@@ -7,7 +7,7 @@
 #include "host/opencl/compute.h"
 #include "host/opencl/exact.h"
 
-// The build options and functions that a precision's kernels share. `fast` is decided by PASSPORT_SINGLE.
+// The build options and functions that a precision's kernels share.
 typedef enum { PASSPORT_SINGLE, PASSPORT_STRICT, PASSPORT_DOUBLE, PASSPORT_MODE_COUNT } PassportMode;
 extern const char *const passport_mode_names[PASSPORT_MODE_COUNT];
 
@@ -88,7 +88,7 @@ bool passport_rounds_correctly(const Passport *passport);
 const char *passport_timer_fault(const Device *device);
 
 // Each property has a finding: as it should be; unusual, which glint allows for; or broken, which the
-// precisions of the mode other than `single` and `fast` rely on.
+// precisions of the mode other than `single` rely on.
 typedef enum { FINDING_SOUND, FINDING_UNUSUAL, FINDING_BROKEN } Finding;
 extern const char *const finding_names[];
 

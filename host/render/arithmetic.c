@@ -6,7 +6,6 @@ static const struct {
     unsigned mode_count;
     bool relies; // refused where a property of a mode is broken
 } needs[PRECISION_COUNT] = {
-    [PRECISION_FAST] = {{PASSPORT_SINGLE}, 1, false},
     [PRECISION_SINGLE] = {{PASSPORT_SINGLE}, 1, false},
     [PRECISION_STRICT] = {{PASSPORT_STRICT}, 1, true},
     [PRECISION_DOUBLE] = {{PASSPORT_DOUBLE}, 1, true},

@@ -90,7 +90,6 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
     const uint32_t scale = settings->perturb_scale;
     text_appendf(text, "#define LANES %u\n", renderer->report.lanes);
     text_appendf(text, "#define IS_OUT_OF_LINE %d\n", is_out_of_line);
-    text_appendf(text, "#define IS_FAST %d\n", precision == PRECISION_FAST);
     text_appendf(text, "#define IS_STRICT %d\n", precision == PRECISION_STRICT);
     text_appendf(text, "#define IS_DOUBLE %d\n", precision == PRECISION_DOUBLE);
     text_appendf(text, "#define IS_CERTIFIED %d\n", renderer_certifies(renderer));
@@ -110,7 +109,6 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
 
 static const char *build_options(const Renderer *renderer)
 {
-    if (renderer->settings.precision == PRECISION_FAST) return "-cl-std=CL1.2 -cl-fast-relaxed-math";
     return passport_build_options(renderer->compute->device, renderer->passport->mode);
 }
 

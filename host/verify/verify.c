@@ -351,7 +351,6 @@ static bool is_inexact(const RenderSettings *settings)
 VerifyTier verify_tier(const RenderSettings *settings)
 {
     static const VerifyTier tiers[PRECISION_COUNT] = {
-        [PRECISION_FAST] = TIER_A,
         [PRECISION_SINGLE] = TIER_B,
         [PRECISION_STRICT] = TIER_C,
         [PRECISION_DOUBLE] = TIER_D,

@@ -120,7 +120,6 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
     case SDLK_2:
     case SDLK_3:
     case SDLK_4:
-    case SDLK_5:
         window->precision = (Precision)(event->keysym.sym - SDLK_1);
         window->image_changed = true;
         break;

@@ -5,7 +5,7 @@
 //
 // The host defines these macros before the text (prelude_write in host/render/renderer_kernels.c):
 //     LANES            1, 4, 8 or 16
-//     IS_FAST, IS_STRICT, IS_DOUBLE    the precision, at most one of them 1
+//     IS_STRICT, IS_DOUBLE    the precision, at most one of them 1
 //     IS_CERTIFIED     1: every decision has a bound on its error: shapes/certain.h
 //     IS_PIXEL_LIST    1: renders a list of pixels instead of a band: film.h
 //     REPAIRS_DIVIDE   1 at `strict` where the device's division and square root are inexact: numerics.h
@@ -19,11 +19,6 @@
 #define LANES_H
 
 #pragma OPENCL FP_CONTRACT OFF
-
-// Relaxed math lets a compiler reassociate sums, and so cancel the terms that measure their rounding error.
-#if IS_FAST && defined(__clang__) && __clang_major__ >= 12
-#pragma clang fp reassociate(off)
-#endif
 
 #if IS_DOUBLE
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable

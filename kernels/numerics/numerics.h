@@ -258,14 +258,10 @@ static inline real real_exp_negative(real x)
     return lanes_select(x < lowest, (real)(0), series * power);
 }
 
-// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1. `fast` uses the device's native functions.
+// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1.
 static inline real real_complement_power(real s, real n)
 {
-#if IS_FAST
-    real power = device_exp2(n * device_log2((real)(1) - s));
-#else
     real power = perturbed_power(real_exp_negative(n * real_log_complement(s)), s, n);
-#endif
     return real_min(power, (real)(1));
 }
 

@@ -51,13 +51,6 @@ static inline Pair two_product(real a, real b)
     return (Pair){product, a_low * b_low - missing};
 }
 
-#if IS_FAST
-
-// May round twice: of all products only two_product's are exact here.
-#define real_fma mad
-
-#else
-
 // high + low rounded to odd: if low is not 0, the one of the two reals around the sum whose last bit is 1.
 static inline real pair_round_to_odd(Pair sum)
 {
@@ -77,8 +70,6 @@ static inline real real_fma(real a, real b, real c)
     mask finite = (fabs(rounded_twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
     return lanes_select(finite & (rounded_once != (real)(0)), rounded_once, rounded_twice);
 }
-
-#endif
 
 #endif
 

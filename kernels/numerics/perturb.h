@@ -1,5 +1,5 @@
-// The operations whose results differ between devices, and simulated errors: division, square root and the
-// native functions are called only here. PERTURB adds to each result the error that the OpenCL C
+// The operations whose results differ between devices, and simulated errors: division and square root are
+// called only here. PERTURB adds to each result the error that the OpenCL C
 // specification permits (3.0, Relative Error as ULPs), times PERTURB_SCALE.
 //
 // The error is a hash of PERTURB_SEED, the operation and its operands alone, so that equal operations err
@@ -20,10 +20,10 @@
 #define HASH_MULTIPLIER ((unsigned_integer)(0x9e3779b1U))
 #endif
 
-enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_EXP2, PERTURBED_LOG2, PERTURBED_COUNT };
+enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_COUNT };
 
 // In ulp, in addition to the device's own rounding.
-enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16, NATIVE_ERROR = 8192 };
+enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16 };
 
 static inline unsigned_integer perturb_hash(uint operation, integer a, integer b)
 {
@@ -48,18 +48,13 @@ static inline real perturb(real value, unsigned_integer hash, uint largest)
     return lanes_select(ordinary, real_from_bits(bits_from_real(value) + steps), value);
 }
 
-// Under -cl-fast-relaxed-math the error of division is bounded for operands in 2^-62 .. 2^62 and reciprocals.
 static inline real device_divide(real a, real b)
 {
     real quotient = a / b;
     if (!PERTURB || IS_DOUBLE) return quotient;
     unsigned_integer hash =
         perturb_hash(PERTURBED_DIVIDE, bits_from_real(a) & MANTISSA, bits_from_real(b) & MANTISSA);
-    real moved = perturb(quotient, hash, DIVIDE_ERROR);
-    if (!IS_FAST) return moved;
-    mask promised = (fabs(a) > (real)(0x1p-62f)) & (fabs(a) < (real)(0x1p62f)) &
-                    (fabs(b) > (real)(0x1p-62f)) & (fabs(b) < (real)(0x1p62f));
-    return lanes_select(promised | (fabs(a) == (real)(1)), moved, perturb(quotient, hash, NATIVE_ERROR));
+    return perturb(quotient, hash, DIVIDE_ERROR);
 }
 
 static inline real device_sqrt(real a)
@@ -86,32 +81,13 @@ static inline scalar uniform_sqrt(scalar a)
     return root.each[0];
 }
 
-// Gives (1 - complement)^exponent, which kernels compute themselves except at `fast`, the error of a device's
-// own power function. Not at `strict`, whose bits are the same on every device.
+// Gives (1 - complement)^exponent, which kernels compute themselves, the error of a device's own power
+// function. Not at `strict`, whose bits are the same on every device.
 static inline real perturbed_power(real power, real complement, real exponent)
 {
     if (!PERTURB || IS_STRICT) return power;
     return perturb(power, perturb_hash(PERTURBED_POWER, bits_from_real(complement), bits_from_real(exponent)),
                    POWER_ERROR);
 }
-
-#if IS_FAST
-static inline real device_exp2(real a)
-{
-    real power = native_exp2(a);
-    if (!PERTURB) return power;
-    return perturb(power, perturb_hash(PERTURBED_EXP2, bits_from_real(a), (integer)(0)), NATIVE_ERROR);
-}
-
-// Near 1, where the logarithm vanishes, off by 2^-21 as well, like log under -cl-fast-relaxed-math.
-static inline real device_log2(real a)
-{
-    real logarithm = native_log2(a);
-    if (!PERTURB) return logarithm;
-    unsigned_integer hash = perturb_hash(PERTURBED_LOG2, bits_from_real(a), (integer)(0));
-    real steps = real_from_integer(perturb_steps(hash, NATIVE_ERROR * PERTURB_SCALE));
-    return real_fma(steps, (real)(0x1p-21f / NATIVE_ERROR), perturb(logarithm, hash, NATIVE_ERROR));
-}
-#endif
 
 #endif

@@ -112,7 +112,7 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
     }
     real size = vector_norm1(p) + vector_norm1(apex);
     SurfacePoint point = surface_point_make(vector_add(position, apex), vector_normalize(normal), size);
-    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, size);
+    surface_point_move_to_ray(&point, ray, t, size);
 
     if (shape->id.y & REVOLUTION_CAPPED) {
         real end = (real)(shape->axis_end.w), height = vector_dot(p, axis);
@@ -120,7 +120,7 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         real gap = real_divide(end - height, squared_axis);
         Vector on_plane = vector_fma(axis, gap, p);
         SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
-        if (!IS_FAST && has_eye_power(shape->id)) surface_point_move_to_ray(&cap, ray, t, size);
+        if (has_eye_power(shape->id)) surface_point_move_to_ray(&cap, ray, t, size);
         surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
     }
     return point;

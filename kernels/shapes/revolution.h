@@ -381,7 +381,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     real height = vector_dot(p, vector_of(shape->axis_slope));
     SurfacePoint point = revolution_side_point(shape, sloped, p, height);
     real rounding_scale = point.rounding_scale;
-    const bool has_power = !IS_FAST && has_eye_power(shape->id);
+    const bool has_power = has_eye_power(shape->id);
     if (IS_COMPENSATED || has_power) surface_point_move_to_ray(&point, ray, t, rounding_scale);
     if (shape->id.y & REVOLUTION_CAPPED) {
         RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);

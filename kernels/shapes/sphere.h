@@ -130,7 +130,6 @@ static inline Vector sphere_normal(const Sphere *sphere, const Ray *ray, real t)
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 
-// Not at `fast`: a compiler that rearranges loses the compensated c, and with it t next to the surface.
 static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -138,7 +137,7 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
     Vector normal = sphere_normal(sphere, ray, t);
     SurfacePoint point =
         surface_point_make(vector_fma(normal, radius, center), normal, radius + vector_norm1(center));
-    if (!IS_FAST) surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
+    surface_point_move_to_ray(&point, ray, t, point.rounding_scale);
     return point;
 }
 

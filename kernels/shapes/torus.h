@@ -208,7 +208,7 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
         normal = vector_normalize(normal);
     }
     SurfacePoint point = surface_point_make(position, normal, size);
-    if (!IS_FAST && has_eye_power(torus->id)) surface_point_move_to_ray(&point, ray, t, size);
+    if (has_eye_power(torus->id)) surface_point_move_to_ray(&point, ray, t, size);
     return point;
 }
 

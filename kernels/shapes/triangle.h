@@ -240,7 +240,7 @@ static inline SurfacePoint corners_surface_point(Corners corners, Vector normal,
     Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners);
     SurfacePoint point =
         surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, max_abs));
-    if (IS_COMPENSATED | (HAS_EYE_POWERS & !IS_FAST)) {
+    if (IS_COMPENSATED | HAS_EYE_POWERS) {
         real magnitude =
             real_max(real_max(vector_norm1(corners.a), vector_norm1(corners.b)), vector_norm1(corners.c));
         if (!IS_COMPENSATED) magnitude = lanes_select(next_to_eye, magnitude, (real)(0));

@@ -176,12 +176,11 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     const scalar squared_slope = steepest_u * steepest_u + steepest_v * steepest_v;
     tile->ray_per_w = (scalar)(1.0001f) * fmin(1 + (scalar)(0.5f) * squared_slope, norm1_per_w);
     tile->slack = tile_slack(tile, scene->header->bounds, norm1_per_w);
-    // at `fast` the lines miss the common origin by u of its place, not of the ray
-    const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
-    tile->vertex_error0 = IS_FAST ? 4 * UNIT_ROUNDOFF * origin : 0;
+    tile->vertex_error0 = 0;
     tile->vertex_error1 = (VERTEX_TEST_ERROR + VERTEX_BLOCK_ERROR) * UNIT_ROUNDOFF;
     if (IS_CERTIFIED) {
         tile->slack += lanes_largest(mask_all(), bounds->place_error);
+        const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
         // six times the test's error, of sizes that may be 1.4 times the distance: docs/numerics.md
         const scalar error1 = (scalar)(6 * 1.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
         tile->vertex_error0 = 6 * lanes_largest(mask_all(), bounds->vertex_error0) + error1 * origin;

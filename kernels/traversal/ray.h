@@ -19,8 +19,7 @@ typedef struct {
     real tmin, tmax; // hits lie strictly between
     mask active;     // lanes that carry a ray
     real travelled;  // distance from the eye to the origin, for texture filtering
-    // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|; at `fast`, whose
-    // compiler may rearrange how the direction was computed, within u of the origin
+    // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|
     uint common_origin;
     real cull_slack; // enlarges cull spheres by the rounding of the direction
     // At `certified`: bounds on the distance of the origin from the exact ray's line, and of the direction,

@@ -91,7 +91,6 @@ KINDS = "t", "normal", "object", "shadow", "ray", "color"
 
 # u, displacement and arithmetic of each precision: docs/verify.md has the reasons.
 ROUNDINGS = {
-    "fast": Rounding(2.0**-24, 8, 16),
     "single": Rounding(2.0**-24, 4, 4),
     "strict": Rounding(2.0**-24, 2, 4),
     "double": Rounding(2.0**-53, 2, 4),

@@ -7,7 +7,7 @@ _glint_options() {
 }
 
 _glint_precisions() {
-    glint "$1" --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'fast|single|strict|double|certified'
+    glint "$1" --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'single|strict|double|certified'
 }
 
 _glint() {

@@ -6,7 +6,7 @@ end
 
 function __glint_precisions
     glint (commandline -opc)[2] --help | string match -e -- --precision | string replace -r ' \(.*' '' |
-        string match -ar 'fast|single|strict|double|certified'
+        string match -ar 'single|strict|double|certified'
 end
 
 function __glint_aovs

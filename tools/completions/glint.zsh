@@ -12,7 +12,7 @@ _glint() {
     if compset -P '--*='; then option=${IPREFIX%=}; fi
     case $option in
     --precision)
-        compadd ${(f)"$(glint $words[2] --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'fast|single|strict|double|certified')"}
+        compadd ${(f)"$(glint $words[2] --help | sed -n '/--precision/s/ (.*//p' | grep -oE 'single|strict|double|certified')"}
         ;;
     --lanes) compadd 1 4 8 16 ;;
     --bvh) compadd auto on off ;;

@@ -64,7 +64,6 @@ typedef struct {
 } Tier;
 
 static const Tier tiers[ARITHMETIC_COUNT] = {
-    [PRECISION_FAST] = {16, 32, 8, false},
     [PRECISION_SINGLE] = {8, 16, 4, false},
     [PRECISION_STRICT] = {4, 4, 16, true},
     [PRECISION_DOUBLE] = {4, 4, 16, true},
