@@ -19,8 +19,9 @@ static struct {
     size_t dropped_count, dropped;
 } pair;
 
-static bool pair_wait(void)
+static bool pair_wait(void *context)
 {
+    (void)context;
     bool is_first = pthread_equal(pthread_self(), first_thread);
     bool *has_waited = is_first ? &pair.first_has_waited : &pair.second_has_waited;
     if (*has_waited) return false;

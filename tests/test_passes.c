@@ -60,8 +60,9 @@ static void passes_give_the_bits_of_one_render(void **state)
 
 static unsigned stop_countdown;
 
-static bool stop_now(void)
+static bool stop_now(void *context)
 {
+    (void)context;
     return stop_countdown-- == 0;
 }
 

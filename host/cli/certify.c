@@ -279,7 +279,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     RenderSettings settings = settings_whole(&options->common, width, height);
     settings.bounce_count = options->bounce_count;
     settings.shift_to_eye = true;
-    settings.stop = progress_interrupted;
+    settings.stop = progress_stops;
     int status = EXIT_DONE;
     for (unsigned i = 0; i < PRECISION_COUNT && status == EXIT_DONE; i++) {
         if (!options->precisions || options->precisions >> i & 1)

@@ -117,3 +117,9 @@ bool progress_interrupted(void)
 {
     return interrupted != 0 || (other_interrupts && other_interrupts());
 }
+
+bool progress_stops(void *context)
+{
+    (void)context;
+    return progress_interrupted();
+}

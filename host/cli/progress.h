@@ -29,5 +29,7 @@ void progress_release_signals(void);
 void progress_end_at_once(void);
 void progress_close(Progress *progress); // erases the line; signals still only set the flag
 bool progress_interrupted(void);
+// Returns progress_interrupted(); a renderer's `stop`, whose context it ignores.
+bool progress_stops(void *context);
 // From now on progress_interrupted is also true where `ask` is, which it calls.
 void progress_ask(bool (*ask)(void));

@@ -195,7 +195,7 @@ bool render_settings_make(RenderSettings *settings, RenderOptions *options, cons
     settings->sample_count = options->sample_count;
     settings->bounce_count = options->bounce_count;
     settings->shift_to_eye = true;
-    settings->stop = progress_interrupted;
+    settings->stop = progress_stops;
     settings->hashes_scene = options->checkpoint != NULL;
     return true;
 }

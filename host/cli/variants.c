@@ -109,7 +109,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
     RenderSettings settings = settings_whole(&options->common, width, height);
     settings.bounce_count = options->bounce_count;
     settings.shift_to_eye = true;
-    settings.stop = progress_interrupted;
+    settings.stop = progress_stops;
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
     const uint64_t hash = scene_files_hash(&set->scenes[scene_index]);
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)

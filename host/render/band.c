@@ -181,12 +181,13 @@ Pace *renderer_pace(Renderer *renderer, KernelKind kind)
 static bool place_launch(Renderer *renderer, KernelKind kind, const Place *place, uint32_t samples)
 {
     Pace *pace = renderer_pace(renderer, kind);
-    bool (*stop)(void) = renderer->settings.stop;
+    const RenderSettings *settings = &renderer->settings;
     Place part = {0};
     while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
         const double seconds = renderer_launch(renderer, kind, 2, part.first, part.items, part.group);
         pace_note_launch(pace, place_pixels(&part) * samples, seconds);
-        if (!compute_ok(renderer->compute) || (stop && stop())) return false;
+        if (!compute_ok(renderer->compute) || (settings->stop && settings->stop(settings->stop_context)))
+            return false;
     }
     return true;
 }

@@ -33,11 +33,12 @@ typedef struct {
     // roundings are then relative to that eye's distance from the surfaces.
     bool is_preview;
     bool no_cache;
-    double band_seconds; // target duration of a launch; 0: 0.1
-    bool (*stop)(void);  // called between launches; true ends the render; NULL: never
-    bool hashes_scene;   // for the report
-    uint32_t band_rows;  // fixed rows per band, for tests; 0: by time
-    Stage *stage;        // shows what is done before the first launch; NULL: not wanted
+    double band_seconds;         // target duration of a launch; 0: 0.1
+    bool (*stop)(void *context); // called between launches; true ends the render; NULL: never
+    void *stop_context;
+    bool hashes_scene;  // for the report
+    uint32_t band_rows; // fixed rows per band, for tests; 0: by time
+    Stage *stage;       // shows what is done before the first launch; NULL: not wanted
 } RenderSettings;
 
 // A whole image, with one sample per pixel.

@@ -2,32 +2,13 @@
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/memory.h"
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
-static atomic_bool has_news; // a request that was not yet read
-static atomic_bool first_is_due, ends;
-
-bool render_stops(void)
+bool render_stops(void *context)
 {
-    return atomic_load(&ends) || (atomic_load(&has_news) && !atomic_load(&first_is_due));
-}
-
-void renders_end(bool end)
-{
-    atomic_store(&ends, end);
-    if (!end) atomic_store(&has_news, false);
-}
-
-void first_frame_set_due(bool is_due)
-{
-    atomic_store(&first_is_due, is_due);
-}
-
-bool first_frame_is_due(void)
-{
-    return atomic_load(&first_is_due);
+    const FrameLoop *loop = context;
+    return atomic_load(&loop->ends) || (atomic_load(&loop->has_news) && !atomic_load(&loop->first_is_due));
 }
 
 void message_publish(FrameLoop *loop, char *message)
@@ -108,7 +89,7 @@ void files_changed(void *context)
     FrameLoop *loop = context;
     pthread_mutex_lock(&loop->mutex);
     loop->reloads = true;
-    atomic_store(&has_news, true);
+    atomic_store(&loop->has_news, true);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
 }
@@ -154,7 +135,7 @@ Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
         *save_path = loop->save_path;
         loop->save_path = NULL;
     }
-    atomic_store(&has_news, loop->request_number != loop->current_number);
+    atomic_store(&loop->has_news, loop->request_number != loop->current_number);
     pthread_mutex_unlock(&loop->mutex);
     return work;
 }
@@ -173,7 +154,7 @@ unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)
     pthread_mutex_lock(&loop->mutex);
     loop->request = *request;
     unsigned number = ++loop->request_number;
-    atomic_store(&has_news, true);
+    atomic_store(&loop->has_news, true);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
     return number;

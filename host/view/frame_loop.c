@@ -51,9 +51,9 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     loop->settings = options->settings;
     loop->stage = stage_open();
     loop->settings.stop = render_stops;
+    loop->settings.stop_context = loop;
     loop->settings.stage = loop->stage;
     loop->settings.band_seconds = 0.01;
-    renders_end(false);
     pthread_mutex_init(&loop->mutex, NULL);
     pthread_condattr_t steady;
     pthread_condattr_init(&steady);
@@ -67,7 +67,7 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
 
 void frame_loop_close(FrameLoop *loop)
 {
-    renders_end(true);
+    atomic_store(&loop->ends, true);
     pthread_mutex_lock(&loop->mutex);
     loop->quits = true;
     pthread_cond_signal(&loop->changed);

@@ -5,6 +5,7 @@
 #include "host/view/preview.h"
 #include "host/view/watch.h"
 #include <pthread.h>
+#include <stdatomic.h>
 
 struct FrameLoop {
     FrameLoopOptions options;
@@ -12,6 +13,9 @@ struct FrameLoop {
     pthread_mutex_t mutex;
     pthread_cond_t changed;
     Stage *stage;
+    atomic_bool has_news;     // a request that was not yet read
+    atomic_bool first_is_due; // new requests do not end the render
+    atomic_bool ends;         // the current render and all later ones
 
     // under the mutex
     FrameRequest request;
@@ -48,13 +52,8 @@ struct FrameLoop {
 
 // frame_exchange.c
 
-// The renderers' `stop`. It takes no context, so there is one loop per process.
-bool render_stops(void);
-// True ends the current render and all later ones; false allows them again.
-void renders_end(bool end);
-// While it is due, new requests do not end the render.
-void first_frame_set_due(bool is_due);
-bool first_frame_is_due(void);
+// Returns whether the current render should end; the renderers' `stop`, whose context is the loop.
+bool render_stops(void *context);
 
 // Called by the thread that watches the scene's files.
 void files_changed(void *context);

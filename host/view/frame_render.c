@@ -39,7 +39,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
 {
     FrameLoop *loop = context;
     film_copy_band(&loop->film, band);
-    if (!first_frame_is_due()) probe_answer(loop);
+    if (!atomic_load(&loop->first_is_due)) probe_answer(loop);
     if (samples == 1) rendering_show(loop, band);
     if (!is_last(&loop->film, band)) return true;
     const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
@@ -50,7 +50,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     frame_fill(loop, samples);
     if (!is_first) distances_fill(loop);
     frame_publish(loop, samples);
-    first_frame_set_due(false);
+    atomic_store(&loop->first_is_due, false);
     return true;
 }
 
@@ -132,11 +132,11 @@ static bool camera_rests(FrameLoop *loop)
         until.tv_sec += until.tv_nsec / 1000000000;
         until.tv_nsec %= 1000000000;
         pthread_mutex_lock(&loop->mutex);
-        while (!render_stops() && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
+        while (!render_stops(loop) && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
             continue;
         pthread_mutex_unlock(&loop->mutex);
     }
-    return !render_stops();
+    return !render_stops(loop);
 }
 
 static bool preview_render(FrameLoop *loop)
@@ -144,13 +144,13 @@ static bool preview_render(FrameLoop *loop)
     const unsigned aovs = view_aovs[loop->current.view];
     if (!renderer_prepare(loop, loop->divisor, 1, true)) return false;
     film_fit(loop, aovs);
-    first_frame_set_due(true);
+    atomic_store(&loop->first_is_due, true);
     if (!renderer_render(loop->renderer, aovs, preview_take, &loop->film)) return false;
     preview_note(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
                  (double)film_pixel_count(&loop->film));
     frame_fill(loop, 1);
     frame_publish(loop, 0);
-    first_frame_set_due(false);
+    atomic_store(&loop->first_is_due, false);
     return camera_rests(loop);
 }
 
@@ -207,10 +207,10 @@ bool request_render(FrameLoop *loop)
     bool complete = (!loop->has_preview || preview_render(loop)) && renderer_prepare(loop, 1, samples, false);
     if (complete) {
         film_fit(loop, aovs);
-        first_frame_set_due(is_moving && !loop->has_preview);
+        atomic_store(&loop->first_is_due, is_moving && !loop->has_preview);
         complete = renderer_accumulate(loop->renderer, aovs, pass_take, loop) &&
                    (view != VIEW_ERROR || errors_render(loop));
-        first_frame_set_due(false);
+        atomic_store(&loop->first_is_due, false);
     }
     if (loop->renderer && !compute_ok(&loop->compute)) failure_publish(loop);
     return complete;
