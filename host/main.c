@@ -59,7 +59,7 @@ static int command_run(int argument_count, char **arguments)
     for (size_t i = 0; i < COMMAND_COUNT; i++) {
         if (strcmp(name, commands[i].name) == 0) {
             // getopt heads its messages with the first argument
-            char full_name[32];
+            static char full_name[32];
             snprintf(full_name, sizeof full_name, "glint %s", name);
             arguments[1] = full_name;
             return commands[i].run(argument_count - 1, arguments + 1);

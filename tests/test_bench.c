@@ -161,7 +161,9 @@ void *__wrap_malloc(size_t size);
 
 void *__wrap_malloc(size_t size)
 {
-    return allocations_left >= 0 && allocations_left-- == 0 ? NULL : __real_malloc(size);
+    const bool fails = allocations_left == 0;
+    if (allocations_left >= 0) allocations_left--;
+    return fails ? NULL : __real_malloc(size);
 }
 
 static Baseline *baseline_of(const char *text, size_t *error_count)

@@ -39,8 +39,8 @@ static const char help_text[] =
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of single, strict, double, certified (default: all that fit)\n" //
-    HELP_BOUNCES HELP_DEVICE HELP_REFERENCE HELP_LANES                                             //
-    "      --bvh B           auto, on or off; does not change the image (default: auto)\n"         //
+    HELP_BOUNCES HELP_DEVICE HELP_REFERENCE HELP_LANES                                       //
+    "      --bvh B           auto, on or off; does not change the image (default: auto)\n"   //
     HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_JSON HELP_HELP;
 
 typedef struct {

@@ -10,7 +10,7 @@
     KEY("right drag", "look around; W A S D fly, Q and E sink and rise")                                     \
     KEY("arrows", "orbit about the point looked at, by 5 degrees")                                           \
     KEY("V", "next view: depth, normal, object, shadow, error, color")                                       \
-    KEY("1 2 3 4", "precision single, strict, double, certified")                                    \
+    KEY("1 2 3 4", "precision single, strict, double, certified")                                            \
     KEY("T", "show or hide times, device and samples")                                                       \
     KEY("I", "show or hide what the pixel under the cursor sees; print it")                                  \
     KEY("R", "reset the camera")                                                                             \

@@ -130,8 +130,7 @@ static inline uint block_see(BlockView *view, const MacroTile *tile, const Block
 static inline real block_vertex_error(const MacroTile *tile, const BlockVertices *at)
 {
     real distance = at->distance;
-    if (IS_CERTIFIED)
-        return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
+    if (IS_CERTIFIED) return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
     // the full test's error counts from the ray's start
     real from_start = tile->frame.leaving ? distance : real_fma(at->low, (real)(-tile->ray_per_w), distance);
     return real_fma(from_start, (real)(VERTEX_TEST_ERROR * UNIT_ROUNDOFF),
