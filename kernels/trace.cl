@@ -1,6 +1,13 @@
 // Traces explicit rays: the closest hit, the bounces there and the transmittance along each.
 #include "shading/bounce.h"
 
+// The bounds are derived for coordinates in this range (host/compile/certified_range.c).
+#if IS_DOUBLE
+#define ORIGIN_MAX 0x1p220
+#else
+#define ORIGIN_MAX 0x1p48f
+#endif
+
 static inline Vector vector_load(const RealLanes *from)
 {
     return (Vector){from[0].all, from[1].all, from[2].all};
@@ -15,7 +22,9 @@ static inline void vector_store(Vector vector, RealLanes *to)
 
 // rays: RAY_SCALARS per ray. results: RESULT_SCALARS per ray: t,
 // geometric normal facing the ray, position, origin and direction of the reflected and of the refracted ray,
-// transmitted fraction, and transmittance from tmin to tmax. On a miss only the last is valid.
+// transmitted fraction, transmittance from tmin to tmax, bounds on t, and 1 where the hit is uncertain. On a
+// miss only the last four are valid. Bounds are those of Hit at `certified`, else t; only rays from tmin = 0
+// without an end have bounds.
 static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
 {
@@ -27,7 +36,12 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
     }
     Vector origin = vector_load(value + RAY_ORIGIN), direction = vector_load(value + RAY_DIRECTION);
     Ray ray = ray_make(origin, direction, value[RAY_TMIN].all, value[RAY_TMAX].all, mask_all());
+    if (IS_CERTIFIED) { // the host rounded each component once
+        ray.origin_error = (real)(UNIT_ROUNDOFF)*vector_norm1(origin);
+        ray.direction_error = (real)(2 * UNIT_ROUNDOFF);
+    }
     Hit hit = closest_hit(scene, &ray);
+    if (IS_CERTIFIED) hit.doubt = hit.doubt | !(ray.active & (vector_norm1(origin) < (real)(ORIGIN_MAX)));
     Surface surface = surface_interaction(scene, &ray, &hit);
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce reflected = {origin, direction, black}, refracted = reflected;
@@ -43,6 +57,9 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
     vector_store(refracted.direction, result + RESULT_REFRACTED_DIRECTION);
     result[RESULT_REFRACTED_WEIGHT].all = refracted.weight.x;
     result[RESULT_TRANSMITTANCE].all = transmittance(scene, &ray);
+    result[RESULT_LOW].all = IS_CERTIFIED ? hit.low : hit.t;
+    result[RESULT_HIGH].all = IS_CERTIFIED ? hit.high : hit.t;
+    result[RESULT_DOUBT].all = IS_CERTIFIED ? lanes_select(hit.doubt, (real)(1), (real)(0)) : (real)(0);
     IntegerLanes object = {hit.object};
     for (uint lane = 0; lane < LANES && first + lane < ray_count; lane++) {
         size_t index = first + lane;

@@ -59,7 +59,7 @@ offers 'glint render --si' --size
 offers 'glint check --le' --lenient
 offers 'glint render --lanes 1' '1 16'
 offers 'glint render --precision ' 'single strict double certified'
-offers 'glint trace --precision ' 'single strict double'
+offers 'glint trace --precision ' 'single strict double certified'
 offers 'glint render --timing = j' json
 offers 'glint render --aov no' normal
 offers 'glint render --timing LICEN' LICENSE

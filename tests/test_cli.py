@@ -464,6 +464,19 @@ class Trace(CliTestCase):
         self.assertEqual(process.stdout, "")
         self.assertEqual(csv_rows(read("hits.csv")), expected)
 
+    def test_certified(self):
+        """A hit, a miss, a hit beyond the end and one at it, and a tangent, which nothing decides."""
+        write("rays", "0 0 -4 0 0 2\n0 5 -4 0 0 1\n0 0 -4 0 0 1 0 2\n0 0 -4 0 0 1 0 3\n0 1 -4 0 0 1\n")
+        header, *lines = self.glint("trace sphere.yaml --rays rays --precision certified").stdout.splitlines()
+        self.assertEqual(header, "object,t,nx,ny,nz,low,high,certainty")
+        hit, *others = [line.split(",") for line in lines]
+        self.assertEqual((hit[0], float(hit[1]), hit[-1]), ("0", 1.5, "certain"))
+        self.assertTrue(1.5 - 1e-5 < float(hit[5]) <= 1.5 <= float(hit[6]) < 1.5 + 1e-5, hit)
+        self.assertEqual([(row[0], row[-1]) for row in others[:2]], [("", "certain")] * 2)
+        self.assertEqual([row[-3:] for row in others[2:]], [["", "", "uncertain"]] * 2)
+        write("rays", "0 0 -4 0 0 1 1 2\n")
+        self.refuses("trace sphere.yaml --rays rays --precision certified", "^rays:1:1: error: .*tmin 0")
+
     def test_directions_of_any_length(self):
         write("rays", "0 0 -4 0 0 1e20\n0 0 -4 0 0 1e-20\n0 0 -4 0 0 3e38 0 3e-38\n0 0 -4 0 0 1\n")
         _, rows = csv_rows(self.glint("trace sphere.yaml --rays rays").stdout)

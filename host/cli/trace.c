@@ -27,16 +27,19 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
-                                "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays "
-                                "are not shifted to the eye;\n"
-                                "each number is rounded once to the precision.\n\n"
-                                "      --rays FILE       one ray per line: ox oy oz dx dy dz [tmin tmax], "
-                                "decimal or C hexadecimal; - is\n"
-                                "                        standard input; # starts a comment\n"
-                                "  -o, --output FILE     CSV file (default: standard output)\n" //
-    HELP_DEVICE "      --precision P     single, strict or double (default: single)\n"          //
-    HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
+static const char help_text[] =
+    "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+    "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays are not shifted to the "
+    "eye;\n"
+    "each number is rounded once to the precision. At certified also low,high,certainty: bounds of the exact "
+    "t,\n"
+    "and whether object and bounds are certain, certain in double, or uncertain.\n\n"
+    "      --rays FILE       one ray per line: ox oy oz dx dy dz [tmin tmax], "
+    "decimal or C hexadecimal; - is\n"
+    "                        standard input; # starts a comment\n"
+    "  -o, --output FILE     CSV file (default: standard output)\n" //
+    HELP_DEVICE HELP_PRECISION                                      //
+        HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -93,6 +96,8 @@ static bool ray_check(Report *report, size_t line, const double numbers[8], int 
     if (beyond)
         return report_error(report, line,
                             "a number is beyond the precision's range; only tmax may be infinite");
+    if (precision == PRECISION_CERTIFIED && numbers[6] != 0)
+        return report_error(report, line, "at certified a ray starts at its origin, tmin 0");
     if (!has_direction)
         return report_error(report, line, "a ray's direction cannot be 0 0 0 at its precision");
     return true;
@@ -147,39 +152,41 @@ static bool rays_load(RayList *rays, const TraceOptions *options)
     return read;
 }
 
-static bool hits_write(const char *path, const TraceHit *hits, size_t count, bool is_double)
+static void hit_print(const TraceHit *hit, Precision precision, FILE *file)
+{
+    const int digits = precision < PRECISION_DOUBLE ? 9 : 17;
+    const bool is_hit = hit->object != UINT32_MAX;
+    if (is_hit)
+        fprintf(file, "%u,%.*g,%.*g,%.*g,%.*g", hit->object, digits, hit->t, digits, hit->normal[0], digits,
+                hit->normal[1], digits, hit->normal[2]);
+    else
+        fputs(",,,,", file);
+    if (precision == PRECISION_CERTIFIED) {
+        static const char *const certainties[] = {"uncertain", "certain", "certain in double"};
+        if (is_hit && hit->certainty != TRACE_UNCERTAIN)
+            fprintf(file, ",%.17g,%.17g", hit->low, hit->high);
+        else
+            fputs(",,", file);
+        fprintf(file, ",%s", certainties[hit->certainty]);
+    }
+    fputc('\n', file);
+}
+
+static bool hits_write(const TraceOptions *options, const TraceHit *hits, size_t count)
 {
     MessageList messages = {0};
     OutputFile output;
-    bool written = output_open(&output, path, &messages);
+    bool written = output_open(&output, options->output, &messages);
     if (written) {
-        int digits = is_double ? 17 : 9;
-        fputs("object,t,nx,ny,nz\n", output.file);
-        for (size_t i = 0; i < count; i++) {
-            const TraceHit *hit = &hits[i];
-            if (hit->object == UINT32_MAX)
-                fputs(",,,,\n", output.file);
-            else
-                fprintf(output.file, "%u,%.*g,%.*g,%.*g,%.*g\n", hit->object, digits, hit->t, digits,
-                        hit->normal[0], digits, hit->normal[1], digits, hit->normal[2]);
-        }
+        const Precision precision = options->common.precision;
+        fprintf(output.file, "object,t,nx,ny,nz%s\n",
+                precision == PRECISION_CERTIFIED ? ",low,high,certainty" : "");
+        for (size_t i = 0; i < count; i++)
+            hit_print(&hits[i], precision, output.file);
         written = output_commit(&output, &messages);
     }
     messages_print(&messages, NULL);
     return written;
-}
-
-// A ray scaled by a power of two so that its direction's largest component lies in 0.5 to 1 and its squared
-// length neither underflows nor overflows. The scaling is exact.
-static TraceRay ray_scaled(TraceRay ray, double farthest, int *exponent)
-{
-    double *d = ray.direction;
-    frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
-    for (int axis = 0; axis < 3; axis++)
-        d[axis] = ldexp(d[axis], -*exponent);
-    ray.tmin = ldexp(ray.tmin, *exponent);
-    ray.tmax = fmin(ldexp(ray.tmax, *exponent), farthest);
-    return ray;
 }
 
 static int rays_trace(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
@@ -194,12 +201,11 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
     double farthest = farthest_of(options->common.precision);
     for (size_t i = 0; i < rays->count; i++)
-        scaled[i] = ray_scaled(rays->items[i], farthest, &exponents[i]);
-    bool traced = renderer_trace(renderer, scaled, rays->count, hits);
+        scaled[i] = trace_ray_scaled(rays->items[i], farthest, &exponents[i]);
+    const bool traced = renderer_trace(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
-        hits[i].t = ldexp(hits[i].t, -exponents[i]);
-    bool written =
-        traced && hits_write(options->output, hits, rays->count, renderer_report(renderer)->is_double);
+        trace_hit_unscale(&hits[i], exponents[i]);
+    const bool written = traced && hits_write(options, hits, rays->count);
     free(exponents);
     free(hits);
     free(scaled);
@@ -224,8 +230,6 @@ static int options_read(TraceOptions *options, int argument_count, char **argume
             return EXIT_USER;
     }
     if (!option_only_scene("trace", argument_count, arguments)) return EXIT_USER;
-    if (options->common.precision == PRECISION_CERTIFIED)
-        return option_usage_fault("trace", "--precision certified is for images");
     if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
     if (image_format_of(options->output) != IMAGE_UNKNOWN)
         return option_usage_fault("trace", "writes CSV: the output's name must not be an image's or array's");
@@ -245,7 +249,9 @@ int command_trace(int argument_count, char **arguments)
     if (scene_open(&scene, options.scene, &options.common) &&
         !output_overwrites_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, &options.common)) {
-        status = rays_trace(&options, &scene, &rays, &open.compute);
+        if (options.common.precision != PRECISION_CERTIFIED ||
+            reference_open(&open.compute, &open.devices, NULL))
+            status = rays_trace(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);
     }
     free(rays.items);

@@ -27,19 +27,30 @@ static void vector_at(const void *scalars, size_t index, bool is_double, double 
 }
 
 // The scalars of one hit, from `index` on.
-static TraceHit hit_at(const void *scalars, size_t index, bool is_double, uint32_t object, double unit)
+static TraceHit hit_at(const Renderer *renderer, const void *scalars, size_t index, uint32_t object)
 {
+    const bool is_double = renderer->report.is_double;
+    const double unit = renderer->compiled.unit;
     TraceHit hit = {.object = object,
                     .t = scalar_at(scalars, index + RESULT_T, is_double),
                     .transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, is_double),
-                    .light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, is_double)};
+                    .light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, is_double),
+                    .low = scalar_at(scalars, index + RESULT_LOW, is_double),
+                    .high = scalar_at(scalars, index + RESULT_HIGH, is_double)};
     vector_at(scalars, index + RESULT_NORMAL, is_double, hit.normal);
     vector_at(scalars, index + RESULT_POSITION, is_double, hit.position);
     vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, hit.reflected_origin);
     vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, hit.reflected_direction);
     vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, hit.refracted_origin);
     vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, hit.refracted_direction);
+    const bool is_certain =
+        renderer_certifies(renderer) && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0;
+    hit.certainty = !is_certain                  ? TRACE_UNCERTAIN
+                    : renderer->pass == PASS_ALL ? TRACE_CERTAIN
+                                                 : TRACE_CERTAIN_IN_DOUBLE;
     hit.t *= unit;
+    hit.low *= unit;
+    hit.high *= unit;
     for (size_t axis = 0; axis < 3; axis++) {
         hit.position[axis] *= unit;
         hit.reflected_origin[axis] *= unit;
@@ -56,9 +67,11 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
     void *scalars = memory_allocate((size_t)count * RAY_SCALARS, renderer_scalar_size(renderer));
     for (uint32_t i = 0; i < count; i++) {
         const double *origin = rays[i].origin, *direction = rays[i].direction;
+        // bounds are those of rays without an end: ends_apply
+        const double tmax = renderer_certifies(renderer) ? INFINITY : rays[i].tmax;
         const double ray[RAY_SCALARS] = {
             origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
-            direction[1],     direction[2],     rays[i].tmin / unit, fmin(rays[i].tmax / unit, farthest)};
+            direction[1],     direction[2],     rays[i].tmin / unit, fmin(tmax / unit, farthest)};
         for (size_t k = 0; k < RAY_SCALARS; k++)
             scalar_set(scalars, i * RAY_SCALARS + k, is_double, ray[k]);
     }
@@ -87,8 +100,7 @@ static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_m
     const void *result = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
     const uint32_t *object = renderer_map(renderer, objects, 0, (size_t)count * sizeof *object, CL_MAP_READ);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
-        hits[i] = hit_at(result, (size_t)i * RESULT_SCALARS, renderer->report.is_double, object[i],
-                         renderer->compiled.unit);
+        hits[i] = hit_at(renderer, result, (size_t)i * RESULT_SCALARS, object[i]);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     compute_try(compute, clFinish(compute->queue));
@@ -112,7 +124,7 @@ static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count
     buffer_release(objects);
 }
 
-bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+static bool pass_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
     const Compute *compute = renderer->compute;
     // the report is of images: a view asks about pixel after pixel
@@ -128,4 +140,62 @@ bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, 
     report->launches.count = launch_count;
     report->reads.count = read_count;
     return compute_ok(compute);
+}
+
+// Traces the rays again whose hits are uncertain.
+static bool uncertain_trace(Renderer *repeat, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < ray_count; i++)
+        count += hits[i].certainty == TRACE_UNCERTAIN;
+    if (count == 0) return true;
+    TraceRay *chosen = memory_allocate(count, sizeof *chosen);
+    TraceHit *found = memory_allocate(count, sizeof *found);
+    for (size_t i = 0, k = 0; i < ray_count; i++)
+        if (hits[i].certainty == TRACE_UNCERTAIN) chosen[k++] = rays[i];
+    const bool is_done = renderer_trace(repeat, chosen, count, found);
+    for (size_t i = 0, k = 0; i < ray_count; i++)
+        if (hits[i].certainty == TRACE_UNCERTAIN) hits[i] = found[k++];
+    free(chosen);
+    free(found);
+    return is_done;
+}
+
+// Makes certain hits beyond their rays' ends misses.
+static void ends_apply(const TraceRay *rays, size_t ray_count, TraceHit *hits)
+{
+    for (size_t i = 0; i < ray_count; i++) {
+        TraceHit *hit = &hits[i];
+        if (hit->certainty == TRACE_UNCERTAIN || hit->object == UINT32_MAX || hit->high < rays[i].tmax)
+            continue;
+        if (hit->low < rays[i].tmax) hit->certainty = TRACE_UNCERTAIN;
+        if (!(hit->t < rays[i].tmax)) hit->object = UINT32_MAX;
+    }
+}
+
+bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+{
+    if (!pass_trace(renderer, rays, ray_count, hits)) return false;
+    if (!renderer->repeat) return true;
+    ends_apply(rays, ray_count, hits);
+    return uncertain_trace(renderer->repeat, rays, ray_count, hits) &&
+           compute_check_reference(renderer->compute);
+}
+
+TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent)
+{
+    double *d = ray.direction;
+    frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
+    for (int axis = 0; axis < 3; axis++)
+        d[axis] = ldexp(d[axis], -*exponent);
+    ray.tmin = ldexp(ray.tmin, *exponent);
+    ray.tmax = fmin(ldexp(ray.tmax, *exponent), farthest);
+    return ray;
+}
+
+void trace_hit_unscale(TraceHit *hit, int exponent)
+{
+    hit->t = ldexp(hit->t, -exponent);
+    hit->low = ldexp(hit->low, -exponent);
+    hit->high = ldexp(hit->high, -exponent);
 }

@@ -1,0 +1,173 @@
+// Explicit rays at `certified`: what is certain agrees with exact arithmetic on the same doubles, whatever
+// the ray hits and wherever it starts.
+#include "host/verify/reference_scene.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include "tests/random_ray.h"
+#include "tests/random_scene.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+typedef struct {
+    size_t certain, in_double, uncertain, hits;
+} Counts;
+
+static void ray_set(TraceRay *ray, Vector3 origin, Vector3 direction)
+{
+    *ray = (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+}
+
+static void hit_check(const ReferenceScene *reference, const TraceRay *ray, const TraceHit *hit,
+                      Counts *counts)
+{
+    if (hit->certainty == TRACE_UNCERTAIN) {
+        counts->uncertain++;
+        return;
+    }
+    const double *o = ray->origin, *d = ray->direction;
+    const ReferenceRay exact_ray = reference_ray((Vector3){o[0], o[1], o[2]}, (Vector3){d[0], d[1], d[2]});
+    ReferenceRay endless = exact_ray;
+    endless.tmax = (Quad)1e300;
+    const ReferenceHit exact = reference_scene_hit(reference, &endless, UINT32_MAX);
+    counts->certain += hit->certainty == TRACE_CERTAIN;
+    counts->in_double += hit->certainty == TRACE_CERTAIN_IN_DOUBLE;
+    counts->hits += exact.found;
+    if (hit->object != exact.object ||
+        (exact.found && !((Quad)hit->low <= exact.t && exact.t <= (Quad)hit->high)))
+        fail_msg("(%a %a %a) + t (%a %a %a): object %u, t %a in %a .. %a, exact %u at %a", o[0], o[1], o[2],
+                 d[0], d[1], d[2], hit->object, hit->t, hit->low, hit->high, exact.object, (double)exact.t);
+}
+
+static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
+{
+    Counts counts = {0};
+    TraceHit *hits = memory_allocate(count, sizeof *hits);
+    assert_true(probe_trace(scene, PRECISION_CERTIFIED, 0, rays, count, hits));
+    ReferenceScene reference = reference_scene_open(scene);
+    for (size_t i = 0; i < count; i++)
+        hit_check(&reference, &rays[i], &hits[i], &counts);
+    reference_scene_close(&reference);
+    free(hits);
+    return counts;
+}
+
+// From within the scene and from far away, in all directions, of any length.
+static void every_shape_is_certain(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    enum { RAYS = 3000 };
+    TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
+    Counts sum = {0};
+    for (uint64_t seed = 1; seed <= (tests_are_long() ? 200 : 4); seed++) {
+        Scene scene = random_scene(seed, 48);
+        Random random = {seed};
+        for (size_t i = 0; i < RAYS; i++) {
+            const double far = exp2(random_between(&random, -4, i % 4 ? 5 : 16));
+            const Vector3 origin = random_point(&random, 0, far), target = random_cube_point(&random, 4);
+            const double length = exp2(random_between(&random, -20, 20));
+            ray_set(&rays[i], origin, vector_scale(vector_subtract(target, origin), length));
+        }
+        const Counts counts = rays_check(&scene, rays, RAYS);
+        sum.certain += counts.certain;
+        sum.in_double += counts.in_double;
+        sum.uncertain += counts.uncertain;
+        sum.hits += counts.hits;
+        scene_free(&scene);
+    }
+    free(rays);
+    printf("%zu certain, %zu in double, %zu uncertain, %zu hits\n", sum.certain, sum.in_double, sum.uncertain,
+           sum.hits);
+    assert_true(sum.certain > 20 * (sum.in_double + sum.uncertain));
+    assert_true(sum.hits > sum.certain / 4);
+}
+
+// A bumpy sheet of triangles. Rays aim at its vertices, at its edges and, along the sheet, at its
+// silhouettes.
+static void mesh_edges_are_certain(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    enum { SIDE = 12, RAYS = 4000 };
+    Random random = {3};
+    Vector3 vertices[SIDE][SIDE];
+    for (size_t i = 0; i < SIDE * SIDE; i++)
+        vertices[i / SIDE][i % SIDE] =
+            (Vector3){(double)(i / SIDE) / 3, random_between(&random, 0, 0.3), (double)(i % SIDE) / 7};
+    Object objects[2 * (SIDE - 1) * (SIDE - 1)];
+    size_t count = 0;
+    for (size_t i = 0; i + 1 < SIDE; i++)
+        for (size_t k = 0; k + 1 < SIDE; k++)
+            for (size_t half = 0; half < 2; half++)
+                objects[count++] = (Object){.kind = SHAPE_TRIANGLE,
+                                            .as.triangle.vertices = {vertices[i][k + 1], vertices[i + 1][k],
+                                                                     vertices[i + half][k + half]}};
+    Material material;
+    Scene scene = scene_of_shapes(objects, count, &material);
+    TraceRay rays[RAYS];
+    for (size_t i = 0; i < RAYS; i++) {
+        const size_t row = (size_t)random_between(&random, 0, SIDE - 1),
+                     column = (size_t)random_between(&random, 0, SIDE - 1);
+        const Vector3 a = vertices[row][column], b = vertices[row + i % 2][column + 1];
+        const Vector3 target =
+            vector_add(a, vector_scale(vector_subtract(b, a), i % 3 ? random_between(&random, 0, 1) : 0));
+        const Vector3 aside = {i % 2 ? 1e-10 : 0, 0, i % 4 == 1 ? 1e-10 : 0};
+        Vector3 origin = random_point(&random, 2, i % 5 ? 20 : 2000);
+        if (i % 7 == 0) origin.y = random_between(&random, 0, 0.3);
+        ray_set(&rays[i], origin, vector_subtract(vector_add(target, aside), origin));
+    }
+    const Counts counts = rays_check(&scene, rays, RAYS);
+    printf("%zu certain, %zu in double, %zu uncertain\n", counts.certain, counts.in_double, counts.uncertain);
+    assert_true(counts.certain > 0 && counts.in_double > RAYS / 10 && counts.uncertain > 0);
+}
+
+// A tangent of a sphere, a start on one, and two spheres that coincide, which no arithmetic of this kind
+// decides; and what is behind a start, or a direction as small as floats are.
+static void open_questions_are_uncertain(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    Object objects[] = {
+        {.kind = SHAPE_SPHERE, .as.sphere = {.center = {0, 0, 5}, .radius = 1}},
+        {.kind = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},
+        {.kind = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},
+    };
+    Material material;
+    Scene scene = scene_of_shapes(objects, 3, &material);
+    const struct {
+        Vector3 origin, direction;
+        bool is_certain;
+    } questions[] = {
+        {{1, 0, 0}, {0, 0, 1}, false},        {{0, 0, 4}, {0, 0, 1}, false},
+        {{9, 0, 0}, {0, 0, 1}, false},        {{0, 0, 0}, {0, 0, 1}, true},
+        {{0, 0, 0}, {0, 0, -1}, true},        {{0.5, 0.1, 5}, {0.1, 0.2, 1}, true},
+        {{0, 0, 0}, {0, 0, 0x1p-30}, true},   {{0, 0, -0x1p30}, {0, 0, 1}, true},
+        {{0, 0, -0x1p230}, {0, 0, 1}, false}, {{1 + 1e-9, 0, 0}, {0, 0, 1}, true},
+    };
+    enum { COUNT = sizeof questions / sizeof *questions };
+    TraceRay rays[COUNT];
+    TraceHit hits[COUNT];
+    for (size_t i = 0; i < COUNT; i++)
+        ray_set(&rays[i], questions[i].origin, questions[i].direction);
+    assert_true(probe_trace(&scene, PRECISION_CERTIFIED, 0, rays, COUNT, hits));
+    for (size_t i = 0; i < COUNT; i++)
+        if ((hits[i].certainty != TRACE_UNCERTAIN) != questions[i].is_certain)
+            fail_msg("question %zu is %scertain", i, questions[i].is_certain ? "not " : "");
+    assert_int_equal(rays_check(&scene, rays, COUNT).uncertain, 4);
+    assert_int_equal(hits[3].certainty, TRACE_CERTAIN);
+    assert_int_equal(hits[COUNT - 1].certainty, TRACE_CERTAIN_IN_DOUBLE);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(every_shape_is_certain),
+        cmocka_unit_test(mesh_edges_are_certain),
+        cmocka_unit_test(open_questions_are_uncertain),
+    };
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
