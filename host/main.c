@@ -3,7 +3,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include "host/import/mesh/assimp_process.h"
 #include <errno.h>
 #include <signal.h>

@@ -255,21 +255,23 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define MACRO_TILE_COLUMNS_OF(lanes)      (1 << MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 #define MACRO_TILE_ROWS_OF(lanes)         ((lanes) >> MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 
-// The scalars of an explicit ray and of its result (kernels/trace.cl): the offset of each vector.
+// The scalars of an explicit ray and of its result (kernels/trace.h): the offset of each vector. closest.cl fills
+// CLOSEST_SCALARS per ray, trace.cl all.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };
 enum {
     RESULT_T,
     RESULT_NORMAL,
     RESULT_POSITION = 4,
-    RESULT_REFLECTED_ORIGIN = 7,
-    RESULT_REFLECTED_DIRECTION = 10,
-    RESULT_REFRACTED_ORIGIN = 13,
-    RESULT_REFRACTED_DIRECTION = 16,
-    RESULT_REFRACTED_WEIGHT = 19,
-    RESULT_TRANSMITTANCE,
-    RESULT_LOW,
+    RESULT_LOW = 7,
     RESULT_HIGH,
     RESULT_DOUBT,
+    CLOSEST_SCALARS,
+    RESULT_REFLECTED_ORIGIN = CLOSEST_SCALARS,
+    RESULT_REFLECTED_DIRECTION = 13,
+    RESULT_REFRACTED_ORIGIN = 16,
+    RESULT_REFRACTED_DIRECTION = 19,
+    RESULT_REFRACTED_WEIGHT = 22,
+    RESULT_TRANSMITTANCE,
     RESULT_SCALARS
 };
 

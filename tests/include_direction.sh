@@ -1,5 +1,5 @@
 #!/bin/sh
-# Includes run one way: main and mpi, cli, {measure, verify, view}, render, compile, {import, then scene; opencl; image}, base. A room
+# Includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene; opencl; image}, base. A room
 # includes itself and the rooms below it; only compile, render and opencl include the kernels' shared headers, each its own;
 # only opencl and render include OpenCL's, only view those of the window, only mpi MPI's.
 set -eu
@@ -10,8 +10,9 @@ forbidden_includes() {
     (cd "$1" && find host kernels -name '*.[ch]' -o -name '*.cl' | sort | xargs grep -nHE '^[ \t]*#[ \t]*include') |
         awk -F: '
             BEGIN { level["base"] = 0; level["scene"] = level["opencl"] = level["image"] = 1; level["import"] = 2
-                    level["compile"] = 3; level["render"] = 4; level["measure"] = level["verify"] = level["view"] = 5
-                    level["cli"] = 6; level["mpi"] = level["main.c"] = 7
+                    level["compile"] = 3; level["render"] = 4; level["api"] = 5
+                    level["measure"] = level["verify"] = level["view"] = 6
+                    level["cli"] = 7; level["mpi"] = level["main.c"] = 8
                     shared["compile kernels/types.h"] = shared["compile kernels/features.h"] = 1
                     shared["render kernels/aovs.h"] = shared["opencl kernels/probes.h"] = 1
                     split("shapes traversal shading numerics", folders, " ")
@@ -85,6 +86,8 @@ expect forbidden host/render/renderer.c '#include "kernels/types.h"'
 expect forbidden host/measure/report.c '#include "kernels/aovs.h"'
 expect forbidden host/cli/view.c '#include <SDL_ttf.h>'
 expect forbidden host/compile/flatten.c '#include "kernels/shapes/sphere.h"'
+expect allowed host/api/image.c '#include "host/render/renderer.h"'
+expect forbidden host/render/renderer.c '#include "host/api/glint.h"'
 expect forbidden host/extra/thing.c '#include "host/base/text.h"'
 expect forbidden kernels/types.h '#include "host/base/text.h"'
 

@@ -63,7 +63,7 @@ check "PKG_CONFIG finds libraries" grep -q 'Libraries are missing' <($make -n PK
 
 # Compiles copies of the source in two folders.
 mkdir -p "$scratch/one" "$scratch/two/deeper"
-objects='kernel_files.o page_files.o host/base/fault.o host/cli/version.o host/image/png.o'
+objects='kernel_files.o page_files.o host/base/fault.o host/api/version.o host/image/png.o'
 compile() {
     local folder=$1 build=$2
     cp -r Makefile host kernels tools "$folder"
@@ -75,7 +75,7 @@ for object in $objects; do
     check "$object is the same in both" cmp "$scratch/one/build/$object" "$scratch/two/objects/$object"
     check "$object names no folder" test "$(grep -c "$scratch" "$scratch/two/objects/$object")" = 0
 done
-check "without a clone the version is the Makefile's" grep -qw "$version" "$scratch/one/build/host/cli/version.o"
+check "without a clone the version is the Makefile's" grep -qw "$version" "$scratch/one/build/host/api/version.o"
 check "objects without debug information" compile "$scratch/one" plain -DMARK_OF_FLAGS
 check "CFLAGS are not compiled in" test "$(cd "$scratch/one/plain" && grep -l MARK_OF_FLAGS $objects)" = ''
 check "the program names no folder" test "$(grep -cF "$PWD" "$build/glint")" = 0
@@ -83,7 +83,7 @@ check "the program names no folder" test "$(grep -cF "$PWD" "$build/glint")" = 0
 if commit=$(git rev-parse --verify -q HEAD 2>/dev/null); then
     mkdir "$scratch/archive"
     git archive HEAD | tar -x -C "$scratch/archive"
-    check "an archive compiles" $make -s -C "$scratch/archive" BUILD=build build/host/cli/version.o
-    check "an archive knows its commit" grep -q "$commit" "$scratch/archive/build/host/cli/version.o"
+    check "an archive compiles" $make -s -C "$scratch/archive" BUILD=build build/host/api/version.o
+    check "an archive knows its commit" grep -q "$commit" "$scratch/archive/build/host/api/version.o"
 fi
 finish

@@ -95,9 +95,9 @@ static void mesh_edges_are_certain(void **state)
     enum { SIDE = 12, RAYS = 4000 };
     Random random = {3};
     Vector3 vertices[SIDE][SIDE];
-    for (size_t i = 0; i < SIDE * SIDE; i++)
-        vertices[i / SIDE][i % SIDE] =
-            (Vector3){(double)(i / SIDE) / 3, random_between(&random, 0, 0.3), (double)(i % SIDE) / 7};
+    for (unsigned i = 0; i < SIDE; i++)
+        for (unsigned k = 0; k < SIDE; k++)
+            vertices[i][k] = (Vector3){(double)i / 3, random_between(&random, 0, 0.3), (double)k / 7};
     Object objects[2 * (SIDE - 1) * (SIDE - 1)];
     size_t count = 0;
     for (size_t i = 0; i + 1 < SIDE; i++)

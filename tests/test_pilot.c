@@ -218,7 +218,9 @@ static void pilot_chooses(void **state)
     const ErrorBudget budget = {0.1, ERROR_RMSE};
     settings = film_settings(320, 240, PRECISION_SINGLE);
     assert_true(pilot_run(&pilot, &budget, &probe_compute, &scene, &settings, &messages));
-    assert_true(pilot.chosen != PRECISION_DOUBLE && pilot.candidates[pilot.chosen].verdict.bound <= 0.1);
+    // which is chosen is a matter of their times
+    assert_true(pilot.candidates[PRECISION_SINGLE].verdict.keeps);
+    assert_true(pilot.candidates[PRECISION_SINGLE].verdict.bound <= 0.1);
     for (size_t i = 0; i < scene.materials.count; i++) {
         scene.materials.items[i].specular = 1000;
         scene.materials.items[i].shininess = 1e15;

@@ -135,7 +135,7 @@ static void crash_report(int signal_number)
 
 // In place of libc's, also for drivers (see LDFLAGS): LLVM replaces the handler of SIGABRT by one that does
 // not call ours.
-_Noreturn void abort(void)
+__attribute__((visibility("default"))) _Noreturn void abort(void)
 {
     crash_report(SIGABRT);
     signal(SIGABRT, SIG_DFL);
@@ -145,7 +145,8 @@ _Noreturn void abort(void)
 
 // Libc's calls another abort than the one above.
 // NOLINTNEXTLINE(bugprone-reserved-identifier): libc's name
-_Noreturn void __assert_fail(const char *assertion, const char *file, unsigned line, const char *function)
+__attribute__((visibility("default"))) _Noreturn void __assert_fail(const char *assertion, const char *file,
+                                                                    unsigned line, const char *function)
 {
     fprintf(stderr, "%s:%u: %s: Assertion `%s' failed.\n", file, line, function, assertion);
     abort();

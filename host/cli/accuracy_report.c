@@ -2,7 +2,7 @@
 
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>

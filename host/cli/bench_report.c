@@ -3,7 +3,7 @@
 #include "host/base/fault.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include "host/measure/baseline.h"
 #include <inttypes.h>
 #include <math.h>

@@ -10,7 +10,7 @@
 #include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -270,7 +270,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     if (is_certified && !reference_open(compute, &open->devices, selector) && selector) return EXIT_USER;
     Certification certification = {.options = options, .scene = scene, .compute = compute};
     uint32_t width = options->width, height = options->height;
-    image_size_choose(scene, &width, &height);
+    scene_choose_image_size(scene, &width, &height);
     const double start = clock_seconds();
     if (!certify_sample_open(&certification.sample, scene, width, height, options->pixels,
                              options->bounce_count, progress_interrupted))

@@ -6,7 +6,7 @@
 #include "host/base/numbers.h"
 #include "host/base/text.h"
 #include "host/cli/options.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>

@@ -279,15 +279,6 @@ RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint3
     return settings;
 }
 
-void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height)
-{
-    if (*width > 0) return;
-    *width = scene->width > 0 ? scene->width : 1280;
-    double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
-    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_MAX));
-    *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
-}
-
 const Device *device_find(DeviceList *devices, const char *selector)
 {
     device_list_open(devices);

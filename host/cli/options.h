@@ -103,7 +103,7 @@ enum {
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
         HELP_LENIENT HELP_MAX_PIXELS
 
-enum { IMAGE_SIDE_MAX = 1 << 20, SAMPLES_MAX = 1 << 20, BOUNCES_DEFAULT = 5 };
+enum { BOUNCES_DEFAULT = 5 };
 
 enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
@@ -150,10 +150,6 @@ void messages_print(MessageList *messages, const char *path);
 
 // Settings for a full image with the common options: one sample, no bounces, the scene not shifted.
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height);
-
-// The default image size if none is given (width 0): the scene's own, else 1280 wide with the camera frame's
-// aspect ratio, or 16:9.
-void image_size_choose(const Scene *scene, uint32_t *width, uint32_t *height);
 
 typedef struct {
     DeviceList devices;

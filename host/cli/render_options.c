@@ -176,7 +176,7 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
 {
-    image_size_choose(scene, &options->width, &options->height);
+    scene_choose_image_size(scene, &options->width, &options->height);
     if (!options->has_region) {
         options->region[2] = options->width;
         options->region[3] = options->height;

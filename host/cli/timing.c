@@ -3,7 +3,7 @@
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include <stdio.h>
 
 bool timing_style_read(const char *value, TimingStyle *style)

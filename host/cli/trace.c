@@ -202,7 +202,7 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     double farthest = farthest_of(options->common.precision);
     for (size_t i = 0; i < rays->count; i++)
         scaled[i] = trace_ray_scaled(rays->items[i], farthest, &exponents[i]);
-    const bool traced = renderer_trace(renderer, scaled, rays->count, hits);
+    const bool traced = renderer_trace_closest(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
         trace_hit_unscale(&hits[i], exponents[i]);
     const bool written = traced && hits_write(options, hits, rays->count);

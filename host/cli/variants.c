@@ -105,7 +105,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
                                size_t scene_index)
 {
     uint32_t width = options->width, height = options->height;
-    image_size_choose(&set->scenes[scene_index], &width, &height);
+    scene_choose_image_size(&set->scenes[scene_index], &width, &height);
     RenderSettings settings = settings_whole(&options->common, width, height);
     settings.bounce_count = options->bounce_count;
     settings.shift_to_eye = true;

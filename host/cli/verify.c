@@ -9,7 +9,7 @@
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/cli/verify_journal.h"
-#include "host/cli/version.h"
+#include "host/api/version.h"
 #include "host/render/arithmetic.h"
 #include <getopt.h>
 #include <inttypes.h>

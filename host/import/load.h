@@ -11,6 +11,9 @@ typedef struct {
     void (*file_named)(void *context, const char *path);
     void *context;
     Stage *stage; // shows what is being read; NULL: not wanted
+    // The program that assimp_process_main serves, looked for in PATH: it reads the formats of assimp. NULL:
+    // this process's own.
+    const char *mesh_program;
 } SceneOptions;
 
 // Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff .dat, or one of a mesh), or its first
@@ -28,6 +31,9 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages);
 // A file that mesh_is_known has: its triangles, materials, camera and lights. Without a camera one frames it,
 // without lights there are two.
 bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
+
+// Makes a scene of a mesh, which it takes: gray, with a camera that frames it and two lights.
+void scene_of_mesh(Scene *scene, Mesh *mesh);
 
 // For the readers: closes the report. Warns of what makes an image black; frees the scene if there are
 // errors.

@@ -56,6 +56,8 @@ static inline RenderSettings settings_of_image(uint32_t width, uint32_t height, 
 // stays below one binade.
 enum { PERTURB_SCALE_MAX = 1000 };
 
+enum { SAMPLES_MAX = 1 << 20 };
+
 typedef struct Renderer Renderer;
 
 enum { LANES_MAX = 16 };
@@ -171,6 +173,8 @@ bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film);
 // Closest hits of explicit rays (host/render/trace.h), by the same intersection code that renders. The
 // report has neither its launches nor its reads. False: the device failed, and `hits` are undefined.
 bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
+// Computes neither reflected and refracted rays nor transmission and light, which makes it faster.
+bool renderer_trace_closest(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits);
 
 // A kernel launch or a transfer.
 typedef struct {

@@ -11,10 +11,9 @@
 static const struct {
     const char *file, *name;
 } kernel_sources[KERNEL_COUNT] = {
-    [KERNEL_RENDER] = {"render.cl", "render"},
-    [KERNEL_AOV] = {"aov.cl", "aov"},
-    [KERNEL_PATH] = {"path.cl", "path"},
-    [KERNEL_TRACE] = {"trace.cl", "trace"},
+    [KERNEL_RENDER] = {"render.cl", "render"},    [KERNEL_AOV] = {"aov.cl", "aov"},
+    [KERNEL_PATH] = {"path.cl", "path"},          [KERNEL_TRACE] = {"trace.cl", "trace"},
+    [KERNEL_CLOSEST] = {"closest.cl", "closest"},
 };
 
 static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)

@@ -6,7 +6,14 @@
 #include "host/render/pace.h"
 #include "host/render/renderer.h"
 
-typedef enum { KERNEL_RENDER, KERNEL_AOV, KERNEL_PATH, KERNEL_TRACE, KERNEL_COUNT } KernelKind;
+typedef enum {
+    KERNEL_RENDER,
+    KERNEL_AOV,
+    KERNEL_PATH,
+    KERNEL_TRACE,
+    KERNEL_CLOSEST,
+    KERNEL_COUNT
+} KernelKind;
 
 typedef struct {
     ProgramRequest request;

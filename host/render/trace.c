@@ -26,36 +26,43 @@ static void vector_at(const void *scalars, size_t index, bool is_double, double 
         vector[axis] = scalar_at(scalars, index + axis, is_double);
 }
 
-// The scalars of one hit, from `index` on.
-static TraceHit hit_at(const Renderer *renderer, const void *scalars, size_t index, uint32_t object)
+// Returns how many scalars a kernel stores per ray.
+static size_t result_scalars(KernelKind kind)
+{
+    return kind == KERNEL_TRACE ? RESULT_SCALARS : CLOSEST_SCALARS;
+}
+
+static void bounces_read(TraceHit *hit, const void *scalars, size_t index, bool is_double, double unit)
+{
+    hit->transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, is_double);
+    hit->light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, is_double);
+    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, hit->reflected_origin);
+    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, hit->reflected_direction);
+    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, hit->refracted_origin);
+    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, hit->refracted_direction);
+    for (size_t axis = 0; axis < 3; axis++) {
+        hit->reflected_origin[axis] *= unit;
+        hit->refracted_origin[axis] *= unit;
+    }
+}
+
+// Returns the hit whose scalars begin at `index`.
+static TraceHit hit_at(const Renderer *renderer, KernelKind kind, const void *scalars, size_t index,
+                       uint32_t object)
 {
     const bool is_double = renderer->report.is_double;
     const double unit = renderer->compiled.unit;
     TraceHit hit = {.object = object,
-                    .t = scalar_at(scalars, index + RESULT_T, is_double),
-                    .transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, is_double),
-                    .light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, is_double),
-                    .low = scalar_at(scalars, index + RESULT_LOW, is_double),
-                    .high = scalar_at(scalars, index + RESULT_HIGH, is_double)};
+                    .t = unit * scalar_at(scalars, index + RESULT_T, is_double),
+                    .low = unit * scalar_at(scalars, index + RESULT_LOW, is_double),
+                    .high = unit * scalar_at(scalars, index + RESULT_HIGH, is_double)};
     vector_at(scalars, index + RESULT_NORMAL, is_double, hit.normal);
     vector_at(scalars, index + RESULT_POSITION, is_double, hit.position);
-    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, hit.reflected_origin);
-    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, hit.reflected_direction);
-    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, hit.refracted_origin);
-    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, hit.refracted_direction);
-    const bool is_certain =
-        renderer_certifies(renderer) && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0;
-    hit.certainty = !is_certain                  ? TRACE_UNCERTAIN
-                    : renderer->pass == PASS_ALL ? TRACE_CERTAIN
-                                                 : TRACE_CERTAIN_IN_DOUBLE;
-    hit.t *= unit;
-    hit.low *= unit;
-    hit.high *= unit;
-    for (size_t axis = 0; axis < 3; axis++) {
+    for (size_t axis = 0; axis < 3; axis++)
         hit.position[axis] *= unit;
-        hit.reflected_origin[axis] *= unit;
-        hit.refracted_origin[axis] *= unit;
-    }
+    if (renderer_certifies(renderer) && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0)
+        hit.certainty = renderer->pass == PASS_ALL ? TRACE_CERTAIN : TRACE_CERTAIN_IN_DOUBLE;
+    if (kind == KERNEL_TRACE) bounces_read(&hit, scalars, index, is_double, unit);
     return hit;
 }
 
@@ -79,10 +86,11 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
 }
 
 // Returns the launch's seconds.
-static double trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_mem results, cl_mem objects)
+static double trace_launch(Renderer *renderer, KernelKind kind, uint32_t count, cl_mem rays, cl_mem results,
+                           cl_mem objects)
 {
     Compute *compute = renderer->compute;
-    cl_kernel kernel = renderer_kernel(renderer, KERNEL_TRACE);
+    cl_kernel kernel = renderer_kernel(renderer, kind);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof rays, &rays);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof count, &count);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof results, &results);
@@ -90,23 +98,25 @@ static double trace_launch(Renderer *renderer, uint32_t count, cl_mem rays, cl_m
     const size_t *fixed = compute->device->work_group,
                  items = (count + renderer->report.lanes - 1) / renderer->report.lanes,
                  group = fixed[0] > 0 ? fixed[0] * fixed[1] : TRACE_GROUP;
-    return renderer_launch(renderer, KERNEL_TRACE, 1, NULL, &items, &group);
+    return renderer_launch(renderer, kind, 1, NULL, &items, &group);
 }
 
-static void hits_unpack(Renderer *renderer, uint32_t count, cl_mem results, cl_mem objects, TraceHit *hits)
+static void hits_unpack(Renderer *renderer, KernelKind kind, uint32_t count, cl_mem results, cl_mem objects,
+                        TraceHit *hits)
 {
     Compute *compute = renderer->compute;
-    size_t result_size = (size_t)count * RESULT_SCALARS * renderer_scalar_size(renderer);
+    size_t result_size = (size_t)count * result_scalars(kind) * renderer_scalar_size(renderer);
     const void *result = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
     const uint32_t *object = renderer_map(renderer, objects, 0, (size_t)count * sizeof *object, CL_MAP_READ);
     for (uint32_t i = 0; i < count && compute_ok(compute); i++)
-        hits[i] = hit_at(renderer, result, (size_t)i * RESULT_SCALARS, object[i]);
+        hits[i] = hit_at(renderer, kind, result, i * result_scalars(kind), object[i]);
     renderer_unmap(renderer, results, result);
     renderer_unmap(renderer, objects, object);
     compute_try(compute, clFinish(compute->queue));
 }
 
-static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count, TraceHit *hits)
+static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *rays, uint32_t count,
+                        TraceHit *hits)
 {
     Compute *compute = renderer->compute;
     size_t scalar = renderer_scalar_size(renderer);
@@ -114,36 +124,42 @@ static void trace_batch(Renderer *renderer, const TraceRay *rays, uint32_t count
     cl_mem ray_buffer =
         buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, scalars, CL_MEM_READ_ONLY);
     free(scalars);
-    cl_mem results = buffer_create(compute, (size_t)count * RESULT_SCALARS * scalar, NULL, CL_MEM_WRITE_ONLY);
+    cl_mem results =
+        buffer_create(compute, (size_t)count * result_scalars(kind) * scalar, NULL, CL_MEM_WRITE_ONLY);
     cl_mem objects = buffer_create(compute, (size_t)count * sizeof(uint32_t), NULL, CL_MEM_WRITE_ONLY);
-    const double seconds = trace_launch(renderer, count, ray_buffer, results, objects);
-    pace_note_launch(renderer_pace(renderer, KERNEL_TRACE), count, seconds);
-    hits_unpack(renderer, count, results, objects, hits);
+    const double seconds = trace_launch(renderer, kind, count, ray_buffer, results, objects);
+    pace_note_launch(renderer_pace(renderer, kind), count, seconds);
+    hits_unpack(renderer, kind, count, results, objects, hits);
     buffer_release(ray_buffer);
     buffer_release(results);
     buffer_release(objects);
 }
 
-static bool pass_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
+                       TraceHit *hits)
 {
     const Compute *compute = renderer->compute;
     // the report is of images: a view asks about pixel after pixel
     RenderReport *report = &renderer->report;
     const size_t launch_count = report->launches.count, read_count = report->reads.count;
-    Pace *pace = renderer_pace(renderer, KERNEL_TRACE);
+    Pace *pace = renderer_pace(renderer, kind);
     pace_begin_band(pace);
     for (size_t first = 0, count; first < ray_count && compute_ok(compute); first += count) {
         count = ray_count - first < BATCH_RAYS_MAX ? ray_count - first : BATCH_RAYS_MAX;
         if (count > pace_launch_samples(pace)) count = (size_t)pace_launch_samples(pace);
-        trace_batch(renderer, rays + first, (uint32_t)count, hits + first);
+        trace_batch(renderer, kind, rays + first, (uint32_t)count, hits + first);
     }
     report->launches.count = launch_count;
     report->reads.count = read_count;
     return compute_ok(compute);
 }
 
+static bool rays_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
+                       TraceHit *hits);
+
 // Traces the rays again whose hits are uncertain.
-static bool uncertain_trace(Renderer *repeat, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+static bool uncertain_trace(Renderer *repeat, KernelKind kind, const TraceRay *rays, size_t ray_count,
+                            TraceHit *hits)
 {
     size_t count = 0;
     for (size_t i = 0; i < ray_count; i++)
@@ -153,7 +169,7 @@ static bool uncertain_trace(Renderer *repeat, const TraceRay *rays, size_t ray_c
     TraceHit *found = memory_allocate(count, sizeof *found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) chosen[k++] = rays[i];
-    const bool is_done = renderer_trace(repeat, chosen, count, found);
+    const bool is_done = rays_trace(repeat, kind, chosen, count, found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) hits[i] = found[k++];
     free(chosen);
@@ -173,13 +189,24 @@ static void ends_apply(const TraceRay *rays, size_t ray_count, TraceHit *hits)
     }
 }
 
-bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+static bool rays_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
+                       TraceHit *hits)
 {
-    if (!pass_trace(renderer, rays, ray_count, hits)) return false;
+    if (!pass_trace(renderer, kind, rays, ray_count, hits)) return false;
     if (!renderer->repeat) return true;
     ends_apply(rays, ray_count, hits);
-    return uncertain_trace(renderer->repeat, rays, ray_count, hits) &&
+    return uncertain_trace(renderer->repeat, kind, rays, ray_count, hits) &&
            compute_check_reference(renderer->compute);
+}
+
+bool renderer_trace(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+{
+    return rays_trace(renderer, KERNEL_TRACE, rays, ray_count, hits);
+}
+
+bool renderer_trace_closest(Renderer *renderer, const TraceRay *rays, size_t ray_count, TraceHit *hits)
+{
+    return rays_trace(renderer, KERNEL_CLOSEST, rays, ray_count, hits);
 }
 
 TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent)

@@ -136,3 +136,12 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
         is_read = is_same_file(scene->meshes.items[i].path, &status);
     return is_read;
 }
+
+void scene_choose_image_size(const Scene *scene, uint32_t *width, uint32_t *height)
+{
+    if (*width > 0) return;
+    *width = scene->width > 0 ? scene->width : 1280;
+    double aspect = scene->camera.frame_aspect > 0 ? scene->camera.frame_aspect : 16.0 / 9;
+    double fitting = fmax(1, fmin(round(*width / aspect), IMAGE_SIDE_MAX));
+    *height = scene->height > 0 ? scene->height : (uint32_t)fitting;
+}

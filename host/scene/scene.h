@@ -222,6 +222,12 @@ void material_set_opacity(Material *material, double opacity);
 // is (1, 1, 1), where it replaces the material's ambient light.
 void material_set_emission(Material *material, Color emission);
 
+enum { IMAGE_SIDE_MAX = 1 << 20 }; // in pixels
+
+// Chooses an image size where none is given (width 0): the scene's, else 1280 wide with the camera frame's
+// aspect ratio, or 16:9.
+void scene_choose_image_size(const Scene *scene, uint32_t *width, uint32_t *height);
+
 // How many ids an object takes: one for each triangle of a mesh, else one.
 size_t object_primitive_count(const Scene *scene, const Object *object);
 size_t scene_primitive_count(const Scene *scene);

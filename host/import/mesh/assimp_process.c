@@ -399,7 +399,9 @@ static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
     posix_spawnattr_setsigmask(&attributes, &none);
     posix_spawnattr_setsigdefault(&attributes, &defaults);
     posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    const int error = posix_spawn(process, "/proc/self/exe", &actions, &attributes, arguments, environ);
+    const SceneOptions *options = draft->import->options;
+    const char *program = options && options->mesh_program ? options->mesh_program : "/proc/self/exe";
+    const int error = posix_spawnp(process, program, &actions, &attributes, arguments, environ);
     posix_spawnattr_destroy(&attributes);
     posix_spawn_file_actions_destroy(&actions);
     close(ends[1]);

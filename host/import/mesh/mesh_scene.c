@@ -148,6 +148,18 @@ static void scene_show(Scene *scene, const MeshView *view, const char *path, Rep
     if (scene->lights.count == 0) lights_around(scene);
 }
 
+void scene_of_mesh(Scene *scene, Mesh *mesh)
+{
+    const Material material = material_default();
+    *scene = (Scene){.background = vector_all(gray)};
+    array_push(scene->meshes, *mesh);
+    *mesh = (Mesh){0};
+    scene_add_object(scene, (Object){.kind = SHAPE_MESH}, &material);
+    const Mesh *own = &scene->meshes.items[0];
+    scene->camera = camera_around(own, mesh_center(own), (Vector3){0, 1, 0});
+    lights_around(scene);
+}
+
 bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
 {
     const Source source = {.file = path, .bytes = ""};

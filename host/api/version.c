@@ -1,4 +1,4 @@
-#include "host/cli/version.h"
+#include "host/api/version.h"
 
 const char *glint_version(void)
 {

@@ -1,0 +1,56 @@
+// What begins and ends the calls of glint.h.
+#include "host/api/handles.h"
+#include <stdlib.h>
+#include <string.h>
+
+bool struct_read(void *own, size_t own_size, const void *given, MessageList *messages)
+{
+    size_t size = 0;
+    if (given) memcpy(&size, given, sizeof size);
+    bool is_known = size >= sizeof size;
+    for (size_t i = own_size; is_known && i < size; i++)
+        is_known = ((const char *)given)[i] == 0;
+    memset(own, 0, own_size);
+    if (!is_known)
+        return message_error(messages, "a struct is of a later version than %s, or its size is not set",
+                             glint_version());
+    memcpy(own, given, size < own_size ? size : own_size);
+    return true;
+}
+
+GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages)
+{
+    if (compute && !compute_ok(compute)) {
+        char *failure = compute_failure_text(compute);
+        message_error(list, "%s", failure);
+        free(failure);
+        status = GLINT_DEVICE_FAILED;
+    }
+    char *text = NULL;
+    size_t size = 0;
+    FILE *stream = messages && list->count > 0 ? open_memstream(&text, &size) : NULL;
+    if (stream) {
+        message_list_print(list, stream);
+        fclose(stream);
+    }
+    if (messages) *messages = text;
+    message_list_free(list);
+    return status;
+}
+
+bool precision_read(Precision *precision, GlintPrecision given, MessageList *messages)
+{
+    static const Precision precisions[] = {[GLINT_SINGLE] = PRECISION_SINGLE,
+                                           [GLINT_STRICT] = PRECISION_STRICT,
+                                           [GLINT_DOUBLE] = PRECISION_DOUBLE,
+                                           [GLINT_CERTIFIED] = PRECISION_CERTIFIED};
+    if ((size_t)given >= sizeof precisions / sizeof *precisions)
+        return message_error(messages, "there is no precision %d", (int)given);
+    *precision = precisions[given];
+    return true;
+}
+
+void glint_text_free(char *text)
+{
+    free(text);
+}

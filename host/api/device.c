@@ -1,0 +1,86 @@
+#include "host/api/handles.h"
+
+#include "host/base/memory.h"
+#include <stdlib.h>
+#include <string.h>
+
+static void info_set(GlintDeviceInfo *info, const Device *device)
+{
+    GlintDeviceInfo own = {.size = info->size,
+                           .index = device->index,
+                           .compute_units = device->compute_units,
+                           .memory_bytes = device->memory_bytes,
+                           .is_gpu = (device->type & CL_DEVICE_TYPE_GPU) != 0,
+                           .is_cpu = (device->type & CL_DEVICE_TYPE_CPU) != 0,
+                           .has_double = device->fp64,
+                           .is_usable = device_usable(device, NULL)};
+    snprintf(own.name, sizeof own.name, "%s", device->name);
+    snprintf(own.platform, sizeof own.platform, "%s", device->platform_name);
+    snprintf(own.driver, sizeof own.driver, "%s", device->driver);
+    memcpy(info, &own, info->size < sizeof own ? info->size : sizeof own);
+}
+
+GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *count, char **messages)
+{
+    MessageList list = {0};
+    DeviceList devices;
+    device_list_open(&devices);
+    *count = devices.count;
+    const size_t stride = infos ? infos->size : 0;
+    bool is_sound = capacity == 0 || stride >= sizeof(size_t);
+    if (!is_sound) message_error(&list, "the size of a GlintDeviceInfo is not set");
+    for (size_t i = 0; is_sound && i < devices.count && i < capacity; i++) {
+        GlintDeviceInfo *info = (GlintDeviceInfo *)(void *)((char *)infos + i * stride);
+        info->size = stride;
+        info_set(info, &devices.items[i]);
+    }
+    char *failure = device_list_failure_text(&devices);
+    if (failure) message_error(&list, "%s", failure);
+    const GlintStatus status = !is_sound ? GLINT_WRONG_INPUT : failure ? GLINT_DEVICE_FAILED : GLINT_DONE;
+    free(failure);
+    device_list_close(&devices);
+    return call_end(&list, NULL, status, messages);
+}
+
+GlintStatus glint_device_open(const char *selector, GlintDevice **device, char **messages)
+{
+    MessageList list = {0};
+    GlintDevice *opened = memory_allocate_zeroed(1, sizeof *opened);
+    device_list_open(&opened->list);
+    const Device *chosen = device_choose(&opened->list, device_selector(selector), &list);
+    if (chosen) compute_open(&opened->compute, chosen);
+    const GlintStatus status =
+        call_end(&list, &opened->compute, chosen ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+    pthread_mutex_init(&opened->mutex, NULL);
+    *device = status == GLINT_DONE ? opened : NULL;
+    if (!*device) glint_device_close(opened);
+    return status;
+}
+
+void glint_device_close(GlintDevice *device)
+{
+    if (!device) return;
+    compute_close(&device->compute);
+    device_list_close(&device->list);
+    pthread_mutex_destroy(&device->mutex);
+    free(device);
+}
+
+void glint_device_info(const GlintDevice *device, GlintDeviceInfo *info)
+{
+    info_set(info, device->compute.device);
+}
+
+Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
+                          MessageList *messages)
+{
+    Compute *compute = &device->compute;
+    if (settings->precision == PRECISION_CERTIFIED && !compute->device->fp64 && !compute->reference &&
+        compute_ok(compute)) {
+        MessageList unsaid = {0}; // renderer_open names what is missing
+        const Device *reference = device_choose_reference(&device->list, NULL, &unsaid);
+        message_list_free(&unsaid);
+        if (reference) compute_open_reference(compute, reference);
+    }
+    return renderer_open(compute, scene, settings, messages);
+}

@@ -1,0 +1,144 @@
+#include "host/api/handles.h"
+
+#include "host/base/memory.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { BATCH_RAYS = 1 << 16 };
+
+GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
+                              const GlintTraceSettings *settings, GlintTracer **tracer, char **messages)
+{
+    MessageList list = {0};
+    GlintTraceSettings given;
+    Precision precision;
+    *tracer = NULL;
+    if (!struct_read(&given, sizeof given, settings, &list) ||
+        !precision_read(&precision, given.precision, &list))
+        return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
+    RenderSettings own = settings_of_image(1, 1, precision);
+    own.lanes = given.lanes;
+    pthread_mutex_lock(&device->mutex);
+    Renderer *renderer = device_renderer(device, &scene->scene, &own, &list);
+    const GlintStatus status =
+        call_end(&list, &device->compute, renderer ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+    if (status == GLINT_DONE) {
+        *tracer = memory_allocate_zeroed(1, sizeof **tracer);
+        **tracer = (GlintTracer){device, renderer, given.precision, scene_primitive_count(&scene->scene)};
+    } else {
+        renderer_close(renderer);
+    }
+    pthread_mutex_unlock(&device->mutex);
+    return status;
+}
+
+void glint_tracer_close(GlintTracer *tracer)
+{
+    if (!tracer) return;
+    pthread_mutex_lock(&tracer->device->mutex);
+    renderer_close(tracer->renderer);
+    pthread_mutex_unlock(&tracer->device->mutex);
+    free(tracer);
+}
+
+static void reals_read(double *values, size_t count, GlintReal real, const void *reals, size_t first)
+{
+    for (size_t i = 0; i < count; i++)
+        values[i] = real == GLINT_FLOAT32 ? (double)((const float *)reals)[first + i]
+                                          : ((const double *)reals)[first + i];
+}
+
+// Reads a ray and scales it. False with a message.
+static bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index,
+                     GlintPrecision precision, MessageList *messages)
+{
+    const double farthest =
+        precision == GLINT_DOUBLE || precision == GLINT_CERTIFIED ? DBL_MAX : (double)FLT_MAX;
+    *ray = (TraceRay){.tmax = farthest};
+    reals_read(ray->origin, 3, rays->real, rays->origins, 3 * index);
+    reals_read(ray->direction, 3, rays->real, rays->directions, 3 * index);
+    if (rays->tmin) reals_read(&ray->tmin, 1, rays->real, rays->tmin, index);
+    if (rays->tmax) reals_read(&ray->tmax, 1, rays->real, rays->tmax, index);
+    bool is_finite = isfinite(ray->tmin) && !isnan(ray->tmax), has_direction = false;
+    for (int axis = 0; axis < 3; axis++) {
+        is_finite = is_finite && fabs(ray->origin[axis]) <= farthest && isfinite(ray->direction[axis]);
+        has_direction = has_direction || ray->direction[axis] != 0;
+    }
+    if (!is_finite || !has_direction)
+        return message_error(
+            messages,
+            "ray %zu: expected finite numbers within the precision's range and a direction other than 0",
+            index);
+    if (precision == GLINT_CERTIFIED && ray->tmin != 0)
+        return message_error(messages, "ray %zu: at certified a ray starts at its origin, tmin 0", index);
+    *ray = trace_ray_scaled(*ray, farthest, exponent);
+    return true;
+}
+
+static void vector_write(double *vectors, size_t index, const double vector[3], bool is_hit)
+{
+    for (size_t axis = 0; axis < 3 && vectors; axis++)
+        vectors[3 * index + axis] = is_hit ? vector[axis] : 0;
+}
+
+static void hit_write(const GlintHits *hits, size_t index, TraceHit *hit, int exponent)
+{
+    const bool is_hit = hit->object != UINT32_MAX, is_certain = hit->certainty != TRACE_UNCERTAIN;
+    trace_hit_unscale(hit, exponent);
+    if (hits->object) hits->object[index] = hit->object;
+    if (hits->t) hits->t[index] = is_hit ? hit->t : (double)INFINITY;
+    if (hits->low) hits->low[index] = !is_hit ? (double)INFINITY : is_certain ? hit->low : hit->t;
+    if (hits->high) hits->high[index] = !is_hit ? (double)INFINITY : is_certain ? hit->high : hit->t;
+    vector_write(hits->normal, index, hit->normal, is_hit);
+    vector_write(hits->position, index, hit->position, is_hit);
+    static const uint8_t certainties[] = {[TRACE_UNCERTAIN] = GLINT_UNCERTAIN,
+                                          [TRACE_CERTAIN] = GLINT_CERTAIN,
+                                          [TRACE_CERTAIN_IN_DOUBLE] = GLINT_CERTAIN_IN_DOUBLE};
+    if (hits->certainty) hits->certainty[index] = certainties[hit->certainty];
+}
+
+// Traces rays in batches, which bounds the memory that they take. False with a message, or if the device
+// failed.
+static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const GlintHits *hits,
+                       MessageList *messages)
+{
+    const size_t batch = rays->count < BATCH_RAYS ? rays->count : BATCH_RAYS;
+    TraceRay *scaled = memory_allocate(batch + 1, sizeof *scaled);
+    TraceHit *found = memory_allocate(batch + 1, sizeof *found);
+    int *exponents = memory_allocate(batch + 1, sizeof *exponents);
+    bool is_sound = true;
+    for (size_t first = 0, count; first < rays->count && is_sound; first += count) {
+        count = rays->count - first < batch ? rays->count - first : batch;
+        for (size_t i = 0; i < count && is_sound; i++)
+            is_sound = ray_read(&scaled[i], &exponents[i], rays, first + i, tracer->precision, messages);
+        is_sound = is_sound && renderer_trace_closest(tracer->renderer, scaled, count, found);
+        for (size_t i = 0; i < count && is_sound; i++)
+            hit_write(hits, first + i, &found[i], exponents[i]);
+    }
+    free(exponents);
+    free(found);
+    free(scaled);
+    return is_sound;
+}
+
+GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages)
+{
+    MessageList list = {0};
+    GlintRays given;
+    GlintHits arrays;
+    bool is_sound =
+        struct_read(&given, sizeof given, rays, &list) && struct_read(&arrays, sizeof arrays, hits, &list);
+    if (is_sound && given.real != GLINT_FLOAT32 && given.real != GLINT_FLOAT64)
+        is_sound = message_error(&list, "rays are neither of 32 nor of 64 bits");
+    if (is_sound && given.count > 0 && (!given.origins || !given.directions))
+        is_sound = message_error(&list, "rays need origins and directions");
+    if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
+    pthread_mutex_lock(&tracer->device->mutex);
+    is_sound = rays_trace(tracer, &given, &arrays, &list);
+    const GlintStatus status =
+        call_end(&list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+    pthread_mutex_unlock(&tracer->device->mutex);
+    return status;
+}

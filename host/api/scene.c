@@ -1,0 +1,121 @@
+#include "host/api/handles.h"
+
+#include "host/base/memory.h"
+#include "host/import/number.h"
+#include "host/scene/mesh.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const SceneOptions options = {.mesh_program = "glint"};
+
+static GlintStatus scene_give(GlintScene **scene, Scene *read, bool is_read, MessageList *list,
+                              char **messages)
+{
+    *scene = NULL;
+    if (is_read) {
+        *scene = memory_allocate_zeroed(1, sizeof **scene);
+        (*scene)->scene = *read;
+    }
+    return call_end(list, NULL, is_read ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+}
+
+GlintStatus glint_scene_load(const char *path, GlintScene **scene, char **messages)
+{
+    MessageList list = {0};
+    Scene read = {0};
+    const bool is_read = scene_load(&read, path, &options, &list);
+    return scene_give(scene, &read, is_read, &list, messages);
+}
+
+GlintStatus glint_scene_parse(const char *text, size_t length, const char *name, GlintScene **scene,
+                              char **messages)
+{
+    MessageList list = {0};
+    Scene read = {0};
+    const Source source = {.file = name, .bytes = text, .length = length};
+    const bool is_read = scene_read_yaml(&read, &source, &options, &list);
+    return scene_give(scene, &read, is_read, &list, messages);
+}
+
+static double real_at(GlintReal real, const void *reals, size_t index)
+{
+    return real == GLINT_FLOAT32 ? (double)((const float *)reals)[index] : ((const double *)reals)[index];
+}
+
+// Copies vectors; false with a message: one is not finite, or too far away.
+static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, size_t count,
+                         MessageList *messages)
+{
+    for (size_t i = 0; i < count; i++) {
+        vectors[i] = (Vector3){real_at(real, reals, 3 * i), real_at(real, reals, 3 * i + 1),
+                               real_at(real, reals, 3 * i + 2)};
+        if (!(fabs(vectors[i].x) <= NUMBER_MAX && fabs(vectors[i].y) <= NUMBER_MAX &&
+              fabs(vectors[i].z) <= NUMBER_MAX))
+            return message_error(messages, "vertex %zu: expected numbers up to %g", i, NUMBER_MAX);
+    }
+    return true;
+}
+
+static bool mesh_is_sound(const GlintMesh *given, MessageList *messages)
+{
+    enum { TRIANGLES_MAX = 1 << 24 };
+    if (given->real != GLINT_FLOAT32 && given->real != GLINT_FLOAT64)
+        return message_error(messages, "vertices are neither of 32 nor of 64 bits");
+    if (!given->vertices || !given->triangles || given->triangle_count == 0 ||
+        given->triangle_count > TRIANGLES_MAX || given->vertex_count > UINT32_MAX)
+        return message_error(messages, "expected 1 to %d triangles and at most %u vertices, not %zu and %zu",
+                             TRIANGLES_MAX, UINT32_MAX, given->triangle_count, given->vertex_count);
+    for (size_t i = 0; i < 3 * given->triangle_count; i++)
+        if (given->triangles[i] >= given->vertex_count)
+            return message_error(messages, "triangle %zu: there is no vertex %u of %zu", i / 3,
+                                 given->triangles[i], given->vertex_count);
+    return true;
+}
+
+GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char **messages)
+{
+    MessageList list = {0};
+    Scene read = {0};
+    GlintMesh given;
+    bool is_read = struct_read(&given, sizeof given, mesh, &list) && mesh_is_sound(&given, &list);
+    if (is_read) {
+        Mesh own = {.vertex_count = given.vertex_count, .triangle_count = given.triangle_count};
+        own.vertices = memory_allocate(given.vertex_count, sizeof *own.vertices);
+        own.triangles = memory_allocate(given.triangle_count, sizeof *own.triangles);
+        memcpy(own.triangles, given.triangles, given.triangle_count * sizeof *own.triangles);
+        if (given.normals) own.normals = memory_allocate(given.vertex_count, sizeof *own.normals);
+        is_read = vectors_read(own.vertices, given.real, given.vertices, given.vertex_count, &list) &&
+                  (!given.normals ||
+                   vectors_read(own.normals, given.real, given.normals, given.vertex_count, &list));
+        for (size_t i = 0; own.normals && i < own.vertex_count; i++)
+            if (!vector_is_zero(own.normals[i])) own.normals[i] = vector_normalize(own.normals[i]);
+        if (is_read)
+            scene_of_mesh(&read, &own);
+        else
+            mesh_free(&own);
+    }
+    return scene_give(scene, &read, is_read, &list, messages);
+}
+
+void glint_scene_free(GlintScene *scene)
+{
+    if (scene) scene_free(&scene->scene);
+    free(scene);
+}
+
+size_t glint_scene_object_count(const GlintScene *scene)
+{
+    return scene_primitive_count(&scene->scene);
+}
+
+size_t glint_scene_light_count(const GlintScene *scene)
+{
+    return scene->scene.lights.count;
+}
+
+void glint_scene_image_size(const GlintScene *scene, uint32_t *width, uint32_t *height)
+{
+    *width = *height = 0;
+    scene_choose_image_size(&scene->scene, width, height);
+}

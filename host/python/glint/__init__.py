@@ -1,0 +1,292 @@
+"""Renders scenes and traces rays on OpenCL devices, with a bound on the error of each hit.
+
+    import glint
+    scene = glint.load("scene.yaml")            # or a mesh or glTF file, glint.Scene(dict), glint.load_mesh(…)
+    image = scene.render(640, 360)              # (360, 640, 3), linear light
+    hits = scene.trace(origins, directions, precision="certified")
+    hits.object[hits.certain]                   # proven equal to exact arithmetic's
+
+Every call that computes releases Python's lock. A wrong scene or argument raises SceneError, a device that fails
+DeviceError; what glint warns of is a GlintWarning.
+"""
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import threading
+import warnings
+import weakref
+from typing import Any, Callable, Mapping, NamedTuple, Optional, Sequence, Union
+
+import numpy as np
+
+from . import _library as _c
+
+__all__ = ["Device", "DeviceError", "GlintWarning", "Hits", "MISS", "Scene", "SceneError", "devices", "load", "load_mesh",
+           "version"]
+
+MISS = 0xFFFFFFFF  #: the object of a miss
+PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
+#: the layers of an image: values per pixel (0: one per light) and their type
+LAYERS = {"color": (3, np.float64), "t": (1, np.float64), "normal": (3, np.float64), "position": (3, np.float64),
+          "object": (1, np.uint32), "shadow": (0, np.uint32), "doubt": (1, np.uint32)}
+
+
+class SceneError(ValueError):
+    """A scene, file, setting or selector is wrong; the text is what `glint` prints."""
+
+
+class DeviceError(RuntimeError):
+    """An OpenCL call failed."""
+
+
+class Stopped(Exception):
+    """The progress function returned True."""
+
+
+class GlintWarning(UserWarning):
+    """What glint warns of."""
+
+
+def _check(status: int, messages: ctypes.c_char_p) -> None:
+    """Raises what a call's status and messages say."""
+    text = ctypes.string_at(messages).decode("utf-8", "replace").rstrip() if messages else ""
+    if messages:
+        _c.library.glint_text_free(messages)
+    if status == 1:
+        raise SceneError(text)
+    if status == 2:
+        raise DeviceError(text)
+    if status == 3:
+        raise Stopped()
+    if text:
+        warnings.warn(text, GlintWarning, stacklevel=3)
+
+
+def version() -> str:
+    """Returns the library's version."""
+    return _c.library.glint_version().decode()
+
+
+class Device(NamedTuple):
+    """An OpenCL device; `index` selects it."""
+    index: int
+    name: str
+    platform: str
+    driver: str
+    compute_units: int
+    memory_bytes: int
+    is_gpu: bool
+    is_cpu: bool
+    has_double: bool
+    is_usable: bool
+
+
+def devices() -> list[Device]:
+    """Lists the devices of all platforms."""
+    infos, count, messages = (_c.DeviceInfo * 256)(), ctypes.c_size_t(), ctypes.c_void_p()
+    for info in infos:
+        info.size = ctypes.sizeof(_c.DeviceInfo)
+    status = _c.library.glint_devices_list(infos, len(infos), ctypes.byref(count), ctypes.byref(messages))
+    _check(status, messages)
+    return [Device(info.index, info.name.decode(), info.platform.decode(), info.driver.decode(), info.compute_units,
+                   info.memory_bytes, bool(info.is_gpu), bool(info.is_cpu), bool(info.has_double), bool(info.is_usable))
+            for info in infos[:min(count.value, len(infos))]]
+
+
+class _OpenDevice:
+    """A device that stays open for the process, since its compiler takes long to start."""
+    _opened: dict[Optional[str], "_OpenDevice"] = {}
+    _lock = threading.Lock()
+
+    def __init__(self, selector: Optional[str]):
+        self.handle, messages = ctypes.c_void_p(), ctypes.c_void_p()
+        encoded = None if selector is None else selector.encode()
+        _check(_c.library.glint_device_open(encoded, ctypes.byref(self.handle), ctypes.byref(messages)), messages)
+
+    @classmethod
+    def get(cls, selector: Union[None, int, str]) -> "_OpenDevice":
+        key = None if selector is None else str(selector)
+        with cls._lock:
+            if key not in cls._opened:
+                cls._opened[key] = cls(key)
+            return cls._opened[key]
+
+
+class Hits(NamedTuple):
+    """The nearest hits of rays: arrays with one row per ray.
+
+    object: its number, MISS where nothing is hit; of glint.load_mesh, the face's.
+    t: in lengths of the direction, inf on a miss. low, high: bounds of the exact t where certain, else t.
+    normal: geometric, unit, facing the ray; position: the hit point. Both are 0 on a miss.
+    certainty: 0 uncertain, 1 certain by float, 2 certain by double; 0 below precision "certified".
+    """
+    object: np.ndarray
+    t: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    normal: np.ndarray
+    position: np.ndarray
+    certainty: np.ndarray
+
+    @property
+    def hit(self) -> np.ndarray:
+        """Where something is hit."""
+        return self.object != MISS
+
+    @property
+    def certain(self) -> np.ndarray:
+        """Where object, or miss, and the bounds of t are proven."""
+        return self.certainty != 0
+
+
+def _reals(array: Any, columns: int, count: Optional[int], name: str, dtype: Any) -> np.ndarray:
+    """A contiguous array of rows; a single row or number serves all rays."""
+    array = np.asarray(array, dtype)
+    shape = (count, columns) if columns > 1 else (count,)
+    if count is not None:
+        try:
+            array = np.broadcast_to(array, shape)
+        except ValueError:
+            raise ValueError(f"{name}: expected shape {shape}, not {array.shape}") from None
+    elif array.ndim != 2 or array.shape[1] != columns:
+        raise ValueError(f"{name}: expected shape (n, {columns}), not {array.shape}")
+    return np.ascontiguousarray(array)
+
+
+def _pointer(array: Optional[np.ndarray]) -> Optional[int]:
+    return None if array is None else array.ctypes.data
+
+
+def _precision(name: str) -> int:
+    if name not in PRECISIONS:
+        raise ValueError(f"precision: expected one of {', '.join(PRECISIONS)}, not {name!r}")
+    return PRECISIONS[name]
+
+
+class Scene:
+    """A scene, from a dict or text in glint's YAML format; glint.load and glint.load_mesh make others."""
+
+    def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml"):
+        text = description if isinstance(description, str) else json.dumps(description)
+        encoded = text.encode()
+        self._take(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), scene, messages))
+
+    def _take(self, make: Callable[[Any, Any], int]) -> None:
+        self._tracers: dict[tuple[Optional[str], str, int], ctypes.c_void_p] = {}
+        self._lock = threading.Lock()
+        self._handle, messages = ctypes.c_void_p(), ctypes.c_void_p()
+        _check(make(ctypes.byref(self._handle), ctypes.byref(messages)), messages)
+        weakref.finalize(self, _scene_free, self._handle, self._tracers)
+
+    @property
+    def object_count(self) -> int:
+        """Objects, with each triangle of a mesh as one."""
+        return _c.library.glint_scene_object_count(self._handle)
+
+    @property
+    def light_count(self) -> int:
+        return _c.library.glint_scene_light_count(self._handle)
+
+    def render(self, width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5, precision: str = "single",
+               device: Union[None, int, str] = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None) -> np.ndarray:
+        """Returns the image, (height, width, 3), in linear light. The arguments are those of render_layers."""
+        return self.render_layers(("color",), width, height, samples, bounces, precision, device, lanes, progress)["color"]
+
+    def render_layers(self, layers: Sequence[str], width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5,
+                      precision: str = "single", device: Union[None, int, str] = None, lanes: int = 0,
+                      progress: Optional[Callable[[float], Any]] = None) -> dict[str, np.ndarray]:
+        """Renders the layers named, of glint.LAYERS, and returns their arrays, (height, width[, values]).
+
+        width, height: 0: those of the scene's file, else 1280 wide. samples: per pixel. bounces: of a ray, at most.
+        precision: single, strict, double or certified. device: as `glint render --device`. lanes: rays per work-item,
+        0: as suits the device. progress: called with the fraction that is done; Stopped is raised where it returns True.
+        """
+        unknown = set(layers) - set(LAYERS)
+        if unknown:
+            raise ValueError(f"layers: expected some of {', '.join(LAYERS)}, not {', '.join(sorted(unknown))}")
+        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), width, height, samples, bounces, _precision(precision), lanes)
+        if not (width and height):
+            sides = ctypes.c_uint32(), ctypes.c_uint32()
+            _c.library.glint_scene_image_size(self._handle, *map(ctypes.byref, sides))
+            settings.width, settings.height = width, height = sides[0].value, sides[1].value
+        if progress:
+            settings.progress = _c.Progress(lambda _, fraction: 1 if progress(fraction) else 0)
+        arrays = {}
+        for name in {"color", *layers}:
+            values, kind = LAYERS[name]
+            values = values or self.light_count
+            arrays[name] = np.zeros((height, width, values)[:2 + (LAYERS[name][0] != 1)], kind)
+        image = _c.Image(ctypes.sizeof(_c.Image), **{name: _pointer(array) for name, array in arrays.items()})
+        messages = ctypes.c_void_p()
+        status = _c.library.glint_render(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings), ctypes.byref(image),
+                                         ctypes.byref(messages))
+        _check(status, messages)
+        return {name: arrays[name] for name in layers}
+
+    def trace(self, origins: Any, directions: Any, precision: str = "single", tmin: Any = None, tmax: Any = None,
+              device: Union[None, int, str] = None, lanes: int = 0) -> Hits:
+        """Finds the nearest hit of each ray strictly between tmin and tmax, in lengths of the direction.
+
+        origins, directions: (n, 3); directions may have any length but 0. Arrays of float32 are taken as they are, others
+        as float64. At "certified" rays start at their origins. tmin, tmax: one number or n.
+        """
+        is_float = all(getattr(array, "dtype", None) == np.float32 for array in (origins, directions))
+        dtype = np.float32 if is_float else np.float64
+        origins = _reals(origins, 3, None, "origins", dtype)
+        count = len(origins)
+        directions = _reals(directions, 3, count, "directions", dtype)
+        tmin = None if tmin is None else _reals(tmin, 1, count, "tmin", dtype)
+        tmax = None if tmax is None else _reals(tmax, 1, count, "tmax", dtype)
+        rays = _c.Rays(ctypes.sizeof(_c.Rays), count, 0 if is_float else 1, *map(_pointer, (origins, directions, tmin, tmax)))
+        hits = Hits(np.empty(count, np.uint32), *(np.empty(count) for _ in range(3)), np.empty((count, 3)), np.empty((count, 3)),
+                    np.empty(count, np.uint8))
+        found = _c.Hits(ctypes.sizeof(_c.Hits), *map(_pointer, hits))
+        messages = ctypes.c_void_p()
+        tracer = self._tracer(device, precision, lanes)
+        _check(_c.library.glint_trace(tracer, ctypes.byref(rays), ctypes.byref(found), ctypes.byref(messages)), messages)
+        return hits
+
+    def _tracer(self, device: Union[None, int, str], precision: str, lanes: int) -> ctypes.c_void_p:
+        key = None if device is None else str(device), precision, lanes
+        with self._lock:
+            if key not in self._tracers:
+                settings = _c.TraceSettings(ctypes.sizeof(_c.TraceSettings), _precision(precision), lanes)
+                tracer, messages = ctypes.c_void_p(), ctypes.c_void_p()
+                status = _c.library.glint_tracer_open(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings),
+                                                      ctypes.byref(tracer), ctypes.byref(messages))
+                _check(status, messages)
+                self._tracers[key] = tracer
+            return self._tracers[key]
+
+
+def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) -> None:
+    for tracer in tracers.values():
+        _c.library.glint_tracer_close(tracer)
+    _c.library.glint_scene_free(handle)
+
+
+def load(path: Union[str, os.PathLike[str]]) -> Scene:
+    """Reads a scene, mesh or glTF file."""
+    scene = Scene.__new__(Scene)
+    scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), taken, messages))
+    return scene
+
+
+def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
+    """Makes a scene of triangles: vertices (n, 3), faces (m, 3), and normals (n, 3) for smooth shading. A face's index is
+    its object. A camera frames the mesh, and two lights shine on it."""
+    points = _reals(vertices, 3, None, "vertices", np.float32 if getattr(vertices, "dtype", None) == np.float32 else np.float64)
+    directions = None if normals is None else _reals(normals, 3, len(points), "normals", points.dtype)
+    indices = np.asarray(faces)
+    if indices.ndim != 2 or indices.shape[1] != 3 or not np.issubdtype(indices.dtype, np.integer):
+        raise ValueError(f"faces: expected integers of shape (m, 3), not {indices.dtype} of shape {indices.shape}")
+    if len(indices) and indices.min() < 0:
+        raise SceneError("faces: an index is negative")
+    triangles = np.ascontiguousarray(indices, np.uint32)
+    mesh = _c.Mesh(ctypes.sizeof(_c.Mesh), 0 if points.dtype == np.float32 else 1, _pointer(points), _pointer(directions), len(points),
+                   _pointer(triangles), len(triangles))
+    scene = Scene.__new__(Scene)
+    scene._take(lambda taken, messages: _c.library.glint_scene_of_mesh(ctypes.byref(mesh), taken, messages))
+    return scene

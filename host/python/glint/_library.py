@@ -1,0 +1,59 @@
+"""The C interface of libglint (glint.h) by ctypes."""
+import ctypes
+import os
+import pathlib
+from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint32, c_uint64, c_void_p
+
+NAME = "libglint.so.1"
+Progress = ctypes.CFUNCTYPE(c_int, c_void_p, c_double)
+
+
+def structure(name, *fields):
+    return type(name, (ctypes.Structure,), {"_fields_": [("size", c_size_t), *fields]})
+
+
+DeviceInfo = structure("DeviceInfo", ("index", c_uint32), ("compute_units", c_uint32), ("memory_bytes", c_uint64), ("is_gpu", c_int),
+                       ("is_cpu", c_int), ("has_double", c_int), ("is_usable", c_int), ("name", c_char * 128),
+                       ("platform", c_char * 128), ("driver", c_char * 64))
+Mesh = structure("Mesh", ("real", c_int), ("vertices", c_void_p), ("normals", c_void_p), ("vertex_count", c_size_t),
+                 ("triangles", c_void_p), ("triangle_count", c_size_t))
+RenderSettings = structure("RenderSettings", ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32), ("bounces", c_uint32),
+                           ("precision", c_int), ("lanes", c_uint32), ("progress", Progress), ("context", c_void_p))
+Image = structure("Image", *((name, c_void_p) for name in ("color", "t", "normal", "position", "object", "shadow", "doubt")))
+TraceSettings = structure("TraceSettings", ("precision", c_int), ("lanes", c_uint32))
+Rays = structure("Rays", ("count", c_size_t), ("real", c_int), ("origins", c_void_p), ("directions", c_void_p), ("tmin", c_void_p),
+                 ("tmax", c_void_p))
+Hits = structure("Hits", *((name, c_void_p) for name in ("object", "t", "low", "high", "normal", "position", "certainty")))
+
+_MESSAGES = POINTER(c_void_p)
+_FUNCTIONS = {
+    "glint_version": (c_char_p,),
+    "glint_text_free": (None, c_void_p),
+    "glint_devices_list": (c_int, POINTER(DeviceInfo), c_size_t, POINTER(c_size_t), _MESSAGES),
+    "glint_device_open": (c_int, c_char_p, POINTER(c_void_p), _MESSAGES),
+    "glint_device_close": (None, c_void_p),
+    "glint_scene_load": (c_int, c_char_p, POINTER(c_void_p), _MESSAGES),
+    "glint_scene_parse": (c_int, c_char_p, c_size_t, c_char_p, POINTER(c_void_p), _MESSAGES),
+    "glint_scene_of_mesh": (c_int, POINTER(Mesh), POINTER(c_void_p), _MESSAGES),
+    "glint_scene_free": (None, c_void_p),
+    "glint_scene_object_count": (c_size_t, c_void_p),
+    "glint_scene_light_count": (c_size_t, c_void_p),
+    "glint_scene_image_size": (None, c_void_p, POINTER(c_uint32), POINTER(c_uint32)),
+    "glint_render": (c_int, c_void_p, c_void_p, POINTER(RenderSettings), POINTER(Image), _MESSAGES),
+    "glint_tracer_open": (c_int, c_void_p, c_void_p, POINTER(TraceSettings), POINTER(c_void_p), _MESSAGES),
+    "glint_tracer_close": (None, c_void_p),
+    "glint_trace": (c_int, c_void_p, POINTER(Rays), POINTER(Hits), _MESSAGES),
+}
+
+
+def _open():
+    """The library of GLINT_LIBRARY, else that of the wheel, else the system's."""
+    beside = pathlib.Path(__file__).with_name(NAME)
+    opened = ctypes.CDLL(os.environ.get("GLINT_LIBRARY") or (str(beside) if beside.exists() else NAME))
+    for name, (result, *arguments) in _FUNCTIONS.items():
+        function = getattr(opened, name)
+        function.restype, function.argtypes = result, arguments
+    return opened
+
+
+library = _open()

@@ -1,0 +1,79 @@
+"""A drop-in for trimesh.ray: mesh.ray = glint.trimesh.RayMeshIntersector(mesh)."""
+from __future__ import annotations
+
+from typing import Any, Union
+
+import numpy as np
+
+from . import MISS, Hits, load_mesh
+
+
+class RayMeshIntersector:
+    """Ray queries on a trimesh.Trimesh, with the methods of trimesh.ray's classes.
+
+    First and any hits are traced at `precision`; `certified` proves each, and `hits` tells which it cannot. Rays that
+    pass through the mesh are traced in double from hit to hit.
+    """
+
+    def __init__(self, mesh: Any, precision: str = "certified", device: Union[None, int, str] = None):
+        self.mesh = mesh
+        self._precision, self._device = precision, device
+        self._scene = load_mesh(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces))
+
+    def hits(self, origins: Any, directions: Any) -> Hits:
+        """Returns the nearest hits with their bounds and certainty."""
+        return self._scene.trace(np.asarray(origins, np.float64), np.asarray(directions, np.float64), self._precision,
+                                 device=self._device)
+
+    def intersects_first(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
+        """Returns the index of the first triangle that each ray hits, -1 where it hits none."""
+        found = self.hits(ray_origins, ray_directions)
+        return np.where(found.hit, found.object.astype(np.int64), -1)
+
+    def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
+        """Returns whether each ray hits anything."""
+        return self.hits(ray_origins, ray_directions).hit
+
+    def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True) \
+            -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Returns the hit points (n, 3), and of each the index of its ray and of its triangle."""
+        triangles, rays, locations = self.intersects_id(ray_origins, ray_directions, multiple_hits, return_locations=True)
+        return locations, rays, triangles
+
+    def intersects_id(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True, max_hits: int = 20,
+                      return_locations: bool = False) -> tuple[np.ndarray, ...]:
+        """Returns the triangles that rays hit and the indices of these rays, and with `return_locations` the hit points.
+        Hits of a ray are in order. Of triangles that a ray hits at the same t the first counts."""
+        origins, directions = (np.asarray(array, np.float64) for array in (ray_origins, ray_directions))
+        alive, tmin = np.arange(len(origins)), np.zeros(len(origins))
+        triangles, rays, locations = [], [], []
+        for number in range(max_hits if multiple_hits else 1):
+            if multiple_hits:
+                found = self._scene.trace(origins[alive], directions[alive], "double", tmin=tmin[alive], device=self._device)
+            else:
+                found = self.hits(origins, directions)
+            hit = found.hit
+            alive = alive[hit]
+            if not len(alive):
+                break
+            tmin[alive] = found.t[hit]
+            triangles.append(found.object[hit].astype(np.int64))
+            rays.append(alive)
+            locations.append(origins[alive] + found.t[hit][:, None] * directions[alive])
+        ray_of_each = np.concatenate(rays) if rays else np.zeros(0, np.int64)
+        order = np.argsort(ray_of_each, kind="stable")
+        result = [np.concatenate(triangles)[order] if rays else np.zeros(0, np.int64), ray_of_each[order]]
+        if return_locations:
+            result.append(np.concatenate(locations)[order] if rays else np.zeros((0, 3)))
+        return tuple(result)
+
+    def contains_points(self, points: Any) -> np.ndarray:
+        """Returns whether points lie inside the mesh, if it is watertight: rays leave it through an odd number of
+        triangles. Ask for a direction that is not along edges of usual models."""
+        points = np.asarray(points, np.float64)
+        directions = np.broadcast_to([0.4395064455, 0.617598629942, 0.652231566745], points.shape)
+        _, rays = self.intersects_id(points, directions, max_hits=1 << 20)
+        return np.bincount(rays, minlength=len(points)) % 2 == 1
+
+
+__all__ = ["MISS", "RayMeshIntersector"]

@@ -1,0 +1,35 @@
+#!/bin/bash
+# Tests libglint as a C program finds it: installed, with nothing else of the tree. The example builds against the shared and the
+# static library, as C and as C++, and both have the symbols of glint.h alone.
+. "$(dirname "$0")/support.bash"
+case $BUILD in *-sanitize) echo "the example has no sanitizer's runtime"; exit 77 ;; esac
+make=${MAKE:-make}
+
+stage=$scratch/stage
+check "make install-library" $make -s BUILD="$BUILD" PREFIX="$stage" DOCDIR="$stage/doc" install-library
+check "the header declares what symbols lists" diff <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort) \
+    <(grep -o 'glint_[a-z_]*(' "$stage/include/glint.h" | tr -d '(' | sort -u)
+exported() { nm "$@" | sed -n 's/.* T \(.*\)/\1/p' | sed 's/@.*//' | sort; }
+check "the shared library exports these alone" diff <(exported -D --defined-only "$stage/lib/libglint.so") \
+    <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort)
+check "so does the static one" diff <(nm -g --defined-only "$stage/lib/libglint.a" | sed -n 's/.* [A-Z] //p' | sort) \
+    <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort)
+
+# Compiles in the stage, where the tree is out of sight.
+cp scenes/article.yaml "$scratch/scene.yaml"
+cd "$stage/doc/docs"
+export PKG_CONFIG_PATH=$stage/lib/pkgconfig LD_LIBRARY_PATH=$stage/lib
+flags="-Wall -Wextra -Werror"
+check "the example compiles" cc -std=c11 $flags example.c $(pkg-config --cflags --libs glint) -lm -o "$scratch/shared"
+check "it compiles with the static library" cc -std=c11 $flags example.c $(pkg-config --cflags glint) "$stage/lib/libglint.a" \
+    $(pkg-config --libs --static glint | sed 's/-lglint//') -lm -o "$scratch/static"
+check "the header is one of C++" c++ -x c++ -fsyntax-only $flags -include "$stage/include/glint.h" /dev/null
+cd "$scratch"
+for program in shared static; do
+    check "the $program example renders" test "$(./$program scene.yaml $program.ppm 2>/dev/null)" = \
+        "object 1, t from 3.5511868 to 3.55119538, certain"
+done
+check "both images are the same" cmp shared.ppm static.ppm
+check "the image has its size" test "$(head -c 14 shared.ppm)" = "P6 320 180 255"
+check "a wrong scene ends it with the message" grep -q 'nowhere.yaml.*No such file' <(./shared nowhere.yaml image.ppm 2>&1)
+finish

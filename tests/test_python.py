@@ -1,0 +1,210 @@
+#!/usr/bin/env python3
+"""The Python package over libglint: scenes, images, rays with bounds, the drop-in for trimesh, errors and threads."""
+import ctypes
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+import warnings
+from fractions import Fraction
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+BUILD = ROOT / os.environ.get("BUILD", "build")
+if BUILD.name.endswith("-sanitize"):
+    print("skipped: Python does not start with a sanitizer's runtime")
+    sys.exit(77)
+os.environ["GLINT_LIBRARY"] = str(BUILD / "libglint.so.1")
+os.environ.pop("GLINT_DEVICE", None)
+sys.path.insert(0, str(ROOT / "host/python"))
+import numpy as np  # noqa: E402
+
+import glint  # noqa: E402
+import glint.trimesh  # noqa: E402
+
+CUBE_VERTICES = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
+                       [1, 5, 7], [1, 7, 3]])
+SPHERE = {"camera": {"position": [0, 0, -4], "look_at": [0, 0, 0], "fov": 60}, "background": [0.1, 0.2, 0.4],
+          "lights": [{"point": {"position": [3, 4, -5]}}], "objects": [{"sphere": {"center": [0, 0, 0], "radius": 1}}]}
+
+
+class Mesh:
+    """What RayMeshIntersector asks of a trimesh.Trimesh."""
+    vertices, faces = CUBE_VERTICES, CUBE_FACES
+
+
+class Images(unittest.TestCase):
+    def test_layers(self):
+        layers = glint.Scene(SPHERE).render_layers(tuple(glint.LAYERS), 40, 30, precision="certified")
+        self.assertEqual({name: array.shape for name, array in layers.items()},
+                         {"color": (30, 40, 3), "t": (30, 40), "normal": (30, 40, 3), "position": (30, 40, 3), "object": (30, 40),
+                          "shadow": (30, 40, 1), "doubt": (30, 40)})
+        hit = layers["object"] == 0
+        self.assertTrue(0.05 < hit.mean() < 0.3 and np.all(layers["object"][~hit] == glint.MISS))
+        self.assertTrue(np.all(np.isinf(layers["t"][~hit])) and np.allclose(layers["color"][~hit], [0.1, 0.2, 0.4]))
+        # a hit point lies on the sphere, in the direction of its normal, at its distance from the camera
+        position = layers["position"][hit]
+        np.testing.assert_allclose(np.linalg.norm(position, axis=1), 1, atol=1e-6)
+        np.testing.assert_allclose(position, layers["normal"][hit], atol=1e-5)
+        np.testing.assert_allclose(np.linalg.norm(position - [0, 0, -4], axis=1), layers["t"][hit], atol=1e-5)
+
+    def test_equals_the_program(self):
+        """The example of the documents has the program's bits."""
+        scene = glint.load(ROOT / "scenes/article.yaml")
+        image = scene.render(64, 36, samples=2, bounces=3, precision="strict")
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([BUILD / "glint", "render", ROOT / "scenes/article.yaml", "--size", "64x36", "--samples", "2", "--bounces", "3",
+                            "--precision", "strict", "-o", f"{folder}/image.npy", "--quiet"], check=True)
+            np.testing.assert_array_equal(image, np.load(f"{folder}/image.npy"))
+
+    def test_sizes_and_meshes(self):
+        self.assertEqual(glint.load_mesh(CUBE_VERTICES, CUBE_FACES).render(16, 9).shape, (9, 16, 3))
+        scene = glint.Scene(SPHERE)
+        seen = []
+        self.assertEqual(scene.render(progress=seen.append).shape, (720, 1280, 3))
+        self.assertTrue(seen == sorted(seen) and seen[-1] == 1)
+        with self.assertRaises(glint.Stopped):
+            scene.render(1280, 720, progress=lambda fraction: True)
+
+    def test_smooth(self):
+        flat, smooth = (glint.load_mesh(CUBE_VERTICES, CUBE_FACES, normals).render_layers(["normal"], 48, 36)["normal"]
+                        for normals in (None, CUBE_VERTICES - 0.5))
+        self.assertGreater(len(np.unique(smooth.reshape(-1, 3).round(6), axis=0)), 10 * len(np.unique(flat.reshape(-1, 3).round(6), axis=0)))
+
+
+class Rays(unittest.TestCase):
+    def test_hits(self):
+        scene = glint.Scene(SPHERE)
+        for dtype in np.float32, np.float64:
+            for precision in glint.PRECISIONS:
+                hits = scene.trace(np.array([[0, 0, -4], [0, 5, -4], [0, 0, 0]], dtype), np.array([[0, 0, 2], [0, 0, 1], [0, 3, 0]], dtype),
+                                   precision)
+                self.assertEqual(hits.object.tolist(), [0, glint.MISS, 0])
+                np.testing.assert_allclose(hits.t, [1.5, np.inf, 1 / 3], rtol=1e-6)
+                np.testing.assert_allclose(hits.normal, [[0, 0, -1], [0, 0, 0], [0, -1, 0]], atol=1e-6)
+                np.testing.assert_allclose(hits.position, [[0, 0, -1], [0, 0, 0], [0, 1, 0]], atol=1e-6)
+                self.assertEqual(hits.certain.all(), precision == "certified")
+                self.assertTrue(np.all((hits.low <= hits.t) & (hits.t <= hits.high)))
+        hits = scene.trace([[0, 0, -4]] * 3, [0, 0, 1], "double", tmin=[0, 3, 3.5], tmax=[2.5, np.inf, np.inf])
+        np.testing.assert_allclose(hits.t, [np.inf, 5, 5])
+
+    def test_bounds_hold(self):
+        """Nothing that is certain differs from exact rational arithmetic on the rays' doubles: a cube's faces at 0 and 1, in
+        which many rays meet edges and diagonals."""
+        random = np.random.default_rng(5)
+        count = 2000
+        targets = random.integers(0, 5, (count, 3)) / 4
+        origins = random.normal(size=(count, 3)) * 3
+        directions = targets - origins
+        hits = glint.load_mesh(CUBE_VERTICES, CUBE_FACES).trace(origins, directions, "certified")
+        certain = 0
+        for origin, direction, t, low, high, is_certain in zip(origins, directions, hits.t, hits.low, hits.high, hits.certain):
+            origin, direction = [Fraction(x) for x in origin], [Fraction(x) for x in direction]
+            exact = []
+            for axis in range(3):
+                for face in (0, 1):
+                    at = (face - origin[axis]) / direction[axis]
+                    point = [o + at * d for o, d in zip(origin, direction)]
+                    if at > 0 and all(0 <= x <= 1 for k, x in enumerate(point) if k != axis):
+                        exact.append(at)
+            if is_certain:
+                certain += 1
+                self.assertEqual(np.isfinite(t), bool(exact), (origin, direction))
+                if exact:
+                    self.assertTrue(Fraction(low) <= min(exact) <= Fraction(high), (origin, direction))
+        self.assertTrue(count / 10 < certain < count, "some rays are open, many are not")
+
+    def test_threads(self):
+        """One scene, device and tracer serve several threads."""
+        scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
+        random = np.random.default_rng(1)
+        origins, directions = random.normal(size=(20000, 3)) * 3, random.normal(size=(20000, 3))
+        expected, found = scene.trace(origins, directions).object, [None] * 4
+
+        def work(i):
+            found[i] = scene.trace(origins, directions).object if i % 2 else scene.render(64, 48)
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for i in 1, 3:
+            np.testing.assert_array_equal(found[i], expected)
+        np.testing.assert_array_equal(found[0], found[2])
+
+
+class Trimesh(unittest.TestCase):
+    def test_queries(self):
+        intersector = glint.trimesh.RayMeshIntersector(Mesh)
+        origins, directions = np.array([[0.25, 0.5, -1], [0.25, 0.5, 2], [3, 3, 3], [0.3, 0.6, 0.5]]), np.array([[0, 0, 2], [0, 0, 1], [1, 0, 0], [0, 0, -1]])
+        self.assertEqual(intersector.intersects_any(origins, directions).tolist(), [True, False, False, True])
+        first = intersector.intersects_first(origins, directions)
+        self.assertEqual((first >= 0).tolist(), [True, False, False, True])
+        locations, rays, triangles = intersector.intersects_location(origins, directions)
+        self.assertEqual(rays.tolist(), [0, 0, 3])
+        np.testing.assert_allclose(locations, [[0.25, 0.5, 0], [0.25, 0.5, 1], [0.3, 0.6, 0]], atol=1e-12)
+        self.assertEqual(triangles[[0, 2]].tolist(), first[[0, 3]].tolist())
+        triangles, rays = intersector.intersects_id(origins, directions, multiple_hits=False)
+        self.assertEqual((rays.tolist(), triangles.tolist()), ([0, 3], first[[0, 3]].tolist()))
+        self.assertEqual([len(array) for array in intersector.intersects_id(origins[2:3], directions[2:3], return_locations=True)], [0, 0, 0])
+
+    def test_contains(self):
+        points = np.random.default_rng(2).uniform(-0.5, 1.5, (500, 3))
+        inside = glint.trimesh.RayMeshIntersector(Mesh).contains_points(points)
+        self.assertEqual(inside.tolist(), np.all((points > 0) & (points < 1), axis=1).tolist())
+
+
+class Errors(unittest.TestCase):
+    def test_messages(self):
+        for make, words in (
+                (lambda: glint.Scene({"objects": []}), "lacks 'camera'"), (lambda: glint.Scene("objects: ["), "scene.yaml:1"),
+                (lambda: glint.load("missing.yaml"), "missing.yaml.*No such file"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES + 1), "no vertex 8 of 8"),
+                (lambda: glint.load_mesh(CUBE_VERTICES * np.nan, CUBE_FACES), "vertex 0"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES[:0]), "1 to"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, -CUBE_FACES), "negative"),
+                (lambda: glint.Scene(SPHERE).render(8, 6, device="toaster"), "toaster"),
+                (lambda: glint.Scene(SPHERE).render(8, 6, lanes=3), "lanes"),
+                (lambda: glint.Scene(SPHERE).render(1 << 21, 6), "pixels per side"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 0]]), "ray 0"),
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], "certified", tmin=1), "tmin 0")):
+            with self.assertRaisesRegex(glint.SceneError, words):
+                make()
+        for make in (lambda: glint.Scene(SPHERE).trace([0, 0, 0], [0, 0, 1]), lambda: glint.load_mesh(CUBE_VERTICES, [[0.5] * 3]),
+                     lambda: glint.Scene(SPHERE).render(8, 6, precision="fast"), lambda: glint.Scene(SPHERE).render_layers(["depth"])):
+            with self.assertRaises(ValueError):
+                make()
+
+    def test_warnings(self):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            glint.Scene({**SPHERE, "lights": []})
+        self.assertEqual([(w.category, "no lights" in str(w.message)) for w in caught], [(glint.GlintWarning, True)])
+
+    def test_later_structs(self):
+        """A caller of a later version may set only what this one knows."""
+        library = glint._c.library
+
+        class Later(glint._c.TraceSettings):
+            _fields_ = [("later", ctypes.c_uint64)]
+        scene, device = glint.Scene(SPHERE), glint._OpenDevice.get(None)
+        for value, status in (0, 0), (1, 1):
+            tracer, messages = ctypes.c_void_p(), ctypes.c_void_p()
+            settings = Later(ctypes.sizeof(Later), 0, 0, value)
+            self.assertEqual(library.glint_tracer_open(device.handle, scene._handle, ctypes.cast(ctypes.byref(settings), ctypes.POINTER(glint._c.TraceSettings)),
+                                                       ctypes.byref(tracer), ctypes.byref(messages)), status)
+            self.assertEqual(bool(messages), status == 1)
+            library.glint_text_free(messages)
+            library.glint_tracer_close(tracer)
+
+    def test_devices(self):
+        devices = glint.devices()
+        self.assertTrue(devices and all(device.index == i and device.name for i, device in enumerate(devices)))
+        self.assertRegex(glint.version(), r"^\d+\.\d+\.\d+")
+
+
+if __name__ == "__main__":
+    unittest.main()
