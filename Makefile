@@ -227,7 +227,7 @@ bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_py
 	$(if $(RUNGS),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS))
 	$(if $(SPD),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(spd_options) \
 	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
-	tools/report README.md docs/performance.md
+	tools/report docs/performance.md
 
 # How times grow with the number of triangles and of spheres, up to ten million: half an hour, 10 GB of memory and of disk.
 bench-growth: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)

@@ -1,5 +1,5 @@
 #!/bin/bash
-# The keys of the window are those of docs/view.md. The options of each command are the same in its --help and in the manual pages, which
+# The keys of the window are those of docs/guide.md. The options of each command are the same in its --help and in the manual pages, which
 # tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -29,7 +29,7 @@ for page in "$pages"/*; do diff "docs/${page##*/}" "$page" || failed=1; done
 
 # What mouse and keys do in the window.
 keys=$("$GLINT" view --help | sed -n '3,/^$/s/^  \(.*[^ ]\)   *\([^ ].*\)$/| \1 | \2 |/p' | sed 's/ * |/ |/')
-diff <(echo "$keys") <(sed -n '/^<!-- keys/,/^<!-- end/{/^| [^|]/p}' docs/view.md) || failed=1
+diff <(echo "$keys") <(sed -n '/^<!-- keys/,/^<!-- end/{/^| [^|]/p}' docs/guide.md) || failed=1
 
 listed=$("$GLINT" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p' | xargs)
 if [ "$listed" != "$subcommands" ]; then

@@ -5,7 +5,7 @@
 
 command -v python3 >/dev/null || skip_all "there is no python3"
 
-documents=(README.md docs/accuracy.md docs/numerics.md docs/performance.md docs/verify.md)
+documents=(docs/accuracy.md docs/numerics.md docs/performance.md docs/verify.md)
 cp -r --parents docs/measurements "${documents[@]}" "$scratch"
 for document in "${documents[@]}"; do
     tools/report "$scratch/$document" 2>"$scratch/messages"

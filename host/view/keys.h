@@ -1,4 +1,4 @@
-// What mouse and keys do, for glint view --help, the window's help and docs/view.md.
+// What mouse and keys do, for glint view --help, the window's help and docs/guide.md.
 #pragma once
 
 // KEY(input, effect)
