@@ -233,7 +233,6 @@ bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_py
 bench-growth: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
 	$(peers_python) tools/peers/growth --glint $(BUILD)/glint $(if $(has_embree),--embree $(BUILD)/peers/embree) \
 	    --scenes $(PEERS_SCENES) --rounds $(ROUNDS)
-	tools/report docs/performance.md
 
 # With PyYAML: Debian's, if it is there.
 $(peers_python):
@@ -274,19 +273,16 @@ lint-man:
 
 # The measured parts of the documents; the machine should have nothing else to do.
 accuracy_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)
-bench_scenes    := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass bunny demo)
-measured        := accuracy bench bench-lanes verify
+measured        := accuracy bench-lanes verify
 
 docs-measurements: $(BUILD)/glint
 	$(BUILD)/glint accuracy $(accuracy_scenes) --size 960x540 --seconds 40 --json > $(BUILD)/accuracy.json
-	$(BUILD)/glint bench $(bench_scenes) --size 1920x1080 --seconds 40 --precision single,strict,double \
-	    --json > $(BUILD)/bench.json
 	$(BUILD)/glint bench scenes/spheres16.yaml --size 1920x1080 --seconds 10 --lanes 1,16 \
-	    --precision single,strict,double --json > $(BUILD)/bench-lanes.json
+	    --precision single --json > $(BUILD)/bench-lanes.json
 	$(BUILD)/glint verify --json > $(BUILD)/verify.json
 	mkdir -p docs/measurements
 	cp $(measured:%=$(BUILD)/%.json) docs/measurements
-	tools/report docs/accuracy.md docs/performance.md docs/verify.md
+	tools/report docs/accuracy.md docs/verify.md
 
 # Where make install puts files, below DESTDIR. Debian needs ZSHDIR=/usr/share/zsh/vendor-completions.
 PREFIX  ?= /usr/local
@@ -303,7 +299,7 @@ FISHDIR ?= $(DATADIR)/fish/vendor_completions.d
 man_pages := $(wildcard docs/glint*.[15])
 # Lists source:target for each file that belongs to the programs $1.
 installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(program).1) \
-    docs/glint-scene.5:$(MANDIR)/man5/glint-scene.5 \
+    $(foreach page,scene json,docs/glint-$(page).5:$(MANDIR)/man5/glint-$(page).5) \
     tools/completions/glint.bash:$(BASHDIR)/glint \
     tools/completions/glint.zsh:$(ZSHDIR)/_glint \
     tools/completions/glint.fish:$(FISHDIR)/glint.fish \

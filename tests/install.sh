@@ -17,7 +17,7 @@ check "metainfo has $version" grep -q "<release version=\"$version\" " tools/des
 stage=$scratch/stage
 at_stage() { $make -s BUILD="$build" DESTDIR="$stage" PREFIX=/p BINDIR=/b MANDIR=/m DOCDIR=/d ZSHDIR=/z "$1"; }
 check "make install" at_stage install
-for file in b/glint m/man1/glint.1 m/man5/glint-scene.5 d/README.md d/docs/json.md z/_glint p/share/bash-completion/completions/glint \
+for file in b/glint m/man1/glint.1 m/man5/glint-scene.5 m/man5/glint-json.5 d/README.md d/docs/guide.md z/_glint p/share/bash-completion/completions/glint \
     p/share/fish/vendor_completions.d/glint.fish p/share/glint/scenes/meshes/bunny.obj; do
     check "$file is installed" test -s "$stage/$file"
 done

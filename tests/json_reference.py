@@ -1,4 +1,4 @@
-"""docs/json.md, made of what the commands print and of the meanings below.
+"""docs/glint-json.5, made of what the commands print and of the meanings below.
 
 A meaning belongs to a member's path, or to the end of it; the longest that fits counts. "type; words", where the words may
 be missing. Types: text, hash, boolean, count (an integer, 0 or more), integer, number, object, figure, or several.
@@ -6,38 +6,72 @@ be missing. Types: text, hash, boolean, count (an integer, 0 or more), integer, 
 import re
 
 INTRODUCTION = """\
-# JSON
-
-What the commands print with `--json`, and `glint render` with `--timing=json`: one object. `tests/test_json.py --write` writes this
-page from the commands' output.
-
-- `schema` is the version of a command's members. It is raised when a member changes its name or meaning or goes, not when one is added.
-- `a[]` is an element of the array `a`; `a.{b,c}` stands for `a.b` and `a.c`.
-- A *count* is an integer, 0 or more, a *hash* a text of 16 hexadecimal digits. `_ms` are milliseconds, `_bytes` bytes, `_mhz` megahertz.
-  Numbers that are not finite are `null`, such as the PSNR of equal images.
-- A *figure* may be unavailable: an object with `status` `"unavailable"` and `reason` stands in its place.
-- A member is always there unless its row says when. In every report `glint` is the program's version, and `device` has the name,
-  platform, driver, passports and other members of `glint devices`. `doubt` and `clock_doubt` appear where the device's clock is not
-  trusted, and say why.
+.\\" Written by tests/test_json.py --write.
+.TH GLINT\\-JSON 5 "" "glint" "File Formats"
+.ad l
+.SH NAME
+glint\\-json \\- reports of glint as JSON
+.SH DESCRIPTION
+Each command of glint prints one JSON object with
+.BR \\-\\-json ,
+and
+.B glint render
+with
+.BR \\-\\-timing=json .
+.PP
+The member
+.B schema
+is the version of a command's members. It rises when a member is renamed, removed or changes its meaning, not when one is added.
+.PP
+Below,
+.B a[]
+is an element of the array
+.BR a ,
+and
+.B a.{b,c}
+stands for
+.BR a.b " and " a.c .
+A count is an integer, 0 or more, and a hash a text of 16 hexadecimal digits.
+Names end in the unit: _ms for milliseconds, _bytes, _mhz.
+A number that is not finite is null, such as the PSNR of equal images.
+A figure may be unavailable; an object with the members
+.BR status ,
+which is "unavailable", and
+.B reason
+then replaces it.
+.PP
+A member is always present unless its entry states when.
+In every report
+.B glint
+is the program's version, and
+.B device
+has the name, platform, driver, passports and other members of
+.BR "glint devices" .
+.BR doubt " and " clock_doubt
+appear where the device's clock is not trusted, and state the reason.
+"""
+TAIL = """\
+.SH SEE ALSO
+.BR glint (1),
+docs/accuracy.md for the figures of glint accuracy, render \\-\\-max\\-error and certify, docs/verify.md for the cases, docs/numerics.md for passports
 """
 NOTES = {
-    "glint render --timing=json": "`glint-mpi render` adds `by_rank[]`, with each further rank's `host`, `name`, `driver`, `lanes`, "
-                                  "`share`, `bands`, `busy_ms` and `idle_ms`.",
+    "glint render --timing=json": "glint-mpi render adds `by_rank[]`, with the members `host`, `name`, `driver`, `lanes`, `share`, `bands`, "
+                                  "`busy_ms` and `idle_ms` for each rank but the first.",
     "glint check": "",
-    "glint devices": "`passports[]` has those that are known, in other reports those that were needed; `refused[]` has each `precision` "
-                     "that a passport refuses, and the `reason`. Both may be empty.",
-    "glint diff": "Not printed if the images cannot be compared (exit status 1).",
+    "glint devices": "`passports[]` has the passports that are known, in other reports those that were needed. `refused[]` has each "
+                     "`precision` that a passport refuses, and the `reason`. Both may be empty.",
+    "glint diff": "Nothing is printed if the images cannot be compared (exit status 1).",
     "glint bench": "A row that cannot be measured has only the members up to `size`, `status` and `reason`.",
-    "glint bench --against": "What is not listed is as in `glint bench`; `frame_ms` and `frame_samples_ms` are this program's.",
-    "glint accuracy": "[accuracy.md](accuracy.md) defines the figures. A row has `frame_ms`, `kernel_ms`, `clock`, `rays` and "
-                      "`mrays_per_s` of `glint bench`; a reference's ends with `saved`, an unavailable one with `reason`. The "
-                      "HTML report embeds the same object.",
-    "glint certify": "[accuracy.md](accuracy.md#the-exact-image) says what is compared. A precision that does not fit the device "
-                     "or scene has only `precision`, `status` and `reason`; one that `--precision` names is an error.",
-    "glint verify": "[verify.md](verify.md) lists the cases. One in which the driver crashed has `crash`, a text that names the call and the "
-                    "kernel, and only `name`, `title`, `passed` and `seconds` otherwise.",
+    "glint bench --against": "Members that are not listed are those of glint bench; `frame_ms` and `frame_samples_ms` are this program's.",
+    "glint accuracy": "A row has `frame_ms`, `kernel_ms`, `clock`, `rays` and `mrays_per_s` of glint bench. A reference's row ends with `saved`, "
+                      "an unavailable one with `reason`. The HTML report embeds the same object.",
+    "glint certify": "A precision that the device or scene does not support has only `precision`, `status` and `reason`; one that "
+                     "--precision names is an error.",
+    "glint verify": "A case in which the driver crashed has `crash`, a text that names the call and the kernel, and only `name`, `title`, "
+                    "`passed` and `seconds` otherwise.",
 }
-# A path that begins so has no row, since the introduction, a note or a row names the section that has it.
+# A path that begins so has no row, because the introduction, a note or a row names the section that has it.
 ELSEWHERE = {
     "glint render --timing=json": ("glint", "by_device[].passports"),
     "glint check": (),
@@ -58,7 +92,7 @@ MEANINGS = {
     "device": "object",
     "device.{name,platform,platform_version,driver,type}": "text",
     "device.{units,clock_mhz}": "count",
-    "passports[]": "object; what the arithmetic does at a precision, once that is measured: [numerics.md](numerics.md#passports)",
+    "passports[]": "object; what the arithmetic does at a precision, once that is measured",
     "passports[].precision": "text; `single` (also of the first pass of `certified`), `strict` or `double`",
     "passports[].lanes": "integer; of the vectors",
     "passports[].thorough": "boolean; false: a sample of mantissas was divided",
@@ -80,7 +114,7 @@ MEANINGS = {
     "size": "integer; width, height",
     "samples": "integer; per pixel",
     "precision": "text; `single`, `strict`, `double` or `certified`",
-    "{repeated,undecided}_samples": "count; at `certified`: rendered in double, and still in doubt",
+    "{repeated,undecided}_samples": "count; at `certified`: re-rendered in double, and undecided",
     "lanes": "integer; 1, 4, 8 or 16",
     "bvh": "text; `auto`, `on` or `off`",
     "kernel_hash": "hash; of the kernel's text",
@@ -106,7 +140,7 @@ MEANINGS = {
     "precisions[].undecided.examined": "count; of these",
     "precisions[].undecided.witnessed": "count; errors of 2^-50 change their answer",
     "precisions[].undecided.close": "count; not so, but within 2^-49 of the distance of another answer",
-    "pilot": "object; only with `--max-error`, by [these rules](accuracy.md#an-error-budget)",
+    "pilot": "object; only with `--max-error`",
     "pilot.limit": "number; the budget",
     "pilot.metric": "text; `rmse`, `max` or `flip`",
     "pilot.confidence": "number; that all bounds hold",
@@ -380,15 +414,27 @@ def merged(rows):
     return kept
 
 
+def roff(text):
+    """As roff prints it; `words` are bold."""
+    text = re.sub("[^\0-~]", lambda character: f"\\[u{ord(character[0]):04X}]", text.replace("\\", r"\e").replace("-", r"\-"))
+    return re.sub("`([^`]*)`", r"\\fB\1\\fR", text)
+
+
+def breakable(path):
+    """A line may end after a comma or a point."""
+    return re.sub(r"([,.])(?=.)", r"\1\:", path)
+
+
 def section(heading, schema, paths):
-    """The table of a command's members, in the order printed."""
+    """The entries of a command's members, in the order printed."""
     rows = []
     for path in paths:
         rule, kind, words = meaning_of(path)
         if rule == "schema":
             words = str(schema)
-        if not path.startswith(ELSEWHERE[heading]) and (kind, words) != ("object", ""):  # whose members say it
+        if not path.startswith(ELSEWHERE[heading]) and (kind, words) != ("object", ""):  # which its members describe
             rows.append(([[part] for part in path.split(".")], kind, words.removesuffix("; ")))
-    note = NOTES[heading] + "\n\n" if NOTES[heading] else ""
-    table = "".join(f"| `{'.'.join(map(braced, parts))}` | {kind} | {words} |\n" for parts, kind, words in merged(rows))
-    return f"## {heading}\n\n{note}| member | type | meaning |\n|---|---|---|\n{table}"
+    note = f"\\&{roff(NOTES[heading])}\n" if NOTES[heading] else ""
+    entries = "".join(f".TP\n\\fB{breakable(roff('.'.join(map(braced, parts))))}\\fR\n\\fI{kind}\\fR{'; ' if words else ''}{roff(words)}\n"
+                      for parts, kind, words in merged(rows))
+    return f".SH {roff(heading)}\n{note}{entries}"

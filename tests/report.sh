@@ -16,14 +16,14 @@ for document in "${documents[@]}"; do
     done
 done
 
-check "docs/scaling.md says what is simulated" tools/scaling --check --ranks 1,10,100
+check "docs/performance.md shows what is simulated" tools/scaling --check --ranks 10,100
 
 # Changed figures are written, as they would be by a new measurement.
 sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/docs/measurements/accuracy.json"
 check "a new measurement" tools/report "$scratch/docs/accuracy.md"
 check "its times are in the document" grep -q '| 12346 (' "$scratch/docs/accuracy.md"
 
-printf '%s\n' before '<!-- measured: bench none.json -->' within '<!-- end of measured -->' after >"$scratch/absent.md"
+printf '%s\n' before '<!-- measured: verify none.json -->' within '<!-- end of measured -->' after >"$scratch/absent.md"
 cp "$scratch/absent.md" "$scratch/before.md"
 check "a report that is not there" tools/report "$scratch/absent.md"
 check "the part of a report that is not there" cmp "$scratch/absent.md" "$scratch/before.md"

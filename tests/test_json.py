@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""docs/json.md is what tests/json_reference.py makes of each command's JSON, whose members are of the types it says.
+"""docs/glint-json.5 is what tests/json_reference.py makes of each command's JSON, whose members are of the types that it states.
 
 --write writes the page.
 
@@ -28,7 +28,7 @@ SMALL = "--size 48x32"
 QUICK = "--seconds 0.1"
 
 
-PAGE = ROOT / "docs/json.md"
+PAGE = ROOT / "docs/glint-json.5"
 SECTIONS = {}
 
 
@@ -51,7 +51,7 @@ def members_of(value, path=""):
 
 
 def is_of_type(value, words):
-    """Whether a value is of the type in the second column."""
+    """Whether a value is of the type."""
     if value is None:
         return "null" in words
     if isinstance(value, dict):
@@ -176,7 +176,7 @@ class Json(TestCase):
 
 
 def write_page():
-    PAGE.write_text("\n".join([json_reference.INTRODUCTION, *(SECTIONS[heading] for heading in json_reference.NOTES)]))
+    PAGE.write_text("".join([json_reference.INTRODUCTION, *(SECTIONS[heading] for heading in json_reference.NOTES), json_reference.TAIL]))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ typedef struct {
 } AccuracyReport;
 
 void accuracy_print_text(const AccuracyReport *report, FILE *stream);
-Json *accuracy_json(const AccuracyReport *report); // docs/json.md; to be printed
+Json *accuracy_json(const AccuracyReport *report); // docs/glint-json.5; to be printed
 
 // Path prefix of the saved arrays of a scene's variant, or of its reference if `variant` is NULL:
 // FOLDER/0-scene-single-16-auto-1, for example.

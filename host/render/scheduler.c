@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Of bands that wait, unless the settings say otherwise: a band of each worker, as a rule (docs/scaling.md).
+// The most bytes of waiting bands by default: usually a band of each worker (docs/performance.md).
 static const size_t WAITING_BYTES_MIN = 64 << 20, WAITING_BYTES_OF_WORKER = 16 << 20;
 
 typedef struct {
