@@ -227,7 +227,7 @@ bench-peers: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_py
 	$(if $(RUNGS),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(PEERS_OPTIONS) --json $(PEERS_JSON) $(RUNGS))
 	$(if $(SPD),$(peers_bench) --scenes $(PEERS_SCENES) --rounds $(ROUNDS) $(spd_options) \
 	    --json docs/measurements/peers-spd.json $(wildcard $(SPD)/*.nff))
-	tools/report docs/performance.md
+	tools/report docs/measurements/README.md
 
 # How times grow with the number of triangles and of spheres, up to ten million: half an hour, 10 GB of memory and of disk.
 bench-growth: $(BUILD)/glint $(if $(has_embree),$(BUILD)/peers/embree) $(peers_python)
@@ -282,7 +282,7 @@ docs-measurements: $(BUILD)/glint
 	$(BUILD)/glint verify --json > $(BUILD)/verify.json
 	mkdir -p docs/measurements
 	cp $(measured:%=$(BUILD)/%.json) docs/measurements
-	tools/report docs/accuracy.md docs/verify.md
+	tools/report docs/measurements/README.md
 
 # Where make install puts files, below DESTDIR. Debian needs ZSHDIR=/usr/share/zsh/vendor-completions.
 PREFIX  ?= /usr/local
@@ -304,7 +304,7 @@ installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(progra
     tools/completions/glint.zsh:$(ZSHDIR)/_glint \
     tools/completions/glint.fish:$(FISHDIR)/glint.fish \
     $(foreach file,$(wildcard scenes/*.* scenes/*/*),$(file):$(DATADIR)/glint/$(file)) \
-    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE $(wildcard docs/*.md docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
+    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE docs/measurements/README.md $(wildcard docs/*.md docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
     $(if $(filter glint-view,$1),$(BUILD)/glint-view.desktop:$(DATADIR)/applications/glint-view.desktop \
         tools/desktop/glint-view.svg:$(DATADIR)/icons/hicolor/scalable/apps/glint-view.svg \
         tools/desktop/glint-view.metainfo.xml:$(DATADIR)/metainfo/alt.glint.glint_view.metainfo.xml)
@@ -344,7 +344,7 @@ wheel: $(shared_library)
 uninstall: every := glint glint-view glint-mpi
 uninstall:
 	rm -f $(every:%=$(DESTDIR)$(BINDIR)/%) $(foreach pair,$(call installed_files,$(every)),$(DESTDIR)$(lastword $(subst :, ,$(pair))))
-	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) $(addprefix $(DESTDIR)$(DOCDIR),/docs /); do \
+	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) $(addprefix $(DESTDIR)$(DOCDIR),/docs/measurements /docs /); do \
 	    [ ! -d $$folder ] || rmdir --ignore-fail-on-non-empty $$folder || exit; \
 	done
 

@@ -5,7 +5,7 @@
 
 command -v python3 >/dev/null || skip_all "there is no python3"
 
-documents=(docs/accuracy.md docs/numerics.md docs/performance.md docs/verify.md)
+documents=(docs/measurements/README.md)
 cp -r --parents docs/measurements "${documents[@]}" "$scratch"
 for document in "${documents[@]}"; do
     tools/report "$scratch/$document" 2>"$scratch/messages"
@@ -20,8 +20,8 @@ check "docs/performance.md shows what is simulated" tools/scaling --check --rank
 
 # Changed figures are written, as they would be by a new measurement.
 sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/docs/measurements/accuracy.json"
-check "a new measurement" tools/report "$scratch/docs/accuracy.md"
-check "its times are in the document" grep -q '| 12346 (' "$scratch/docs/accuracy.md"
+check "a new measurement" tools/report "$scratch/docs/measurements/README.md"
+check "its times are in the document" grep -q '| 12346 (' "$scratch/docs/measurements/README.md"
 
 printf '%s\n' before '<!-- measured: verify none.json -->' within '<!-- end of measured -->' after >"$scratch/absent.md"
 cp "$scratch/absent.md" "$scratch/before.md"
