@@ -1,5 +1,5 @@
 #!/bin/bash
-# The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/chaos.md). At length:
+# The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/design.md). At length:
 # GLINT_LONG_TESTS=1, tools/chaos --long. A sanitized build has allocators and handlers of its own.
 set -euo pipefail
 cd "$(dirname "$0")/.."

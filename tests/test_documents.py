@@ -187,6 +187,12 @@ def perturbed_others():
     return [failure["name"] for run in runs for failure in run["failures"] if failure["name"] != "R7"]
 
 
+def scaling_cell(image, ranks):
+    """Of the table that tools/scaling --check tests, what is built."""
+    row = next(line for line in read(ROOT / "docs/measurements/README.md").splitlines() if line.startswith(f"| {image} | {ranks} |"))
+    return float(row.split("|")[3])
+
+
 def growth(program, triangles):
     (row,) = (row for row in measured("growth")["rows"] if (row["kind"], row["program"], row["count"]) == ("bunny", program, triangles))
     return row["build_ms"], row["frame_ms"]
@@ -207,7 +213,6 @@ CLAIMS = [  # N stands for a number
     ("README.md", "None of N pixels compared in N scenes",
      lambda: (certified_compared("certified")[1], len(measured("certified")["rows"]))),
     ("README.md", "`glint verify` checks N cases", lambda: (verify_counts(),)),
-    ("docs/verify.md", "Every precision passes all N.", lambda: (verify_counts(),)),
     ("README.md", "glint passes N of the N that other programs can also run, POV-Ray N of N, Tachyon N of N, Embree N of N",
      lambda: (*glint_peer_cases(), *peer_cases("POV-Ray")[:2], *peer_cases("Tachyon")[:2], *peer_cases("Embree")[:2])),
     ("CHANGELOG.md", "a million spheres take N ms at 1920x1080 on two CPU cores, a million triangles N ms",
@@ -222,17 +227,17 @@ CLAIMS = [  # N stands for a number
     ("docs/accuracy.md", "In trials of N scenes and N budgets every image keeps its budget. The N pilots took N s in the median.", budget_pilots),
     ("docs/accuracy.md", "Where `double` takes more than 0.35 s, N of N trials found a faster precision and took N of the time of `double` in the "
                          "median; the other N took N of it.", lambda: budget_long(0.35)),
-    ("docs/verify.md", r"Intel's CPU runtime, 2026-11-22 \| N of that day \| N pass, with PoCL's bits at `strict`",
+    ("docs/measurements/README.md", r"Intel's CPU runtime, 2026-11-22 \| N of that day \| N pass, with PoCL's bits at `strict`",
      lambda: (passed_elsewhere("verify-intel", "intel")[0],) * 2),
-    ("docs/verify.md", r"2026-11-22 \| N of that day \| N pass, with PoCL's bits at `strict`; M6 takes N to N minutes",
+    ("docs/measurements/README.md", r"2026-11-22 \| N of that day \| N pass, with PoCL's bits at `strict`; M6 takes N to N minutes",
      lambda: (*(passed_elsewhere("verify-rusticl", "rusticl")[0],) * 2, min(rusticl_m6_minutes()), max(rusticl_m6_minutes()))),
-    ("docs/verify.md", "except that R7 reaches N instead of 1e-5", lambda: (max(case["worst"] for case in perturbed("single", "R7")),)),
-    ("docs/verify.md", r"\| glint, each precision \| N of N \|", glint_peer_cases),
-    ("docs/verify.md", r"\| Embree \| N of N \| C3, C4, C7: .*?; M1: N of N rays leak .*?; C6, P3, S6: one ray each",
+    ("docs/measurements/README.md", "except that R7 reaches N instead of 1e-5", lambda: (max(case["worst"] for case in perturbed("single", "R7")),)),
+    ("docs/measurements/README.md", r"\| glint, each precision \| N of N \|", glint_peer_cases),
+    ("docs/measurements/README.md", r"\| Embree \| N of N \| C3, C4, C7: .*?; M1: N of N rays leak .*?; C6, P3, S6: one ray each",
      lambda: (*peer_cases("Embree")[:2], *leaks("Embree", "M1"))),
-    ("docs/verify.md", r"\| Embree, not robust \| N of N \|", lambda: peer_cases("Embree without its robust flag")[:2]),
-    ("docs/verify.md", r"\| POV-Ray \| N of N \|", lambda: peer_cases("POV-Ray")[:2]),
-    ("docs/verify.md", r"\| Tachyon \| N of N \|", lambda: peer_cases("Tachyon")[:2]),
+    ("docs/measurements/README.md", r"\| Embree, not robust \| N of N \|", lambda: peer_cases("Embree without its robust flag")[:2]),
+    ("docs/measurements/README.md", r"\| POV-Ray \| N of N \|", lambda: peer_cases("POV-Ray")[:2]),
+    ("docs/measurements/README.md", r"\| Tachyon \| N of N \|", lambda: peer_cases("Tachyon")[:2]),
     ("docs/performance.md", "Embree's packets take N times glint's time on a mesh of 20,000 triangles and N times on one of a million; 16 to a million "
                             "spheres take N to N times with our spheres",
      lambda: (to_glint("bunny-20000"), to_glint("bunny-1000000"), to_glint("spheres-16", "Embree packets, our spheres"),
@@ -240,32 +245,33 @@ CLAIMS = [  # N stands for a number
     ("docs/performance.md", "eight lights and a directional light they take N to N times",
      lambda: (min(to_glint(rung["scene"], name="bench-peers-more") for rung in measured("bench-peers-more")["rungs"]),
               max(to_glint(rung["scene"], name="bench-peers-more") for rung in measured("bench-peers-more")["rungs"]))),
-    ("docs/performance.md", r"Tachyon truncates to 8 bits: a mean difference of N to N of 255 \(N in balls\)",
+    ("docs/measurements/README.md", r"Tachyon truncates to 8 bits: a mean difference of N to N of 255 \(N in balls\)",
      lambda: (min(tachyon_means()), max(tachyon_means()), spd("balls", "Tachyon", "mean"))),
-    ("docs/performance.md", "past the last bounce Tachyon sees the background, glint and POV-Ray nothing: N% of the pixels",
+    ("docs/measurements/README.md", "past the last bounce Tachyon sees the background, glint and POV-Ray nothing: N% of the pixels",
      lambda: (100 * spd("balls", "Tachyon", "pixels_off"),)),
-    ("docs/performance.md", "glint's `single` is off in N%", lambda: (100 * spd("balls", "glint single", "pixels_off"),)),
-    ("docs/performance.md", "where the interpolated one would reflect into the surface: N% of the pixels",
+    ("docs/measurements/README.md", "glint's `single` is off in N%", lambda: (100 * spd("balls", "glint single", "pixels_off"),)),
+    ("docs/measurements/README.md", "where the interpolated one would reflect into the surface: N% of the pixels",
      lambda: (100 * spd("teapot", "POV-Ray", "pixels_off"),)),
-    ("docs/performance.md", r"glint the fraction T \(0.8 here\): N%", lambda: (100 * spd("gears", "POV-Ray", "pixels_off"),)),
-    ("docs/performance.md", r"\(N ns per sample of `scenes/demo.yaml` on two cores, N ns per pixel for PNG\)",
+    ("docs/measurements/README.md", r"glint the fraction T \(0.8 here\): N%", lambda: (100 * spd("gears", "POV-Ray", "pixels_off"),)),
+    ("docs/measurements/README.md", r"\(N ns per sample of `scenes/demo.yaml` on two cores, N ns per pixel for PNG\)",
      lambda: (1e9 * measured("scaling")["sample_seconds"], 1e9 * measured("scaling")["encode_seconds_per_pixel"])),
     ("docs/performance.md", r"A million triangles build in N ms and render in N ms \(Embree: N and N ms\), ten million in N and N ms",
      lambda: (*growth("glint", 10**6), *growth("Embree", 10**6), *growth("glint", 10**7))),
+    ("docs/performance.md", r"N ranks render an (\w+) image with an efficiency of N", lambda: (100, "8K", scaling_cell("8K", 100))),
     ("docs/performance.md", "one lane takes N ms for `spheres16.yaml` at `single`, 16 lanes take N ms", lambda: (lanes_frame(1), lanes_frame(16))),
 ]
 # Document, a sentence, and whether the measurements hold it up.
 FACTS = [
     ("README.md", "has another object, shadow or path than an exact reference",
      lambda: certified_compared("certified")[0] == certified_compared("certified")[1]),
-    ("docs/verify.md", "Seeds 1 to 20 hold at `single`, except that R7", lambda: perturbed_others() == []),
-    ("docs/verify.md", "| C3, C4, C7: cones", lambda: peer_cases("Embree")[2] == ["C3", "C4", "C6", "C7", "M1", "P3", "S6"]),
-    ("docs/verify.md", "| these and P5 |",
+    ("docs/measurements/README.md", "Seeds 1 to 20 hold at `single`, except that R7", lambda: perturbed_others() == []),
+    ("docs/measurements/README.md", "| C3, C4, C7: cones", lambda: peer_cases("Embree")[2] == ["C3", "C4", "C6", "C7", "M1", "P3", "S6"]),
+    ("docs/measurements/README.md", "| these and P5 |",
      lambda: set(peer_cases("Embree without its robust flag")[2]) == {*peer_cases("Embree")[2], "P5"}),
-    ("docs/verify.md", "| P1, S6, R6: absolute tolerances; P5: triangles leak at edges |",
+    ("docs/measurements/README.md", "| P1, S6, R6: absolute tolerances; P5: triangles leak at edges |",
      lambda: peer_cases("POV-Ray")[2] == ["P1", "P5", "R6", "S6"]),
-    ("docs/verify.md", "| P2: a plane shadows itself; R6 |", lambda: peer_cases("Tachyon")[2] == ["P2", "R6"]),
-    ("docs/performance.md", "Elsewhere at most one pixel in a thousand is off, at edges.", lambda: spd_rest() <= 1e-3),
+    ("docs/measurements/README.md", "| P2: a plane shadows itself; R6 |", lambda: peer_cases("Tachyon")[2] == ["P2", "R6"]),
+    ("docs/measurements/README.md", "Elsewhere at most one pixel in a thousand is off, at edges.", lambda: spd_rest() <= 1e-3),
 ]
 
 

@@ -89,7 +89,7 @@ SHORT = ("shapes",)  # all but the spindle torus, in one kernel
 BOUNCES = 2
 KINDS = "t", "normal", "object", "shadow", "ray", "color"
 
-# u, displacement and arithmetic of each precision: docs/verify.md has the reasons.
+# u, displacement and arithmetic of each precision: docs/measurements/README.md has the reasons.
 ROUNDINGS = {
     "single": Rounding(2.0**-24, 4, 4),
     "strict": Rounding(2.0**-24, 2, 4),
