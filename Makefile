@@ -254,7 +254,7 @@ formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/n
 format:
 	$(CLANG_FORMAT) -i $(formatted)
 
-lint: lint-format lint-tidy lint-cppcheck lint-man
+lint: lint-format lint-tidy lint-cppcheck lint-man lint-words
 
 lint-format:
 	@$(CLANG_FORMAT) --dry-run -Werror $(formatted)
@@ -270,6 +270,12 @@ lint-cppcheck:
 
 lint-man:
 	@! groff -man -ww -z -Tutf8 $(man_pages) 2>&1 | grep .
+
+# The folders whose comments are free of what tools/lint-words finds.
+worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15])
+
+lint-words:
+	@tools/lint-words $(worded)
 
 # The measured parts of the documents; the machine should have nothing else to do.
 accuracy_scenes := $(patsubst %,scenes/%.yaml,spheres16 far mirror-glass far-planet)

@@ -217,7 +217,7 @@ CLAIMS = [  # N stands for a number
      lambda: (*glint_peer_cases(), *peer_cases("POV-Ray")[:2], *peer_cases("Tachyon")[:2], *peer_cases("Embree")[:2])),
     ("CHANGELOG.md", "a million spheres take N ms at 1920x1080 on two CPU cores, a million triangles N ms",
      lambda: (frame("spheres-1000000"), frame("bunny-1000000"))),
-    ("docs/numerics.md", r"Of the N million rays of all precisions N has a wrong hit or miss outside its band: at `(\w+)`, at a (\w+) "
+    ("docs/numerics.md", r"Among N million rays of all precisions N has a wrong hit or miss outside its band: at `(\w+)`, at a (\w+) "
                          "N radii away", ladder_wrong),
     ("docs/numerics.md", "At most N % of a shape's rays from one distance lie in the band up to 100,000 radii, N % at a million",
      lambda: (ladder_open(lambda d: d <= 1e5), ladder_open(lambda d: d == 1e6))),

@@ -51,7 +51,7 @@ static const char help_text[] =
     "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
     "      --region X,Y,W,H  render these pixels of the image only\n"
-    "      --aov LIST        more files beside the image, IMAGE.NAME.npy for each NAME of the list:\n" //
+    "      --aov LIST        more files next to the image, IMAGE.NAME.npy for each NAME of the list:\n" //
     LAYER_LIST(
         HELP_LAYER) "      --max-error E[:METRIC]\n"
                     "                        choose the fastest precision that keeps this error in linear "
@@ -63,7 +63,7 @@ static const char help_text[] =
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
-                    "                        same command goes on where an earlier one ended\n"
+                    "                        same command resumes where an earlier one ended\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
