@@ -3,7 +3,7 @@
 
 #include <stddef.h>
 
-// Ensures capacity for `extra` more items, by doubling. `array` is an lvalue of such a struct.
+// Ensures capacity for `extra` more items by doubling. `array` is an lvalue of such a struct.
 #define array_reserve(array, extra)                                                                          \
     ((array).count + (extra) <= (array).capacity                                                             \
          ? (void)0                                                                                           \

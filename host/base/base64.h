@@ -5,6 +5,6 @@
 #include <stdint.h>
 
 void base64_append(Text *text, const uint8_t *bytes, size_t count);
-// Appends the bytes that base64 text stands for; the padding at its end may be missing. False if other
+// Decodes base64 text and appends its bytes. The padding at the end may be missing. Returns false if other
 // characters occur.
 bool base64_decode(Text *bytes, const char *text, size_t length);

@@ -1,8 +1,8 @@
 // Clocks.
 #pragma once
 
-// Seconds since an arbitrary moment; never decreases.
+// Returns the seconds since an arbitrary moment, which never decrease.
 double clock_seconds(void);
 
-// Of all processors together, that this process has used.
+// Returns the seconds of all processors together that this process has used.
 double clock_processor_seconds(void);

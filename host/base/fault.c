@@ -11,7 +11,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-// The call of this thread, and the last of any, which stands for those of a driver's own threads.
+// The current call of this thread, and the latest of any thread, which stands for calls in threads of a
+// driver.
 static _Thread_local const char *volatile noted_call;
 static const char *_Atomic last_call;
 static const char *_Atomic noted_kernel;
@@ -107,7 +108,7 @@ static void crash_describe(CrashText *crash, const char *call, int signal_number
     crash_append(crash, limits, strlen(limits));
 }
 
-// Only what a signal handler may call.
+// Calls only what a signal handler may call.
 static void crash_report(int signal_number)
 {
     const char *call = noted_call ? noted_call : calling_threads > 0 ? last_call : NULL;
@@ -133,8 +134,8 @@ static void crash_report(int signal_number)
     _exit(is_complete ? complete_status : EXIT_MACHINE);
 }
 
-// In place of libc's, also for drivers (see LDFLAGS): LLVM replaces the handler of SIGABRT by one that does
-// not call ours.
+// Replaces libc's function, also for drivers (see LDFLAGS), because LLVM replaces the handler of SIGABRT by
+// one that does not call ours.
 __attribute__((visibility("default"))) _Noreturn void abort(void)
 {
     crash_report(SIGABRT);
@@ -143,7 +144,7 @@ __attribute__((visibility("default"))) _Noreturn void abort(void)
     _exit(EXIT_MACHINE);
 }
 
-// Libc's calls another abort than the one above.
+// Replaces libc's function, which does not call the abort above.
 // NOLINTNEXTLINE(bugprone-reserved-identifier): libc's name
 __attribute__((visibility("default"))) _Noreturn void __assert_fail(const char *assertion, const char *file,
                                                                     unsigned line, const char *function)
@@ -155,7 +156,7 @@ __attribute__((visibility("default"))) _Noreturn void __assert_fail(const char *
 void fault_catch_crashes(void)
 {
     static const int signals[] = {SIGSEGV, SIGBUS, SIGABRT, SIGILL, SIGFPE};
-    static char stack[1 << 16]; // its own: the crash may be a stack that is full
+    static char stack[1 << 16]; // a separate stack, since the crash may be a full stack
     const stack_t other = {.ss_sp = stack, .ss_size = sizeof stack};
     const struct sigaction action = {.sa_handler = crash_report, .sa_flags = SA_ONSTACK};
     fault_limits();

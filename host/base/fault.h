@@ -13,18 +13,18 @@ enum {
 // Prints `glint: format…` to stderr and exits with EXIT_MACHINE, or as fault_output_is_complete says.
 _Noreturn void fault(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-// An OpenCL driver that lacks memory or threads may abort or read where nothing is. From here on that ends
-// the process with EXIT_MACHINE and a message that names the call; a crash outside of a call is a bug of
-// glint, and ends it by the signal. Sanitizers handle crashes themselves.
+// An OpenCL driver that lacks memory or threads may abort or read where nothing is. After this call, that
+// ends the process with EXIT_MACHINE and a message that names the call. A crash outside of a call is a bug of
+// glint and ends the process by the signal. Sanitizers handle crashes themselves.
 void fault_catch_crashes(void);
-// Notes the OpenCL call that follows, a text up to a parenthesis; NULL: none.
+// Records the OpenCL call that follows, a text up to a parenthesis, or NULL for none.
 void fault_note_call(const char *call);
-// Notes the kernel that the following calls build or run, which a crash's message names; NULL: none.
+// Records the kernel that the following calls build or run, which a crash's message names, or NULL for none.
 void fault_note_kernel(const char *name);
-// From here on a crash within a call is described in `text`, instead of on stderr.
+// Makes a crash within a call write its description to `text` instead of stderr.
 enum { CRASH_TEXT_SIZE = 160 };
 void fault_record_crashes(char text[CRASH_TEXT_SIZE]);
-// From here on a fault or a crash is a warning, and the process exits with `status`: all output is complete.
+// Makes a fault or a crash a warning, after which the process exits with `status`: all output is complete.
 void fault_output_is_complete(int status);
-// " (limited to …)" where the process has little address space or may have few threads, else "".
+// Returns " (limited to …)" where the process has little address space or may have few threads, otherwise "".
 const char *fault_limits(void);

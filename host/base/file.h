@@ -1,21 +1,23 @@
-// What files that outlive their process, or that others name, need: locks, names and syncs.
+// Locks, names and syncs of files that outlive their process or that others name.
 #pragma once
 
 #include <stdbool.h>
 
-// FILE_REMOVED: the lock is held, but of a file that lost its last name before.
+// FILE_REMOVED: the file is locked but had lost its last name before.
 typedef enum { FILE_LOCKED, FILE_BUSY, FILE_REMOVED } FileLock;
 
-// Locks an open file until it is closed, without waiting. A file system without locks counts as locked.
+// Locks an open file until it is closed, without waiting. A file counts as locked where the file system has
+// no locks.
 FileLock file_lock(int descriptor);
-// Whether the name in the open folder (or AT_FDCWD) is that of the open file, and not of another one or a
-// symbolic link.
+// Returns whether the name in the open folder (or AT_FDCWD) is that of the open file, and not of another file
+// or a symbolic link.
 bool file_has_name(int descriptor, int folder, const char *name);
-// Opens the folder of a file. One that may be written but not listed is opened, but cannot be synced. -1: see
-// errno.
+// Opens the folder of a file. A folder that may be written but not listed is opened and cannot be synced.
+// Returns -1 and sets errno on failure.
 int file_folder_open(const char *path);
-// What keeps a file that another one names from being read, or NULL: a pipe might wait, a device never end.
+// Returns the reason why a file that another one names cannot be read, or NULL: a pipe might wait, a device
+// never end.
 const char *file_obstacle(const char *path);
-// Syncs a file or folder. False where a write failed; not every file system can sync every file, which is no
+// Syncs a file or folder. Returns false if a write failed. That a file system cannot sync a file is not a
 // failure.
 bool file_sync(int descriptor);

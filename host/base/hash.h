@@ -4,6 +4,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Start with HASH_START, chain by passing the last hash.
+// Hashes bytes. Start with HASH_START, and chain by passing the last hash.
 #define HASH_START UINT64_C(0xcbf29ce484222325)
 uint64_t hash_bytes(uint64_t hash, const void *bytes, size_t length);

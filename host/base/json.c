@@ -12,8 +12,8 @@
 
 struct Json {
     Text text;
-    bool is_empty; // whether the innermost open container is
-    bool *items;   // whether each open container is an object
+    bool is_empty; // the innermost open container
+    bool *items;   // for each open container, whether it is an object
     size_t count, capacity;
 };
 
@@ -23,7 +23,8 @@ static int json_output(const char *bytes, size_t length, void *text)
     return 0;
 }
 
-// jansson writes the texts only: 2.14 prints numbers with 17 digits, or all with the same number of them.
+// jansson writes only the texts, because version 2.14 prints numbers with 17 digits, or all with the same
+// number of digits.
 static void json_quote(Json *json, const char *value)
 {
     Text utf8 = {0};

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A longer source line is truncated, and not shown at all if the caret would be beyond.
+// A longer source line is truncated, or not shown if the caret would be beyond.
 enum { CHARACTERS_SHOWN = 240 };
 
 // C0 and C1 controls could control the user's terminal.
@@ -17,8 +17,8 @@ static bool character_is_control(const unsigned char *bytes, size_t size)
            (size == 2 && bytes[0] == 0xC2 && bytes[1] < 0xA0);
 }
 
-// At most `characters_max` characters of the text, with `?` for each control character and each byte that is
-// not UTF-8. Tabs are kept on request.
+// Copies at most `characters_max` characters of the text, with `?` for each control character and each byte
+// that is not UTF-8. Tabs are kept on request.
 static char *printable_copy(const char *bytes, size_t length, size_t characters_max, bool keep_tabs)
 {
     Text shown = {0};
@@ -128,7 +128,7 @@ size_t message_count(const MessageList *list, MessageSeverity severity)
     return count;
 }
 
-// Repeats the line's tabs before the caret, which keep it under its character at any tab width.
+// Prints the line's tabs before the caret, which keep it under its character at any tab width.
 static void caret_print(const char *line, unsigned column, FILE *stream)
 {
     const char *at = line;

@@ -28,7 +28,7 @@ typedef struct {
     size_t length;
 } Source;
 
-// Add a message without a file. The error's returns false, as what found the error does.
+// Add a message without a file. The function for errors returns false, so that its caller can return that.
 void message_warning(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 bool message_error(MessageList *list, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
@@ -36,13 +36,13 @@ bool message_error(MessageList *list, const char *format, ...) __attribute__((fo
 #define MESSAGE_WHOLE_FILE SIZE_MAX
 
 // Adds a message at a byte offset of a source, which determines its line, column and source line. An offset
-// past the end points at the end. Control characters are replaced by `?`.
+// past the end is taken as the end. Control characters are replaced by `?`.
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
 
 size_t message_count(const MessageList *list, MessageSeverity severity);
 
-// `file:line:column: error: text`, then the line and a caret where they are known.
+// Prints `file:line:column: error: text`, then the line and a caret where they are known.
 void message_list_print(const MessageList *list, FILE *stream);
 void message_free(Message *message);
 void message_list_free(MessageList *list);

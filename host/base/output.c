@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// The temporaries not yet renamed, for the exit handler.
+// Temporaries that are not yet renamed, for the exit handler.
 typedef struct {
     int folder;
     const char *name;
@@ -33,7 +33,7 @@ static void pending_remove_all(void)
     free(pending.items);
 }
 
-// Called before a temporary has its name, so that nothing can fail once it has.
+// Registers a temporary before it has its name, so that nothing can fail afterwards.
 static void pending_prepare(void)
 {
     static bool is_registered;
@@ -139,8 +139,8 @@ static DescriptorPath descriptor_path(int descriptor)
     return link;
 }
 
-// A file without a name vanishes with its process. -1 where the file system has none, or nothing in /proc to
-// name it by.
+// Opens a file without a name, which vanishes with its process. Returns -1 where the file system has none, or
+// nothing in /proc to name it by.
 static int unnamed_open(const OutputFile *output, mode_t mode)
 {
     int descriptor = openat(output->folder, ".", O_WRONLY | O_TMPFILE | O_CLOEXEC, mode);
@@ -181,8 +181,8 @@ static bool output_open_directly(OutputFile *output, MessageList *messages)
 
 enum { MODE_NEW = 0666, MODE_PRIVATE = 0600, MODE_BITS = 0777 };
 
-// For `output->name` in `output->folder`; `created` is the mode that the umask limits, and `exact` the one
-// that it does not, if given.
+// Creates `output->name` in `output->folder`. `created` is the mode to which the umask applies, and `exact`,
+// if given, the mode to which it does not.
 static bool output_open_beside(OutputFile *output, mode_t created, const mode_t *exact, MessageList *messages)
 {
     int descriptor = unnamed_open(output, created);
@@ -221,7 +221,8 @@ bool output_open_private(OutputFile *output, int folder, const char *name, Messa
     return output_open_beside(output, MODE_PRIVATE, &exact, messages);
 }
 
-// The end of a chain of symbolic links, whether a file exists there or not; `target` itself if it is no link.
+// Returns the end of a chain of symbolic links, whether a file exists there or not, or `target` itself if it
+// is not a link.
 static char *link_end(const char *target)
 {
     enum { STEPS_MAX = 40 }; // as in Linux; a longer chain is a cycle
@@ -275,7 +276,7 @@ bool output_finish(OutputFile *output, MessageList *messages)
     FILE *file = output->file;
     if (!file || file == stdout || output->is_finished) return true;
     output->is_finished = true;
-    errno = EIO; // if an earlier write failed, its error is lost
+    errno = EIO; // the error of an earlier write is lost
     if (fflush(file) != 0 || ferror(file)) return output_failed(output, "write", messages);
     bool needs_sync = output->has_folder && !output->is_private;
     if (needs_sync && !file_sync(fileno(file))) return output_failed(output, "write", messages);

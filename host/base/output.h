@@ -1,6 +1,6 @@
-// A file that is put in place of its target only when complete, so that a failure leaves the old file
-// untouched: an unnamed file in the target's folder where the file system has those (O_TMPFILE), else a
-// temporary beside the target.
+// A file that replaces its target only when complete, so that a failure leaves the old file untouched: an
+// unnamed file in the target's folder where the file system has those (O_TMPFILE), otherwise a temporary next
+// to the target.
 #pragma once
 
 #include "host/base/message.h"
@@ -16,14 +16,14 @@ typedef struct {
     char *temporary;  // the name in the folder until the rename; NULL: none
 } OutputFile;
 
-// Opens a file for `target`, or, for `-`, standard output, whose errors main reports. On failure adds a
-// message and returns false. output_abandon removes the temporary; so does an atexit handler, and temporaries
+// Opens a file for `target` or, for `-`, standard output, whose errors main reports. On failure adds a
+// message and returns false. output_abandon removes the temporary, and so does an atexit handler. Temporaries
 // of killed processes are removed when the next one is needed.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);
-// Opens a file of mode 0600 for `name` in an open folder, in place of whatever has that name. Not synced: for
-// contents that may be lost.
+// Opens a file of mode 0600 for `name` in an open folder, and replaces whatever has that name. It is not
+// synced: for contents that may be lost.
 bool output_open_private(OutputFile *output, int folder, const char *name, MessageList *messages);
-// On failure adds a message and returns false; the file stays open until it is abandoned.
+// Writes bytes. On failure adds a message and returns false; the file stays open until it is abandoned.
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);
 // Flushes, syncs and checks for write errors (disk full), which leaves only the renaming to output_commit.
 // On failure adds a message and removes the temporary.
@@ -33,7 +33,7 @@ bool output_finish(OutputFile *output, MessageList *messages);
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);
 
-// Whether `file_name` is a temporary for the target `name`.
+// Returns whether `file_name` is a temporary for the target `name`.
 bool output_is_temporary(const char *file_name, const char *name);
 // Removes a temporary unless its process lives.
 void output_remove_stale(int folder, const char *file_name);

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The value at `rank` (from 0) of the sorted magnitudes, by radix selection: the bits of non-negative floats
-// are in their order, so histograms of the upper half of the bits, then of the lower, find it.
+// Returns the value at `rank` (from 0) of the sorted magnitudes by radix selection. The bits of non-negative
+// floats are in their order, so histograms of the upper and then of the lower half of the bits find it.
 static float rank_select(const float *magnitudes, size_t count, size_t rank)
 {
     size_t *counts = memory_allocate(1u << 16, sizeof *counts);

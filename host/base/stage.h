@@ -1,5 +1,5 @@
-// What a long operation is doing and how much of that is done, for another thread to show. With a NULL Stage
-// nothing is noted.
+// What a long operation is doing and how much of it is done, for another thread to show. With a NULL Stage
+// nothing is recorded.
 #pragma once
 
 #include "host/base/text.h"
@@ -10,17 +10,17 @@ typedef struct Stage Stage;
 Stage *stage_open(void);
 void stage_close(Stage *stage);
 
-// The operation is now at `what`, such as "reading", of the file at `path`, which may be NULL; nothing of
-// `total` is done, 0: it is not counted. The first stage starts the operation.
+// Sets the stage to `what`, such as "reading", of the file at `path`, which may be NULL, with nothing of
+// `total` done. A `total` of 0 is not counted. The first stage starts the operation.
 void stage_begin(Stage *stage, const char *what, const char *path, size_t total);
-// The operation is over.
+// Ends the operation.
 void stage_end(Stage *stage);
 
-// How much of the stage's total is done.
+// Sets how much of the stage's total is done.
 void stage_set(Stage *stage, size_t done);
-// By any number of threads.
+// Adds to it. Any number of threads may call this.
 void stage_add(Stage *stage, size_t count);
 
 // Appends the stage, such as "reading bunny.obj 41%", and sets for how many seconds the operation has lasted.
-// False: none is under way.
+// Returns false if none is under way.
 bool stage_write(Stage *stage, Text *text, double *seconds);

@@ -71,7 +71,7 @@ ShortText text_size(double bytes)
 
 ShortText text_duration(double seconds)
 {
-    // one of a unit would hide up to half of it
+    // a count of one unit would hide up to half of it
     static const struct {
         const char *name;
         double seconds;
@@ -115,7 +115,7 @@ size_t text_character_size(const char *text, size_t length)
 
 bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages)
 {
-    // A device or a pipe may have no end.
+    // a device or a pipe may have no end
     struct stat status;
     bool is_regular = fstat(fileno(file), &status) == 0 && S_ISREG(status.st_mode);
     const size_t largest = is_regular ? SIZE_MAX : (size_t)2 << 30;
@@ -127,7 +127,7 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
         text->count += got;
         text->items[text->count] = '\0';
     } while (got == chunk && text->count - start <= largest);
-    // no larger than it is: sanitizers then find what reads beyond its end
+    // of the exact size, so that sanitizers find what reads beyond its end
     text->capacity = text->count + 1;
     text->items = memory_resize(text->items, text->capacity, 1);
 
@@ -152,9 +152,9 @@ static size_t least(size_t a, size_t b)
     return a < b ? a : b;
 }
 
-// Insertions, deletions, replacements and swaps of neighbors that turn `a` into `b`, each part edited once
-// (optimal string alignment; Boytsov, Indexing methods for approximate dictionary searching, 2011,
-// section 2.1).
+// Returns the number of insertions, deletions, replacements and swaps of neighbors that turn `a` into `b`,
+// each part edited once (optimal string alignment; Boytsov, Indexing methods for approximate dictionary
+// searching, 2011, section 2.1).
 static size_t edit_distance(const char *a, size_t a_length, const char *b, size_t b_length)
 {
     size_t *rows = memory_allocate(3 * (b_length + 1), sizeof *rows);

@@ -27,16 +27,17 @@ typedef struct {
 ShortText text_size(double bytes);
 // Returns a duration in the unit that suits it, such as "90 seconds" or "3 hours".
 ShortText text_duration(double seconds);
-// Returns what makes a noun of that many a plural: "" for 1, else "s".
+// Returns the ending of a noun for that many: "" for 1, otherwise "s".
 const char *text_plural(uint64_t count);
 
-// Returns whether a line ends with the first byte: a newline, or a carriage return that none follows.
+// Returns whether a line ends with the first byte: a newline, or a carriage return that no newline follows.
 static inline bool text_ends_line(const char *text, size_t length)
 {
     return *text == '\n' || (*text == '\r' && (length < 2 || text[1] != '\n'));
 }
 
-// Bytes of the well-formed UTF-8 character that `text` starts with; 0 if it does not start with one.
+// Returns the bytes of the well-formed UTF-8 character with which `text` starts, or 0 if it does not start
+// with one.
 size_t text_character_size(const char *text, size_t length);
 
 // Reads a whole file (`-`: standard input). On failure adds a message that names the file and returns false.
@@ -44,6 +45,6 @@ bool text_read_file(Text *text, const char *path, MessageList *messages);
 // Reads the rest of an open file and leaves it open; `path` is used in messages only.
 bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages);
 
-// The known word nearest to `word` by edit distance, in which a swap of neighbors counts one; NULL if the
-// nearest is farther than 1 + length / 4 or than length - 1.
+// Returns the known word nearest to `word` by edit distance, in which a swap of neighbors counts one, or NULL
+// if the nearest is farther than 1 + length / 4 or than length - 1.
 const char *text_nearest(const char *word, const char *const *known, size_t known_count);

@@ -1,10 +1,10 @@
-// The interface of a file format to image.c: an encoder of rows and a decoder of whole files.
+// The interface between image.c and a file format: an encoder of rows and a decoder of whole files.
 #pragma once
 
 #include "host/base/output.h"
 #include "host/image/image.h"
 
-// Encoders. `state` is the encoder's own; image.c opens and renames the file.
+// Encoders. `state` belongs to the encoder; image.c opens and renames the file.
 struct ImageWriter {
     ImageHeader header;
     OutputFile output;
@@ -14,10 +14,10 @@ struct ImageWriter {
     bool finished, failed;
 };
 
-// A function that fails adds a message and returns false; only `free` is called after that.
+// A function that fails adds a message and returns false. Only `free` is called after that.
 typedef struct Encoder {
     bool (*begin)(ImageWriter *writer, MessageList *messages);
-    // arrays[0]: the pixels; those of the header's layers follow
+    // arrays[0] has the pixels, and the following ones those of the header's layers
     bool (*rows)(ImageWriter *writer, const void *const *arrays, uint32_t row_count, MessageList *messages);
     bool (*end)(ImageWriter *writer, MessageList *messages); // after the last row; may be NULL
     void (*free)(ImageWriter *writer); // frees `state`, which may be incomplete or NULL; may be NULL
@@ -36,7 +36,7 @@ typedef struct {
     MessageList *messages;
 } ImageFile;
 
-// A decoder reports failure with image_refuse; image.c then frees the image.
+// A decoder reports a failure with image_refuse, and image.c frees the image.
 bool png_decode(Image *image, const ImageFile *file);
 bool ppm_decode(Image *image, const ImageFile *file);
 bool exr_decode(Image *image, const ImageFile *file);

@@ -1,6 +1,6 @@
-// Layers as in OpenEXR's "Technical Introduction" (2013), "Naming conventions": a channel's name is its
-// layer's, a dot and a base name. In a file of several parts a channel without a layer has the part's name
-// for one.
+// Layers follow OpenEXR's "Technical Introduction" (2013), "Naming conventions": a channel's name is its
+// layer's, a dot and a base name. In a file of several parts the name of a part serves as the layer of its
+// channels without one.
 #include "host/image/exr_layers.h"
 
 #include "host/base/array.h"
@@ -126,7 +126,7 @@ static const char *shown_name(const Candidate *candidate, int *length)
     return candidate->length > 0 ? candidate->name : "default";
 }
 
-// At most this many bytes of names are shown.
+// The most bytes of names that a message shows.
 enum { NAMES_SHOWN = 200 };
 
 static void names_add(Text *names, const char *name, size_t length)

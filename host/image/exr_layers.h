@@ -1,4 +1,4 @@
-// Which channels of an EXR file are its image.
+// Finds the channels of an EXR file that are its image.
 #pragma once
 
 #include "host/image/codec.h"

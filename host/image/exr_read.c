@@ -1,5 +1,5 @@
-// OpenEXR input through the C core: one layer at full resolution, scan lines or tiles, halves or floats, or
-// integers of a single channel.
+// Reads OpenEXR through the C core: one layer at full resolution, in scan lines or tiles, of halves or
+// floats, or of integers with a single channel.
 #include "host/image/codec.h"
 #include "host/image/exr_layers.h"
 
@@ -44,7 +44,7 @@ static int64_t exr_size(exr_const_context_t context, void *reader)
     return (int64_t)((ExrReader *)reader)->file->length;
 }
 
-// Like pread, returns fewer bytes at the end of the file: the library reads ahead past a header of unknown
+// Returns fewer bytes at the end of the file, as pread does: the library reads ahead past a header of unknown
 // size.
 static int64_t exr_read_bytes(exr_const_context_t context, void *reader, void *bytes, uint64_t size,
                               uint64_t offset, exr_stream_error_func_ptr_t fail)
@@ -216,7 +216,7 @@ static void chroma_convert(float *pixel)
     pixel[1] = (luminance - 0.2126F * pixel[0] - 0.0722F * pixel[2]) / 0.7152F;
 }
 
-// Also keeps integers as doubles, which hold each of them.
+// Stores the values, and integers also as doubles, which hold each of them.
 static void integers_widen(Image *image)
 {
     const size_t count = (size_t)image->width * image->height;
@@ -230,7 +230,7 @@ static void integers_widen(Image *image)
     }
 }
 
-// Fills the image, which is the display window; where the file has no data it stays 0.
+// Fills the image, which is the display window. It stays 0 where the file has no data.
 static void image_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
     const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;

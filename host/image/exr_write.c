@@ -1,4 +1,4 @@
-// OpenEXR output through the C core (Technical Introduction to OpenEXR, 2013): 32-bit floats and integers,
+// Writes OpenEXR through the C core (Technical Introduction to OpenEXR, 2013): 32-bit floats and integers,
 // ZIP in blocks of 16 rows.
 #include "host/image/codec.h"
 
@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The color or a further layer.
+// The color, or another layer.
 typedef struct {
     char *channels; // names, each ended by a null
     size_t channel_count;
@@ -19,7 +19,7 @@ typedef struct {
     void *block; // rows of the incomplete block
 } ExrLayer;
 
-// A channel of the file and where its values are: the number of the layer and of the value in each pixel.
+// A channel of the file and the place of its values: the number of the layer and of the value in each pixel.
 typedef struct {
     const char *name;
     size_t layer, value;
@@ -66,7 +66,7 @@ static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList
                                             : exr_get_default_error_message(code));
 }
 
-// The first failure of a sequence of calls.
+// Returns the first failure of a sequence of calls.
 #define EXR_STEP(code, call) ((code) = (code) ? (code) : (call))
 
 static void layer_add(ExrWriter *state, const ImageLayer *layer)
@@ -194,8 +194,8 @@ static void channel_place(const ExrWriter *state, int index, uint32_t width)
     channel->user_data_type = layer->is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
 }
 
-// A block of its uncompressed size is read as uncompressed. OpenEXR 3.1 and 3.4.7 store compressed bytes of
-// that size as well (its issue 2306).
+// Stores such a block uncompressed. A block of its uncompressed size is read as uncompressed, but OpenEXR 3.1
+// and 3.4.7 also store compressed bytes of that size (its issue 2306).
 static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
 {
     const ExrWriter *state = pipeline->encoding_user_data;

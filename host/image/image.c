@@ -47,7 +47,7 @@ uint64_t image_bytes(const ImageHeader *header)
     return values * (header->npy_type == 'd' ? sizeof(double) : sizeof(float));
 }
 
-// Deflate, in PNG and EXR, makes 1032 bytes of one at most (zlib's technical details).
+// Deflate, in PNG and EXR, expands a byte to at most 1032 (zlib's technical details).
 enum { DEFLATE_RATIO_MAX = 1032 };
 
 static uint64_t bytes_min(const ImageHeader *header)
@@ -56,7 +56,7 @@ static uint64_t bytes_min(const ImageHeader *header)
     return image_bytes(header) / (is_compressed ? DEFLATE_RATIO_MAX : 1);
 }
 
-// False with a message where the disk has no room for the image, however well it is compressed.
+// Returns false with a message if the image does not fit on the disk, however well it is compressed.
 static bool disk_has_room(const ImageWriter *writer, MessageList *messages)
 {
     struct statvfs disk;

@@ -1,4 +1,4 @@
-// Images: float colors to files and back. Rows run from the top.
+// Images: float colors in files and memory. Rows run from the top.
 #pragma once
 
 #include "host/base/message.h"
@@ -13,7 +13,7 @@ typedef struct {
     const char *key, *value;
 } ImageNote; // written into PNG text chunks and EXR string attributes
 
-// Further values of each pixel, in an EXR only.
+// More values of each pixel, in an EXR only.
 typedef struct {
     const char *channels; // their names in turn, separated by commas, such as "normal.X,normal.Y,normal.Z"
     size_t channel_count;
@@ -39,36 +39,37 @@ ImageFormat image_format_of(const char *path); // by its ending, in any case
 
 uint64_t image_bytes(const ImageHeader *header); // of its pixels, uncompressed
 
-// Writes row by row, so that a large image needs memory for a band only. Nothing is at the target path until
-// image_writer_commit renames the file.
+// Writes an image row by row, so that a large one needs memory for a band only. Nothing is at the target path
+// until image_writer_commit renames the file.
 typedef struct ImageWriter ImageWriter;
-// NULL with an error message if the file cannot be written, or cannot fit on its disk. Reads the header's
-// notes and layers; they need not outlive it.
+// Opens a file. Returns NULL with an error message if it cannot be written or cannot fit on its disk. The
+// header's notes and layers need not outlive the writer.
 ImageWriter *image_writer_open(const char *path, const ImageHeader *header, MessageList *messages);
-// `pixels`: row_count x width x channels values of npy_type ('f' for PNG, PPM, EXR), from the top. Returns
-// false with an error message if they cannot be written; the writer must still be committed, which then fails
-// silently, or abandoned. More rows than the image has are a bug.
+// Writes rows from the top. `pixels` has row_count x width x channels values of npy_type ('f' for PNG, PPM,
+// EXR). Returns false with an error message if they cannot be written. The writer must then be abandoned, or
+// committed, which fails silently. More rows than the image has are a bug.
 bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_count, MessageList *messages);
-// The same for an image with layers: `arrays` are the pixels and then the values of each layer, row_count x
+// Writes rows of an image with layers. `arrays` are the pixels and then the values of each layer, row_count x
 // width x its channels.
 bool image_writer_layer_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
                              MessageList *messages);
-// Adds a note that is known only once rows are written: to a PNG alone, whose text chunks may follow its
-// rows. False as image_writer_rows.
+// Adds a note that is known only once rows are written, to a PNG alone, whose text chunks may follow its
+// rows. Returns false as image_writer_rows does.
 bool image_writer_note(ImageWriter *writer, const ImageNote *note, MessageList *messages);
-// Completes the file so that only the rename is left: of several files none is put in place before all are
-// complete. False with an error message on failure; the writer must still be committed or abandoned.
+// Completes the file so that only the rename is left, and none of several files is put in place before all
+// are complete. Returns false with an error message on failure. The writer must still be committed or
+// abandoned.
 bool image_writer_finish(ImageWriter *writer, MessageList *messages);
 // Completes the file unless finished and renames it to its target. On failure returns false with an error
 // message and leaves the target unchanged. Frees the writer in either case. Missing rows are a bug.
 bool image_writer_commit(ImageWriter *writer, MessageList *messages);
 void image_writer_abandon(ImageWriter *writer); // removes the file and frees the writer; NULL is accepted
 
-// One linear value to a display value of 2^bits - 1 steps: clipped to 0..1, curve, rounded to nearest.
+// Converts a linear value to a display value of 2^bits - 1 steps: clipped to 0..1, curve, rounded to nearest.
 // NaN gives 0. sRGB: IEC 61966-2-1:1999.
 uint32_t image_quantize(float value, Transfer transfer, unsigned bits);
 
-// An image in memory. `image_read` gives linear values; a file's display values become value / maximum, and
+// An image in memory. `image_read` gives linear values. Display values of a file become value / maximum, and
 // `transfer` is their curve (PNG: from its sRGB chunk).
 typedef struct {
     uint32_t width, height, channels;
@@ -82,14 +83,14 @@ typedef struct {
 } Image;
 // Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message
 // and an empty image that need not be freed. An image whose header declares more pixels than
-// image_limit_pixels permits is refused before anything is decoded: a small file may be compressed from many.
+// image_limit_pixels permits is refused before anything is decoded, because a small file may expand to many.
 bool image_read(Image *image, const char *path, MessageList *messages);
-// Reads the layer of an EXR file that has the name; NULL reads what image_read does: the default layer, or
-// the only one with colors.
+// Reads the named layer of an EXR file. With NULL it reads what image_read does, the default layer or the
+// only one with colors.
 bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages);
 // Reads an image from memory; `source->file` names it in messages.
 bool image_read_bytes(Image *image, const Source *source, MessageList *messages);
-// Return whether a file, or its bytes, start as those that image_read reads.
+// Return whether a file, or its bytes, start like one that image_read reads.
 bool image_is_known(const char *path);
 bool image_bytes_are_known(const void *bytes, size_t length);
 enum { IMAGE_PIXELS_MAX = 1 << 27 }; // the default: 1.6 GB of floats

@@ -1,4 +1,4 @@
-// JPEG input through libjpeg-turbo, and libexif for the orientation.
+// Reads JPEG through libjpeg-turbo, and its orientation through libexif.
 #include "host/image/codec.h"
 
 #include "host/base/memory.h"
@@ -8,7 +8,7 @@
 #include <string.h>
 #include <turbojpeg.h>
 
-// Bounds the declared size by the file's: the expansion of a flat gray image.
+// Bounds the declared size by the file's size: the expansion of a flat gray image.
 enum { JPEG_EXPANSION = 1 << 14 };
 
 // Finds the content of the first application segment with the number (T.81, 1992, annex B) that starts with

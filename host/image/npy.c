@@ -56,7 +56,7 @@ static bool npy_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
 
 const Encoder npy_encoder = {npy_begin, npy_rows, NULL, NULL, NULL};
 
-// The value of `'key':` in the header's dictionary, or NULL.
+// Returns the value of `'key':` in the header's dictionary, or NULL.
 static const char *npy_entry(const char *dictionary, const char *key)
 {
     const char *at = strstr(dictionary, key);

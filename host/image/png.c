@@ -13,7 +13,7 @@
 #include <string.h>
 #include <zlib.h>
 
-// Shared by reading and writing; libpng passes it to the error handler.
+// State of reading and writing, which libpng passes to the error handler.
 typedef struct {
     png_structp png;
     png_infop info;
@@ -84,7 +84,7 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
         png_note(state, note);
     png_set_filter(state->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
     png_set_compression_level(state->png, 1);
-    // filtered rows repeat mostly in runs: RLE is as fast as a longer match search, and smaller
+    // filtered rows repeat mostly in runs: RLE is as fast as a longer match search, and its files are smaller
     png_set_compression_strategy(state->png, Z_RLE);
     png_write_info(state->png, state->info);
     return true;

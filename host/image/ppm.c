@@ -39,7 +39,7 @@ static void ppm_free(ImageWriter *writer)
 
 const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, ppm_free, NULL};
 
-// Reads the number at `*at` after white space and comments; false unless it is below 2^31.
+// Reads the number at `*at` after white space and comments. Returns false unless it is below 2^31.
 static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)
 {
     while (*at < file->length && (isspace(file->bytes[*at]) || file->bytes[*at] == '#')) {

@@ -26,7 +26,7 @@ static uint32_t float_bits(float value)
     return bits;
 }
 
-// No threshold lies within a relative 1e-12 of a float, so double precision decides each.
+// No threshold lies within a relative 1e-12 of a float, so double precision decides each value.
 static float float_at_least(double value)
 {
     float near = (float)value;
@@ -80,7 +80,7 @@ static const Curve *curve_of(unsigned bits)
 
 static inline uint32_t curve_quantize(const Curve *curve, float value)
 {
-    if (!(value >= curve->thresholds[1])) // NaN too
+    if (!(value >= curve->thresholds[1])) // also NaN
         return 0;
     if (value >= 1.0F) return curve->maximum;
     uint32_t display = curve->starts[(float_bits(value) >> curve->shift) - curve->first];
@@ -108,7 +108,7 @@ static void srgb_quantize_8(uint8_t *bytes, const float *values, size_t count)
     const Curve *curve = curve_of(8);
     const float largest = 0x1.fffffep-1F;
     for (size_t i = 0; i < count; i++) {
-        float value = values[i] > curve->least ? values[i] : curve->least; // NaN too
+        float value = values[i] > curve->least ? values[i] : curve->least; // also NaN
         value = value < largest ? value : largest;
         const uint32_t display = curve->starts[(float_bits(value) >> curve->shift) - curve->first];
         bytes[i] = (uint8_t)(display + (value >= curve->thresholds[display + 1]));
