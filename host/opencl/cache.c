@@ -84,7 +84,7 @@ char *cache_entry_path(const char *key)
     return path.items;
 }
 
-// Why a file or folder cannot be trusted; NULL: it can.
+// Returns why a file or folder cannot be trusted, or NULL if it can.
 static const char *distrust(const struct stat *status, mode_t type)
 {
     if ((status->st_mode & S_IFMT) != type) return type == S_IFDIR ? "not a folder" : "not a regular file";
@@ -94,7 +94,7 @@ static const char *distrust(const struct stat *status, mode_t type)
 }
 
 // Creates the folder and every one above it, private to their owner (XDG Base Directory Specification 0.8,
-// "Referencing this specification"). A failure shows when the folder is opened.
+// "Referencing this specification"). A failure is reported when the folder is opened.
 static void make_folders(char *path)
 {
     for (char *slash = strchr(path + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
@@ -105,7 +105,7 @@ static void make_folders(char *path)
     mkdir(path, 0700);
 }
 
-// -1 without a folder, with a message if there is one that cannot be opened or trusted.
+// Returns -1 without a folder, with a message if there is one that cannot be opened or trusted.
 static int folder_open(bool makes, MessageList *messages)
 {
     char *path = cache_folder_path();
@@ -132,8 +132,8 @@ static int folder_open(bool makes, MessageList *messages)
 
 static const char absent[] = "absent";
 
-// Reads a file of the folder. Returns why it cannot be trusted, `absent` without one; NULL: it can. Opening
-// never blocks.
+// Reads a file of the folder. Returns why it cannot be trusted, `absent` if there is none, or NULL if it can
+// be trusted. Opening never blocks.
 static const char *file_read(Text *content, int folder, const char *name, uint64_t bytes_max)
 {
     int descriptor = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
@@ -166,8 +166,8 @@ static const char *secret_read(Secret *secret, int folder)
     return why;
 }
 
-// One process at a time makes or removes the hash's key and writes entries with it. Without locks some of
-// them may be lost. Returns a descriptor to close, or -1.
+// Locks the folder: one process at a time makes or removes the hash's key and writes entries with it. Without
+// locks some of them may be lost. Returns a descriptor to close, or -1.
 static int folder_lock(int folder)
 {
     int locked = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -176,7 +176,7 @@ static int folder_lock(int folder)
     return locked;
 }
 
-// Reads the hash's key, or replaces one that is absent or cannot be trusted. In a locked folder.
+// Reads the hash's key, or replaces one that is absent or cannot be trusted. The folder must be locked.
 static bool secret_make(Secret *secret, int folder)
 {
     bool has_secret = secret_read(secret, folder) == NULL;
@@ -200,7 +200,8 @@ typedef struct {
     size_t key_length, binary_length;
 } Entry;
 
-// Returns why the entry cannot be trusted, `absent` for one that an other version wrote; NULL: it can.
+// Returns why the entry cannot be trusted, `absent` if another version wrote it, or NULL if it can be
+// trusted.
 static const char *entry_read(Entry *entry, int folder, const char *name)
 {
     *entry = (Entry){0};
@@ -226,7 +227,7 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
     return memcmp(&header, &expected, sizeof header) == 0 ? NULL : damaged;
 }
 
-// At most one warning per process.
+// Prints at most one warning per process.
 static void warnings_print(MessageList *messages)
 {
     static atomic_flag is_printed = ATOMIC_FLAG_INIT; // each device's thread loads its programs
@@ -274,7 +275,7 @@ static bool starts_with_entry_name(const char *name)
     return strspn(name, "0123456789abcdef") == 16 && strncmp(name + 16, ending, strlen(ending)) == 0;
 }
 
-// Whether it is the temporary of an entry, of which a killed process may leave some.
+// Returns whether the file is the temporary of an entry, of which a killed process may leave some.
 static bool is_temporary(const char *name)
 {
     if (name[0] != '.' || !starts_with_entry_name(name + 1)) return false;
@@ -295,7 +296,7 @@ void cache_entries_free(CacheEntries *entries)
     *entries = (CacheEntries){0};
 }
 
-// The next name in a folder; NULL at its end, where errno is 0, or on failure.
+// Returns the next name in a folder, or NULL at its end, where errno is 0, and on failure.
 static const char *folder_next(DIR *items)
 {
     errno = 0;
@@ -315,8 +316,8 @@ static void entries_add(CacheEntries *entries, int folder, const char *name)
     entries->size += entry.size;
 }
 
-// Lists the entries, the least recently used first, and removes stale temporaries; other files are not ours.
-// False, with a message and no entries, if the folder cannot be read to its end.
+// Lists the entries, the least recently used first, and removes stale temporaries. Other files are not ours.
+// Returns false, with a message and no entries, if the folder cannot be read to its end.
 static bool entries_list(CacheEntries *entries, int folder, MessageList *messages)
 {
     *entries = (CacheEntries){0};
@@ -337,14 +338,15 @@ static bool entries_list(CacheEntries *entries, int folder, MessageList *message
     return true;
 }
 
-// False, with a message, unless the file is gone.
+// Removes a file. Returns false with a message if that fails, unless the file is gone.
 static bool file_remove(int folder, const char *name, MessageList *messages)
 {
     if (unlinkat(folder, name, 0) == 0 || errno == ENOENT) return true;
     return message_error(messages, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
 }
 
-// Removes, too, what is too large to be loaded. False, with messages, if something remains.
+// Removes the least recently used entries beyond `bytes_max`, also those too large to be loaded. Returns
+// false with messages if something remains.
 static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
 {
     CacheEntries entries;

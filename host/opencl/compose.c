@@ -13,7 +13,7 @@ typedef struct {
     Text text;
 } Composer;
 
-// The length of the file's name, without its folder, where the line is `#include "name"`, else 0.
+// Returns the length of the file's name, without its folder, if the line is `#include "name"`, otherwise 0.
 static size_t include_name(const char *line, const char **name)
 {
     static const char word[] = "include";

@@ -8,8 +8,8 @@
 // The files of kernels/: "render.cl", "sphere.h", …; ended by a NULL name.
 extern const EmbeddedFile kernel_files[];
 
-// `prelude`, then `root` with each quoted include expanded the first time and replaced by an empty line after
-// that, whatever the preprocessor's branch; #line around each, so that the compiler reports files and lines
-// of kernels/. Files are found by the last part of their path; <...> includes are kept. A fault if `root` or
-// an include is not in `files`. The caller frees the text.
+// Returns `prelude`, then `root` with each quoted include expanded the first time and replaced by an empty
+// line after that, whatever the preprocessor's branch, with #line around each, so that the compiler reports
+// files and lines of kernels/. Files are found by the last part of their path, and <...> includes are kept.
+// It is a fault if `root` or an include is not in `files`. The caller frees the text.
 char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude);

@@ -33,7 +33,7 @@ void compute_close(Compute *compute)
     *compute = (Compute){0};
 }
 
-// Takes the detail.
+// Records the failure and takes ownership of the detail.
 static void failure_keep(Compute *compute, const char *call, cl_int status, char *detail)
 {
     if (!compute_ok(compute)) {

@@ -25,18 +25,18 @@ typedef struct Compute {
     struct Compute *reference;    // another device, for work in double; NULL: this one does it
 } Compute;
 
-// False: it failed. Closed by compute_close either way.
+// Opens the device. Returns false if that failed. compute_close closes it either way.
 bool compute_open(Compute *compute, const Device *device);
 void compute_close(Compute *compute); // and zeroes; accepts a zeroed one
 
 // Opens the device as the Compute's reference, which compute_close closes.
 bool compute_open_reference(Compute *compute, const Device *device);
-// The Compute that does this one's work in double.
+// Returns the Compute that does this one's work in double.
 static inline Compute *compute_in_double(Compute *compute)
 {
     return compute->reference ? compute->reference : compute;
 }
-// A reference's failure becomes one of the Compute. Returns compute_ok.
+// Copies a reference's failure to the Compute. Returns compute_ok.
 bool compute_check_reference(Compute *compute);
 
 static inline bool compute_ok(const Compute *compute)
@@ -44,22 +44,23 @@ static inline bool compute_ok(const Compute *compute)
     return compute->failure.call[0] == '\0';
 }
 
-// `compute_try(compute, clFinish(compute->queue))`: makes the call unless an earlier one failed; false if
-// either failed.
+// `compute_try(compute, clFinish(compute->queue))` makes the call unless an earlier one failed, and is false
+// if either failed.
 #define compute_try(compute, call)                                                                           \
     (compute_ok(compute) ? (fault_note_call(#call), compute_check((compute), (call), #call)) : false)
-// Keeps the failure of a call that was made, if it is the first: the function's name is `call` up to a
+// Records the failure of a call that was made, if it is the first. The function's name is `call` up to a
 // parenthesis. Returns compute_ok.
 bool compute_check(Compute *compute, cl_int status, const char *call);
-// The same for a call that returns an object: NULL is a failure even with CL_SUCCESS.
+// Records the failure of a call that returns an object, where NULL is a failure even with CL_SUCCESS.
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call);
 void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
     __attribute__((format(printf, 4, 5)));
 // Unmaps a buffer that was only read. A failure matters only if a launch follows, which could write to it.
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped);
-// "CALL: STATUS (CODE) on DEVICE: detail", after a failure. Caller frees.
+// Returns "CALL: STATUS (CODE) on DEVICE: detail" after a failure. The caller frees it.
 char *compute_failure_text(const Compute *compute);
-// The same for an unmap that failed with no launch after it; NULL: none did. Caller frees.
+// Returns such a text for an unmap that failed with no launch after it, or NULL if none did. The caller frees
+// it.
 char *compute_unmap_failure_text(const Compute *compute);
 
 typedef struct {
@@ -86,40 +87,42 @@ typedef struct {
 void program_options_append(Text *text, const Device *device, const char *options);
 
 // Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
-// (host/opencl/cache.h) or builds it. The key: text, options, launch (NULL: the work-group of --work-group),
-// device name, driver, platform version and the cache's own format version. `no_cache` bypasses PoCL's own
-// cache, too. False: failed; where the text does not compile, the detail has the build log and the file in
-// which the composed text was saved. Where both builds fail, the first one's failure is kept.
+// (host/opencl/cache.h) or builds it. The key consists of text, options, launch (NULL: the work-group of
+// --work-group), device name, driver, platform version and the cache's format version. `no_cache` also
+// bypasses PoCL's cache. Returns false if it failed. Where the text does not compile, the detail has the
+// build log and the file in which the composed text was saved. Where both builds fail, the first one's
+// failure is kept.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
 // Writes the program to the cache, unless it came from there. Call after its first launch has ended: PoCL
 // compiles a kernel at its first launch, a binary holds what was launched by then, and a program loaded from
 // it returns that same binary forever (3.1; hence `launch` in the key).
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
-// NULL: failed. Released with clReleaseKernel.
+// Returns NULL if it failed. clReleaseKernel releases it.
 cl_kernel program_kernel(Compute *compute, const Program *program, const char *name);
 void program_close(Program *program);
 
-// The key of the cache for a request's program. Caller frees.
+// Returns the key of the cache for a request's program. The caller frees it.
 char *program_key(const Device *device, const ProgramRequest *request);
 
-// Composes only; for tests and hashes. NULL if `root` or an include is not embedded. Caller frees.
+// Composes only, for tests and hashes. Returns NULL if `root` or an include is not embedded. The caller frees
+// it.
 char *program_text(const char *root, const char *prelude);
 
-// A buffer of at least one byte; `bytes` NULL: not initialized. NULL: failed; the detail compares the size
-// with the device's memory. Released with buffer_release.
+// Creates a buffer of at least one byte, not initialized if `bytes` is NULL. Returns NULL if that failed; the
+// detail then compares the size with the device's memory. buffer_release releases it.
 cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags);
 void buffer_release(cl_mem buffer); // accepts NULL
 // Copies the first `size` bytes and waits. On failure buffer_read leaves `bytes` undefined.
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
-// Returns memory to which to write `size` bytes of a buffer's new contents, at least 1, that begin at
-// `begin`; NULL if the device failed. buffer_write_mapped hands them over.
+// Returns memory to which to write `size` bytes of a buffer's new contents, at least 1, from `begin`, or NULL
+// if the device failed. buffer_write_mapped hands them over.
 void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size);
 void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
 
-// A read-only buffer of bytes of memory_allocate_large. Takes ownership of them, even on failure: a CPU may
-// read large contents in place, other devices get a copy. Fails as buffer_create does.
+// Creates a read-only buffer of bytes of memory_allocate_large and takes ownership of them, even on failure:
+// a CPU may read large contents in place, other devices get a copy. Fails as buffer_create does.
 cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
 
 // One command's time by its event and by the host's clock.
@@ -139,23 +142,23 @@ typedef struct {
 // exceed those by the timer's resolution and 1 %.
 LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
 
-// Why the event's times are not trusted, or NULL where they are.
+// Returns why the event's times are not trusted, or NULL if they are.
 const char *launch_time_doubt(const LaunchTime *time);
 
 // Halves the longest side of a work-group, the last among equals, until it has at most `largest` work-items
 // and no side exceeds its own limit.
 void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const size_t *longest_sides);
 
-// Enqueues over `items` and waits; zeros: failed. `group`, the preferred work-group, is reduced to fit the
-// device and the kernel, and the work-items are rounded up to whole groups, so a kernel must not rely on
-// either. NULL: the runtime's choice, nothing rounded.
+// Enqueues over `items` and waits. Returns zeros if that failed. `group`, the preferred work-group, is
+// reduced to fit the device and the kernel, and the work-items are rounded up to whole groups, so a kernel
+// must not rely on either. With NULL the runtime chooses, and nothing is rounded.
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
                          const size_t *group);
-// Launches as kernel_launch does, with global ids that begin at `first`; NULL: at 0.
+// Launches as kernel_launch does, with global ids that begin at `first`, or at 0 if it is NULL.
 LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
                               const size_t *items, const size_t *group);
-// Waits for the event of `command`, the OpenCL function that enqueued it, reads and releases it; `host_start`
-// is clock_seconds() before the enqueue. Zeros: failed.
+// Waits for the event of `command`, the OpenCL function that enqueued it, reads and releases it. `host_start`
+// is clock_seconds() before the enqueue. Returns zeros if that failed.
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start);
 
 // Sets argument `index`, with the kernel's name in the detail of a failure.

@@ -12,8 +12,9 @@
 #include <string.h>
 #include <strings.h>
 
-// Whether a call succeeded; keeps the first failure. No device and no platform is none, and neither is a
-// property that the runtime does not know (CL_INVALID_VALUE), such as the format of double without fp64.
+// Returns whether a call succeeded, and keeps the first failure. That there is no device or platform is not a
+// failure, and neither is a property that the runtime does not know (CL_INVALID_VALUE), such as the format of
+// double without fp64.
 static bool list_check(DeviceList *list, cl_int status, const char *call)
 {
     fault_note_call(NULL);
@@ -58,13 +59,13 @@ static char *device_text(DeviceList *list, cl_device_id id, cl_device_info what)
     return text;
 }
 
-// The same for numbers: `value` is zero before, and after a failure.
+// Queries a number. A failure sets `value` to 0.
 #define device_number(list, id, what, value)                                                                 \
     do {                                                                                                     \
         if (!device_query((list), (id), (what), sizeof *(value), (value), NULL)) *(value) = 0;               \
     } while (0)
 
-// The first three of up to eight dimensions.
+// Queries the first three of up to eight dimensions.
 static void device_sides(DeviceList *list, cl_device_id id, size_t longest[3])
 {
     size_t sides[8] = {0};
@@ -79,7 +80,7 @@ static bool device_flag(DeviceList *list, cl_device_id id, cl_device_info what)
     return flag != CL_FALSE;
 }
 
-// Whether `name` is a whole word of the blank-separated list.
+// Returns whether `name` is a whole word of the blank-separated list.
 static bool extensions_have(const char *extensions, const char *name)
 {
     size_t length = strlen(name);
@@ -163,7 +164,7 @@ static void device_identify(DeviceList *list, Device *device)
                         : memory_copy_text("");
 }
 
-// What 32 bits can address of a size in bytes; 0: unknown.
+// Limits a size in bytes to what 32 bits can address; 0 is unknown and becomes the limit.
 static uint64_t addressable(uint64_t bytes)
 {
     return bytes == 0 || bytes > UINT32_MAX ? UINT32_MAX : bytes;
@@ -240,15 +241,15 @@ static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device
     array_push(*list, device);
 }
 
-// PoCL reads this when it compiles a kernel for its first launch. A kernel specialized for one work-group
-// size is no faster here than the generic one, which its binaries need in any case: this avoids compiling
-// both.
+// Sets a variable that PoCL reads when it compiles a kernel for its first launch. A kernel specialized for
+// one work-group size is not faster here than the generic one, which its binaries need in any case, so this
+// avoids compiling both.
 static void pocl_compile_once(void)
 {
     setenv("POCL_WORK_GROUP_SPECIALIZATION", "0", false);
 }
 
-// The platform's devices, which the caller frees.
+// Returns the platform's devices, which the caller frees.
 static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform, cl_uint *count)
 {
     *count = 0;
@@ -346,7 +347,7 @@ const char *device_selector(const char *option)
     return selector && selector[0] != '\0' ? selector : NULL;
 }
 
-// GPUs before CPUs before the rest.
+// Ranks GPUs before CPUs before the rest.
 static int device_rank(const Device *device)
 {
     return device->type & CL_DEVICE_TYPE_GPU ? 2 : device->type & CL_DEVICE_TYPE_CPU ? 1 : 0;
@@ -357,7 +358,8 @@ static bool is_number(const char *selector)
     return selector[0] != '\0' && selector[strspn(selector, "0123456789")] == '\0';
 }
 
-// A number must match a whole number of the name: the index 51 does not match "haswell-avx512".
+// Returns whether the name contains the selector. A number must match a whole number of the name: the index
+// 51 does not match "haswell-avx512".
 static bool name_matches(const char *name, const char *selector)
 {
     if (!is_number(selector)) return strcasestr(name, selector) != NULL;
@@ -386,7 +388,7 @@ static bool device_matches(const Device *device, const char *selector)
            (selector[0] != '\0' && strcasecmp(device->uuid, selector) == 0);
 }
 
-// Whether the selector is the index of a device: "3090" may still be a part of a name.
+// Returns whether the selector is the index of a device: "3090" may be a part of a name instead.
 static bool selector_is_index(const DeviceList *list, const char *selector, size_t *index)
 {
     if (!selector || !is_number(selector)) return false;

@@ -41,52 +41,54 @@ typedef struct {
 typedef struct {
     Device *items;
     size_t count, capacity;
-    unsigned platform_count, empty_platform_count; // empty: without a device, which is no error
+    unsigned platform_count, empty_platform_count; // empty: without a device, which is not an error
     const char *failed_call;                       // the first call that failed, or NULL
     cl_int failed_status;
 } DeviceList;
 
-// Queries all platforms. Without any the list is empty, which is no failure. Sets PoCL's environment variable
-// POCL_WORK_GROUP_SPECIALIZATION unless it is set.
+// Queries all platforms. Without any the list is empty, which is not a failure. Sets PoCL's environment
+// variable POCL_WORK_GROUP_SPECIALIZATION unless it is set.
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
-// "CALL: STATUS (CODE)", or NULL if no call failed. Caller frees.
+// Returns "CALL: STATUS (CODE)", or NULL if no call failed. The caller frees it.
 char *device_list_failure_text(const DeviceList *list);
 
-// `selector`: an index, a part of the device's, board's or platform's name (any case; a number only as a
-// whole), the device's place on the PCI bus (with or without the domain), its UUID, "cpu", "gpu", or NULL for
-// the default: a GPU if there is one, else a CPU, else any device. Considers only devices that are usable; of
-// identical ones, chooses the first. NULL, with an error message, if none matches: the message lists the
-// devices, or says how to install PoCL if there are none.
+// Returns the device that `selector` names: an index, a part of the device's, board's or platform's name (any
+// case; a number only as a whole), the device's place on the PCI bus (with or without the domain), its UUID,
+// "cpu", "gpu", or NULL for the default: a GPU if there is one, else a CPU, else any device. Considers only
+// devices that are usable, and chooses the first of identical ones. Returns NULL with an error message if
+// none matches. The message lists the devices, or tells how to install PoCL if there are none.
 const Device *device_choose(const DeviceList *list, const char *selector, MessageList *messages);
 
-// The devices of `selector`: "all" of them, or those of a list with commas between selectors as above.
-// Returns their number; 0, with an error message, if none matches one of the selectors or a device is listed
-// twice. The caller frees *devices.
+// Finds the devices of `selector`: "all" of them, or those of a list with commas between selectors of single
+// devices. Returns their number, or 0 with an error message if none matches one of the selectors or a device
+// is listed twice. The caller frees *devices.
 size_t devices_choose(const DeviceList *list, const char *selector, const Device ***devices,
                       MessageList *messages);
 
-// The device that works in double for one that cannot: that of `selector`, or for NULL the default among
-// those with 64-bit floating point. Returns NULL, with an error message about the selector, if there is none.
+// Returns the device that works in double for one that cannot: that of `selector`, or for NULL the default
+// among those with 64-bit floating point. Returns NULL with an error message about the selector if there is
+// none.
 const Device *device_choose_reference(const DeviceList *list, const char *selector, MessageList *messages);
 
-// The selector the user gave: `option`, else the environment variable GLINT_DEVICE if it is not empty, else
-// NULL.
+// Returns the selector that the user gave: `option`, else the environment variable GLINT_DEVICE if it is not
+// empty, else NULL.
 const char *device_selector(const char *option);
 
-// Whether the device can build and run kernels, and its arithmetic is what they need; if not, *why (may be
-// NULL) says what is missing.
+// Returns whether the device can build and run kernels, and its arithmetic is what they need. Otherwise sets
+// *why, which may be NULL, to what is missing.
 bool device_usable(const Device *device, const char **why);
 
-// The default number of rays per work-item: on a CPU the native vector width of float, or of double where
-// `is_double`, rounded down to 1, 4, 8 or 16; elsewhere 1.
+// Returns the default number of rays per work-item: on a CPU the native vector width of float, or of double
+// where `is_double`, rounded down to 1, 4, 8 or 16, elsewhere 1.
 unsigned device_lanes(const Device *device, bool is_double);
 
-// What may give the device 64-bit floating point, to be appended to a message that it has none; else "".
+// Returns what may give the device 64-bit floating point, to be appended to a message that it has none,
+// otherwise "".
 const char *device_fp64_hint(const Device *device);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
 
 const char *cl_status_name(cl_int status); // "CL_SUCCESS", …
-// What a status of an OpenCL function means, in words; NULL: no more than its name.
+// Returns the meaning of a status of an OpenCL function in words, or NULL if there is no more than its name.
 const char *cl_status_meaning(const char *function, cl_int status);

@@ -68,7 +68,7 @@ double exact_rounded(bool is_double, Exact exact, RoundingMode rounding)
     return exact.nearest;
 }
 
-// Of a normal double.
+// Returns the ulp of a normal double.
 static double ulp_of(bool is_double, double value)
 {
     const uint64_t exponent_bits = UINT64_C(0x7ff0000000000000);

@@ -13,7 +13,7 @@ typedef enum {
     ROUNDING_OTHER
 } RoundingMode;
 
-// nearest + rest without error; nearest is rounded to nearest.
+// A value as nearest + rest without error; nearest is rounded to nearest.
 typedef struct {
     double nearest, rest;
 } Exact;
@@ -22,11 +22,11 @@ typedef struct {
 Exact exact_sum(bool is_double, double a, double b);
 Exact exact_product(bool is_double, double a, double b);
 double exact_fma(bool is_double, double a, double b, double c); // rounded once, to nearest
-// What rounding in that mode, but for ROUNDING_OTHER, makes of it.
+// Returns the result of rounding in that mode, which is not ROUNDING_OTHER.
 double exact_rounded(bool is_double, Exact exact, RoundingMode rounding);
 
-// In ulp of the result: 0.5 for every one that is correctly rounded, more for the others. Operands are
-// positive and all normal; infinite for a result that is not.
+// Returns the error in ulp of the result: 0.5 if it is correctly rounded, otherwise more. Operands are
+// positive and normal. Returns infinity for a result that is not.
 double quotient_error(bool is_double, double a, double b, double quotient);
 double root_error(bool is_double, double a, double root);
 

@@ -28,7 +28,7 @@ const char *launch_time_doubt(const LaunchTime *time)
     return "the event is longer than the host waited for it";
 }
 
-// Zero where the runtime has none.
+// Reads a time of the event, zero where the runtime has none.
 static cl_ulong event_timestamp(cl_event event, cl_profiling_info what)
 {
     cl_ulong nanoseconds = 0;

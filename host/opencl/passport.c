@@ -93,7 +93,7 @@ static void passport_store(const Passport *passport, const Device *device)
     free(key);
 }
 
-// NULL: not known.
+// Returns the passport, or NULL if it is not known.
 static Passport *passport_find(const Device *device, PassportMode mode, uint32_t lanes)
 {
     for (size_t i = 0; i < passport_count(device); i++) {

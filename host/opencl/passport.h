@@ -35,7 +35,7 @@ typedef struct {
     uint64_t step_nanoseconds; // the greatest common divisor of all times; 0: unknown
 } TimerFindings;
 
-// Of one mode at one vector width.
+// The passport of one mode at one vector width.
 typedef struct {
     PassportMode mode;
     uint32_t lanes;
@@ -61,12 +61,13 @@ typedef struct {
 // Fused hardware takes about half of the time of a product and a sum, an emulation dozens of times that.
 #define PASSPORT_FMA_COST_MAX 8.0
 
-// The compiler's options of a mode on a device.
+// Returns the compiler's options of a mode on a device.
 const char *passport_build_options(const Device *device, PassportMode mode);
 
-// The passport of a mode and width: measured before in this process, or from the cache, or measured now.
-// Thorough ones take up to PASSPORT_SECONDS_MAX, the others some hundredths, and both a build. NULL: the
-// device failed. Lives as long as the device's list. Not for two threads with one device.
+// Returns the passport of a mode and width: measured before in this process, loaded from the cache, or
+// measured now. Thorough ones take up to PASSPORT_SECONDS_MAX, the others some hundredths, and both a build.
+// Returns NULL if the device failed. It lives as long as the device's list. Two threads must not call this
+// for one device.
 const Passport *passport_acquire(Compute *compute, PassportMode mode, uint32_t lanes, bool is_thorough,
                                  bool no_cache);
 // Measures all modes that the device has at their default widths thoroughly, and replaces those of the cache.
@@ -74,17 +75,17 @@ bool passports_measure(Compute *compute);
 // Loads what the cache has of all modes at the default widths; measures nothing.
 void passports_recall(const Device *device);
 
-// The passports of a device that are known, in the order in which they became so.
+// The passports of a device that are known, in the order in which they were acquired.
 typedef struct DevicePassports DevicePassports;
 DevicePassports *device_passports_open(void);
 void device_passports_close(DevicePassports *passports); // accepts NULL
 size_t passport_count(const Device *device);
 const Passport *passport_at(const Device *device, size_t index);
 
-// Whether quotients and roots are correctly rounded by the driver's promise, which nothing refuted.
+// Returns whether the driver promises correctly rounded quotients and roots, and nothing refuted that.
 bool passport_rounds_correctly(const Passport *passport);
 
-// Why the events' times of the device are not trusted; NULL: they are, or nothing is known.
+// Returns why the events' times of the device are not trusted, or NULL if they are or nothing is known.
 const char *passport_timer_fault(const Device *device);
 
 // Each property has a finding: as it should be; unusual, which glint allows for; or broken, which the
@@ -110,7 +111,7 @@ extern const char *const property_names[PROPERTY_COUNT];
 
 // Appends what was found.
 Finding passport_finding(const Passport *passport, Property property, Text *text);
-// Appends the first broken property and what was found; false: none is broken.
+// Appends the first broken property and what was found. Returns false if none is broken.
 bool passport_broken(const Passport *passport, Text *text);
-// Appends everything that is not sound, for a line of a report; false: there is nothing.
+// Appends everything that is not sound, for a line of a report. Returns false if there is nothing.
 bool passports_abnormal(const Device *device, Text *text);

@@ -70,8 +70,8 @@ static void contraction_measure(Measurement *measurement)
     }
 }
 
-// Whether real_fma of the kernel in use rounds once, also where the product nearly cancels, or the addend is
-// half an ulp of it, or far below.
+// Returns whether real_fma of the kernel in use rounds once, also where the product nearly cancels, or the
+// addend is half an ulp of it, or far below.
 static bool fma_is_exact(Measurement *measurement)
 {
     const bool is_double = measurement->is_double;
@@ -187,7 +187,7 @@ static void specials_measure(Measurement *measurement)
         measurement->passport->has_infinities_and_nans &= same_value(values[i], cases[i].expected);
 }
 
-// As results and as operands.
+// Measures subnormals as results and as operands.
 static void subnormals_measure(Measurement *measurement)
 {
     const double least = measurement->is_double ? DBL_MIN : FLT_MIN; // the smallest normal real

@@ -7,7 +7,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-// Mantissas.
+// Numbers of mantissas.
 enum {
     SWEEP_MIN = 1 << 8, // of the first launch: Oclgrind interprets some hundred thousand operations a second
     QUICK_SWEEP = 1 << 14,  // of a sweep that is not thorough
@@ -108,7 +108,7 @@ static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint
     return done == count;
 }
 
-// Random operands, whose exponents differ.
+// Measures random operands, whose exponents differ.
 static void quotients_probe(Measurement *measurement)
 {
     Passport *passport = measurement->passport;

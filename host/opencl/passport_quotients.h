@@ -1,4 +1,4 @@
-// How exactly a device divides and takes square roots.
+// Measures how exactly a device divides and takes square roots.
 #pragma once
 
 #include "host/opencl/passport_probe.h"

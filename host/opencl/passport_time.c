@@ -78,7 +78,8 @@ static uint64_t greatest_divisor(uint64_t a, uint64_t b)
     return a;
 }
 
-// The largest share of the host's seconds that an event has, among launches that are long enough for that.
+// Returns the largest share of the host's seconds that an event has, among launches that are long enough for
+// that.
 static double timer_ratio(const Measurement *measurement)
 {
     double ratio = 0;

@@ -24,7 +24,8 @@ void program_options_append(Text *text, const Device *device, const char *option
     if (device->build_options) text_appendf(text, " %s", device->build_options);
 }
 
-// All that the compiled program depends on. The native width distinguishes processors of the same name.
+// Returns a key of all that the compiled program depends on. The native width distinguishes processors of the
+// same name. The caller frees it.
 static char *request_key(const Device *device, const ProgramRequest *request, const char *text)
 {
     Text key = {0};
@@ -59,7 +60,8 @@ static char *build_log(const Compute *compute, cl_program program)
     return log;
 }
 
-// Saves the text for the reader of the build log. Caller frees the path, or what replaces it in a message.
+// Saves the text for the reader of the build log. The caller frees the path, or what replaces it in a
+// message.
 static char *save_text(const char *text)
 {
     char path[4096];
@@ -72,7 +74,8 @@ static char *save_text(const char *text)
     return memory_copy_text(written ? path : "could not be saved");
 }
 
-// Where drivers keep what they compile: PoCL's own variable, then the XDG Base Directory Specification.
+// Describes the disk where drivers keep what they compile: PoCL's variable, then the XDG Base Directory
+// Specification.
 static void describe_cache_disk(Text *text)
 {
     const char *pocl = getenv("POCL_CACHE_DIR"), *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
@@ -131,7 +134,7 @@ static void build_report(Compute *compute, Build *build, const char *text, const
     build_release(build);
 }
 
-// PoCL has a cache of its own, with the options in its key: an option never used before makes it build.
+// Adds an option that was never used before, which makes PoCL build: its cache has the options in its key.
 static void append_unused_option(Text *options)
 {
     struct timespec now;
@@ -166,8 +169,8 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     return build;
 }
 
-// Processes that build the same program at once can fail in PoCL's cache (3.1: one removes the file that
-// another reads), so a build counts as failed only if it fails outside that cache, too.
+// Builds the program. Processes that build the same one at once can fail in PoCL's cache (3.1: one removes
+// the file that another reads), so a build counts as failed only if it also fails outside that cache.
 static Build build_with_retry(Compute *compute, const char *text, const ProgramRequest *request)
 {
     Build build = {0};
@@ -179,7 +182,7 @@ static Build build_with_retry(Compute *compute, const char *text, const ProgramR
     return build_from_source(compute, text, request, true);
 }
 
-// Without a program if the driver refuses the binary.
+// Loads a binary. Leaves no program if the driver refuses it.
 static Build build_from_binary(const Compute *compute, const Text *binary, const ProgramRequest *request)
 {
     Build build = {0};

@@ -1,4 +1,4 @@
-// Boxes along the axes.
+// Axis-aligned boxes.
 #pragma once
 
 #include "host/scene/vector.h"
@@ -27,7 +27,7 @@ static inline Bounds bounds_join(Bounds a, Bounds b)
     return (Bounds){vector_min(a.min, b.min), vector_max(a.max, b.max)};
 }
 
-// What both hold; empty where they are apart.
+// Returns the intersection, which is empty where the boxes are apart.
 static inline Bounds bounds_intersect(Bounds a, Bounds b)
 {
     Bounds both = {vector_max(a.min, b.min), vector_min(a.max, b.max)};
@@ -46,15 +46,15 @@ static inline Bounds bounds_of_triangle(Vector3 a, Vector3 b, Vector3 c)
     return (Bounds){vector_min(vector_min(a, b), c), vector_max(vector_max(a, b), c)};
 }
 
-// Half extents of a circle of radius 1 across the unit vector n. Along each axis: as far as that axis'
-// projection into the circle's plane is long, sqrt(1 - n_x^2), here as the length of n's other components,
-// which does not cancel.
+// Returns the half extents of a circle of radius 1 across the unit vector n. The extent along an axis is the
+// length of its projection into the circle's plane, sqrt(1 - n_x^2), here computed as the length of n's other
+// components, which does not cancel.
 static inline Vector3 circle_half_extents(Vector3 n)
 {
     return (Vector3){hypotenuse(n.y, n.z), hypotenuse(n.x, n.z), hypotenuse(n.x, n.y)};
 }
 
-// `normal` need not be unit.
+// Bounds a disc. `normal` need not be a unit vector.
 static inline Bounds bounds_of_disc(Vector3 center, Vector3 normal, double radius)
 {
     return bounds_around(center, vector_scale(circle_half_extents(vector_normalize(normal)), radius));

@@ -1,13 +1,14 @@
-// Objects in words, for people who look for them in a scene's file.
+// Describes objects in words, for people who look for them in a scene's file.
 #pragma once
 
 #include "host/scene/scene.h"
 
-// The object that has an id (see object_primitive_count), and which of its primitives that is. NULL: none.
+// Returns the object that has an id (see object_primitive_count) and which of its primitives that is, or NULL
+// if there is none.
 const Object *scene_find_object(const Scene *scene, size_t id, size_t *primitive);
-// The index of the material of one of an object's primitives.
+// Returns the index of the material of one of an object's primitives.
 uint32_t object_material(const Scene *scene, const Object *object, size_t primitive);
-// Such as `sphere 12, scene.yaml:9, material red`, or `triangle 3 of mesh 12, bunny.ply, scene.yaml:9,
-// material red`, where 12 is the first id of the object, and `path` is the scene's file. "nothing" without an
-// object.
+// Returns a text such as `sphere 12, scene.yaml:9, material red` or `triangle 3 of mesh 12, bunny.ply,
+// scene.yaml:9, material red`, where 12 is the first id of the object and `path` is the scene's file, or
+// "nothing" without an object.
 void object_describe(Text *text, const Scene *scene, const char *path, size_t id);

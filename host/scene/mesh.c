@@ -56,8 +56,8 @@ static void vertex_move(Mesh *mesh, size_t to, size_t from)
 
 static const uint32_t none = UINT32_MAX;
 
-// The vertices that stay move forward in place; `joined[i]`, none where vertex i is not used, becomes where
-// it has gone.
+// Moves the vertices that stay forward in place. `joined[i]`, none where vertex i is not used, becomes the
+// new index.
 static size_t vertices_join(Mesh *mesh, uint32_t *joined)
 {
     size_t slot_count = 16;
@@ -151,10 +151,10 @@ static void parts_make(void *context, size_t begin, size_t end)
     }
 }
 
-// Weighted by the angle at the vertex, which makes the normal independent of how a polygon was cut into
+// Weights by the angle at the vertex, which makes the normal independent of how a polygon was cut into
 // triangles (Thuermer, Wuethrich, Computing vertex normals from polygonal facets, Journal of Graphics Tools
-// 3(1), 1998). The triangles' parts are made by threads, some at a time, and added in order: the sums are the
-// same on any machine.
+// 3(1), 1998). Threads make the triangles' parts, some at a time, which are added in order, so the sums are
+// the same on any machine.
 void mesh_make_normals(Mesh *mesh)
 {
     enum { PARTS_MAX = 1 << 16, PARTS_OF_THREAD_MIN = 1 << 10 };

@@ -1,15 +1,16 @@
-// Meshes: their vertices joined and made smooth.
+// Joins the vertices of meshes and makes meshes smooth.
 #pragma once
 
 #include "host/scene/scene.h"
 
 void mesh_free(Mesh *mesh); // and zeroes
 
-// Vertices that agree in all their numbers become one, and those of no triangle go; 0 and -0 agree.
+// Joins vertices that agree in all their numbers, 0 and -0 included, and removes those of no triangle.
 void mesh_join_vertices(Mesh *mesh);
 
-// Gives the vertices normals: of the triangles around them, by angle. Zero where no triangle has an area.
+// Sets each vertex normal to the mean of the triangles around it, weighted by angle, or to zero where none of
+// them has an area.
 void mesh_make_normals(Mesh *mesh);
 
-// How many triangles have no area.
+// Returns how many triangles have no area.
 size_t mesh_degenerate_count(const Mesh *mesh);

@@ -17,9 +17,9 @@ static ExactSum exact_sum(double a, double b)
     return (ExactSum){sum, (a - (sum - part)) + (b - part)};
 }
 
-// The orientation's terms multiplied out, each product an exact pair, added up without loss as an expansion
-// whose last nonzero component has its sign (Shewchuk, Adaptive precision floating-point arithmetic and fast
-// robust geometric predicates, Discrete & Computational Geometry 18, 1997, section 2.4).
+// Multiplies the orientation's terms out, each product an exact pair, and adds them up without loss as an
+// expansion whose last nonzero component has its sign (Shewchuk, Adaptive precision floating-point arithmetic
+// and fast robust geometric predicates, Discrete & Computational Geometry 18, 1997, section 2.4).
 static int orientation_exact(const double a[2], const double b[2], const double c[2])
 {
     const double factors[6][2] = {{a[0], b[1]},  {-a[1], b[0]}, {b[0], c[1]},
@@ -79,7 +79,7 @@ Vector3 triangle_normal_signs(Vector3 a, Vector3 b, Vector3 c)
     return (Vector3){signs[0], signs[1], signs[2]};
 }
 
-// What is left of the polygon: a ring of corners, projected to a coordinate plane so that it turns left.
+// The remaining polygon: a ring of corners, projected to a coordinate plane so that it turns left.
 typedef struct {
     double (*points)[2];
     uint32_t *next, *previous;
@@ -89,8 +89,9 @@ typedef struct {
     size_t count;  // left in the ring
 } Ring;
 
-// Twice the area of the polygon's shadow on each coordinate plane (Newell's method: Sutherland, Sproull and
-// Schumacker, A characterization of ten hidden-surface algorithms, 1974), from the first corner.
+// Returns twice the area of the polygon's projection to each coordinate plane (Newell's method: Sutherland,
+// Sproull and Schumacker, A characterization of ten hidden-surface algorithms, 1974), relative to the first
+// corner.
 static Vector3 polygon_normal(const Vector3 *corners, size_t count)
 {
     Vector3 normal = {0, 0, 0};
@@ -134,7 +135,8 @@ static int ring_turn(const Ring *ring, uint32_t corner)
                              ring->points[ring->next[corner]]);
 }
 
-// Whether a point lies in a triangle that turns left, or on its edges where they count. Its corners do not.
+// Returns whether a point lies in a triangle that turns left, or on its edges where they count. The
+// triangle's corners do not.
 static bool triangle_holds(const double *a, const double *b, const double *c, const double *point,
                            bool edges_count)
 {
@@ -147,7 +149,7 @@ static bool triangle_holds(const double *a, const double *b, const double *c, co
            plane_orientation(c, a, point) >= lowest;
 }
 
-// Whether the corner can be cut off: it turns left, and nothing of the polygon lies in its triangle.
+// Returns whether the corner can be cut off: it turns left, and nothing of the polygon lies in its triangle.
 static bool corner_is_ear(const Ring *ring, uint32_t corner)
 {
     if (ring_turn(ring, corner) <= 0) return false;
@@ -160,7 +162,7 @@ static bool corner_is_ear(const Ring *ring, uint32_t corner)
     return true;
 }
 
-// A corner that coincides with a neighbor, or at which the edge runs back on itself.
+// Returns whether the corner coincides with a neighbor, or the edge runs back on itself there.
 static bool corner_is_spike(const Ring *ring, uint32_t corner)
 {
     const double *before = ring->points[ring->previous[corner]], *after = ring->points[ring->next[corner]];
@@ -188,8 +190,8 @@ static void ring_unlink(Ring *ring, uint32_t corner)
     ring->count--;
 }
 
-// Takes a corner out. Only its neighbors can become ears by that, or cease to be (Eberly, Triangulation by
-// ear clipping, 2002).
+// Removes a corner. Only its neighbors can become ears by that, or cease to be (Eberly, Triangulation by ear
+// clipping, 2002).
 static void ring_remove(Ring *ring, uint32_t corner)
 {
     uint32_t before = ring->previous[corner], after = ring->next[corner];
@@ -208,7 +210,7 @@ static void ring_clip(Ring *ring, uint32_t corner, PolygonTriangles *triangles)
     ring_remove(ring, corner);
 }
 
-// The first ear from `at` on. False: there is none.
+// Finds the first ear from `at` on. Returns false if there is none.
 static bool ring_find_ear(const Ring *ring, uint32_t *ear)
 {
     *ear = ring->at;
@@ -227,7 +229,7 @@ static bool ring_find_spike(const Ring *ring, uint32_t *spike)
     return false;
 }
 
-// Goes round until no corner is one: removing a spike may leave another before it.
+// Goes round until no corner is a spike, because removing one may leave another before it.
 static void ring_remove_spikes(Ring *ring)
 {
     uint32_t corner = ring->at;
@@ -266,8 +268,8 @@ static void ring_close(Ring *ring)
     free(ring->is_ear);
 }
 
-// Ears are cut off one by one: every simple polygon has two (Meisters, Polygons have ears, American
-// Mathematical Monthly 82, 1975), and two without another corner on their edges.
+// Cuts off ears one by one: every simple polygon has two (Meisters, Polygons have ears, American Mathematical
+// Monthly 82, 1975), and two without another corner on their edges.
 static PolygonStatus ring_cut(Ring *ring, PolygonTriangles *triangles)
 {
     PolygonStatus status = POLYGON_CUT;

@@ -1,4 +1,4 @@
-// Flat polygons, concave ones too, cut into triangles that use all their corners.
+// Cuts flat polygons, also concave ones, into triangles that use all their corners.
 #pragma once
 
 #include "host/scene/vector.h"
@@ -21,21 +21,21 @@ typedef struct {
 // so that a neighboring polygon which has it too leaves no gap.
 PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonTriangles *triangles);
 
-// The sign of the area of a, b, c in the plane, positive where they turn left: exact.
+// Returns the exact sign of the area of a, b, c in the plane, positive where they turn left.
 int plane_orientation(const double a[2], const double b[2], const double c[2]);
 
-// The signs of a triangle's normal, (b - a) x (c - a): exact, unless within one axis coordinates differ by
-// more than 2^500 times.
+// Returns the signs of a triangle's normal, (b - a) x (c - a). They are exact, unless coordinates within one
+// axis differ by more than a factor of 2^500.
 Vector3 triangle_normal_signs(Vector3 a, Vector3 b, Vector3 c);
 
-// Whether a component a - b of a normal is not 0 whatever its factors' roundings.
+// Returns whether a component a - b of a normal is nonzero however its factors are rounded.
 static inline bool is_certainly_nonzero(double a, double b)
 {
     const double size = fabs(a) + fabs(b);
     return size > 0x1p-900 && fabs(a - b) > 0x1p-49 * size;
 }
 
-// Whether a triangle's corners are not on one line, exactly, where triangle_normal may round to 0.
+// Returns whether a triangle's corners are not on one line. Exact, where triangle_normal may round to 0.
 static inline bool triangle_has_area(Vector3 a, Vector3 b, Vector3 c)
 {
     const Vector3 ab = vector_subtract(b, a), ac = vector_subtract(c, a);

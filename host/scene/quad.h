@@ -63,7 +63,7 @@ static inline Quad quad_absolute(Quad a)
     return a < 0 ? -a : a;
 }
 
-// The sum of |a_i b_i|: what roundings of a . b are proportional to.
+// Returns the sum of |a_i b_i|, to which roundings of a . b are proportional.
 static inline Quad quad3_dot_magnitude(Quad3 a, Quad3 b)
 {
     return quad_absolute(a.x * b.x) + quad_absolute(a.y * b.y) + quad_absolute(a.z * b.z);
@@ -97,14 +97,14 @@ static inline Quad quad3_length(Quad3 a)
     return quad_root(quad3_dot(a, a));
 }
 
-// The zero vector stays zero.
+// Returns the unit vector, or zero for the zero vector.
 static inline Quad3 quad3_unit(Quad3 a)
 {
     Quad length = quad3_length(a);
     return length > 0 ? quad3_scale(a, 1 / length) : a;
 }
 
-// The world axis least aligned with `a`; the first of equals.
+// Returns the world axis least aligned with `a`, the first of equals.
 static inline Quad3 quad3_least_axis(Quad3 a)
 {
     Quad x = quad_absolute(a.x), y = quad_absolute(a.y), z = quad_absolute(a.z);
@@ -112,7 +112,7 @@ static inline Quad3 quad3_least_axis(Quad3 a)
     return y <= z ? (Quad3){0, 1, 0} : (Quad3){0, 0, 1};
 }
 
-// A unit vector perpendicular to the unit vector `a`.
+// Returns a unit vector perpendicular to the unit vector `a`.
 static inline Quad3 quad3_perpendicular(Quad3 a)
 {
     Quad3 axis = quad3_least_axis(a);

@@ -1,5 +1,5 @@
-// A scene as its file says it: plain arrays in double, world coordinates, no OpenCL.
-// Readers fill it; scene_compile (host/compile) turns it into the device's arrays.
+// A scene as its file describes it: plain arrays in double, world coordinates, no OpenCL. Readers fill it,
+// and scene_compile (host/compile) turns it into the device's arrays.
 #pragma once
 
 #include "host/base/text.h"
@@ -31,7 +31,7 @@ typedef struct {
     double half_angle, penumbra;
 } Light;
 
-// What a texture on a mesh shows beyond its edges.
+// How a texture on a mesh continues beyond its edges.
 typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap;
 
 typedef struct {
@@ -60,7 +60,7 @@ typedef struct {
     bool ignores_alpha; // its format defines its alpha as ignored, or its reader has reported the loss
 } SceneTexture;
 
-// Every shape, by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
+// Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
 // then the mesh.
 #define SCENE_SHAPE_LIST(SHAPE)                                                                              \
     SHAPE(SPHERE, "sphere")                                                                                  \
@@ -80,7 +80,7 @@ typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_COUNT } ShapeKind;
 
 extern const char *const shape_names[SHAPE_COUNT];
 
-// Axes and normals are as the file has them, not made unit, never zero.
+// Axes and normals are those of the file: not normalized, never zero.
 typedef struct {
     ShapeKind kind;
     uint32_t material; // index into the scene's materials
@@ -138,8 +138,8 @@ typedef struct {
     } as;
 } Object;
 
-// Triangles that share vertices, in world coordinates. A mesh is one object in the file; each of its
-// triangles has an id of its own.
+// Triangles that share vertices, in world coordinates. A mesh is one object in the file, and each of its
+// triangles has an id.
 typedef struct {
     Vector3 *vertices;
     Vector3 *normals; // one for each vertex, unit or zero (flat there), or NULL: flat
@@ -152,7 +152,7 @@ typedef struct {
     uint64_t file_device, file_index; // of that file, by whatever name
 } Mesh;
 
-// How a format means its colors: linear light, or values a display takes as they are.
+// How a format defines colors: as linear light, or as values that a display takes unchanged.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 
 typedef struct {
@@ -178,7 +178,7 @@ typedef struct {
         Mesh *items;
         size_t count, capacity;
     } meshes;
-    size_t copied_triangle_count; // of meshes whose file another one is of, too
+    size_t copied_triangle_count; // of meshes whose file another mesh has
     struct {
         SceneTexture *items;
         size_t count, capacity;
@@ -198,25 +198,25 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
 // Bounds the cost of a hostile file.
 enum { SCENE_TEXTURES_MAX = 1000 };
 
-// Returns what a material's `texture` is for the image; materials with the same image share it. `layer` may
-// be NULL, as in SceneTexture. 0: the scene
-// has too many.
+// Returns what a material's `texture` is for the image, which materials with the same image share, or 0 if
+// the scene has too many. `layer` may be NULL, as in SceneTexture.
 uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, size_t offset);
 
-// Adds an object with a material of its own.
+// Adds an object with a separate material.
 void scene_add_object(Scene *scene, Object object, const Material *material);
 
-// Of a scene that has images.
+// Returns the source of messages about a scene that has images.
 Source scene_source(const Scene *scene);
 
-// Whether `path` is the file that the scene was read from, or one of its images or meshes, by whatever name.
+// Returns whether `path` is the file that the scene was read from, or one of its images or meshes, by
+// whatever name.
 bool scene_was_read_from(const Scene *scene, const char *scene_path, const char *path);
 
-// Material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0, shininess 32,
-// ior 1.5.
+// Returns a material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0,
+// shininess 32, ior 1.5.
 Material material_default(void);
-// Lets through the fraction 1 - opacity of the light from behind, unbent, and dims what the surface itself
-// shows by the opacity.
+// Makes a material pass the fraction 1 - opacity of the light from behind, unbent, and dims what the surface
+// itself shows by the opacity.
 void material_set_opacity(Material *material, double opacity);
 // Makes a material without a texture emit light that illuminates nothing else, in a scene whose ambient light
 // is (1, 1, 1), where it replaces the material's ambient light.
@@ -228,6 +228,6 @@ enum { IMAGE_SIDE_MAX = 1 << 20 }; // in pixels
 // aspect ratio, or 16:9.
 void scene_choose_image_size(const Scene *scene, uint32_t *width, uint32_t *height);
 
-// How many ids an object takes: one for each triangle of a mesh, else one.
+// Returns how many ids an object takes: one for each triangle of a mesh, otherwise one.
 size_t object_primitive_count(const Scene *scene, const Object *object);
 size_t scene_primitive_count(const Scene *scene);

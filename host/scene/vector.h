@@ -1,4 +1,4 @@
-// Double vectors of the host.
+// Vectors in double.
 #pragma once
 
 #include <float.h>
@@ -33,7 +33,7 @@ static inline Vector3 vector_scale(Vector3 a, double factor)
     return (Vector3){a.x * factor, a.y * factor, a.z * factor};
 }
 
-// Of each component the lesser, or the greater.
+// Return the lesser, or the greater, of each component.
 static inline Vector3 vector_min(Vector3 a, Vector3 b)
 {
     return (Vector3){b.x < a.x ? b.x : a.x, b.y < a.y ? b.y : a.y, b.z < a.z ? b.z : a.z};
@@ -44,7 +44,7 @@ static inline Vector3 vector_max(Vector3 a, Vector3 b)
     return (Vector3){b.x > a.x ? b.x : a.x, b.y > a.y ? b.y : a.y, b.z > a.z ? b.z : a.z};
 }
 
-// Of its components, without their signs.
+// Returns the largest of the components' magnitudes.
 static inline double vector_largest(Vector3 a)
 {
     return fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
@@ -60,7 +60,7 @@ static inline Vector3 vector_cross(Vector3 a, Vector3 b)
     return (Vector3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-// Twice as long as the triangle's area.
+// Returns the normal, whose length is twice the triangle's area.
 static inline Vector3 triangle_normal(Vector3 a, Vector3 b, Vector3 c)
 {
     return vector_cross(vector_subtract(b, a), vector_subtract(c, a));
@@ -74,7 +74,8 @@ static inline Vector3 vector_scaled_down(Vector3 a, int *exponent)
     return (Vector3){ldexp(a.x, -*exponent), ldexp(a.y, -*exponent), ldexp(a.z, -*exponent)};
 }
 
-// Neither overflows nor underflows. Does not call hypot, which differs in the last bit between processors.
+// Returns the length, without overflow or underflow. Does not call hypot, which differs in the last bit
+// between processors.
 static inline double vector_length(Vector3 a)
 {
     const double square = vector_dot(a, a);
@@ -89,7 +90,7 @@ static inline double hypotenuse(double a, double b)
     return vector_length((Vector3){a, b, 0});
 }
 
-// Unit vector, without overflow or underflow; the zero vector stays zero.
+// Returns the unit vector, without overflow or underflow, or zero for the zero vector.
 static inline Vector3 vector_normalize(Vector3 a)
 {
     if (vector_largest(a) == 0) return a;
@@ -108,7 +109,7 @@ static inline bool vectors_equal(Vector3 a, Vector3 b)
     return a.x == b.x && a.y == b.y && a.z == b.z;
 }
 
-// The world axis least aligned with a direction, the first of x, y, z where several are.
+// Returns the world axis least aligned with a direction, the first of x, y, z where several are.
 static inline Vector3 vector_least_aligned_axis(Vector3 direction)
 {
     double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
