@@ -272,7 +272,7 @@ lint-man:
 	@! groff -man -ww -z -Tutf8 $(man_pages) 2>&1 | grep .
 
 # The folders whose comments are free of what tools/lint-words finds.
-worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] $(foreach room,base image opencl scene,host/$(room)/*.[ch]))
+worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] $(foreach room,base image import opencl scene,host/$(room)/*.[ch] host/$(room)/*/*.[ch]))
 
 lint-words:
 	@tools/lint-words $(worded)

@@ -1,5 +1,5 @@
-// `.cfg`, the scenes of the article's program: blocks such as `=>sphere :` with one key per line.
-// docs/scene-format.md says what is read and tolerated.
+// `.cfg`, the scenes of the program in Mouad Sidqi's Ray Tracing in C explained: blocks such as `=>sphere :`
+// with one key per line. docs/scene-format.md lists what is read and tolerated.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
@@ -9,7 +9,7 @@
 #include <string.h>
 
 static const Range range_radians = {0, M_PI_2, true, "greater than 0 and less than pi/2"};
-// One beyond 255 is cut to it, as that program does.
+// A color above 255 is cut to it, as that program does.
 static const Range range_color = {0, INFINITY, false, "from 0 to 255"};
 static const double COLOR_MAX = 255;
 
@@ -162,7 +162,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     return read && line_end(line);
 }
 
-// Moves to the next nonblank line. False at the end of the source.
+// Moves to the next nonblank line. Returns false at the end of the source.
 static bool line_next_filled(Line *line)
 {
     while (line_next(line, '\0')) {
@@ -204,7 +204,8 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
     return all_read;
 }
 
-// The block opened by a line such as `=>sphere :`. Reports an error and returns NULL if the name is unknown.
+// Returns the block opened by a line such as `=>sphere :`. Reports an error and returns NULL if the name is
+// unknown.
 static const Block *block_find(CfgReader *reader)
 {
     Word arrow = line_word(&reader->line);

@@ -38,8 +38,8 @@ typedef struct {
     } fadings;
 } DatReader;
 
-// Return the next word, on this or a later line, and leave it or move behind it. Empty at the end of the
-// source.
+// Return the next word, on this or a later line, and leave it or move behind it. It is empty at the end of
+// the source.
 Word dat_peek(DatReader *reader);
 Word dat_word(DatReader *reader);
 // Returns whether the word is the keyword, in any case.

@@ -76,7 +76,7 @@ bool dat_finite_cylinder(DatReader *reader)
                       offset);
 }
 
-// Cylinders between successive points, and a sphere at each point.
+// Adds cylinders between successive points, and a sphere at each point.
 bool dat_polycylinder(DatReader *reader)
 {
     const size_t offset = reader->line.start;
@@ -121,7 +121,7 @@ static void mesh_add(DatReader *reader, Mesh *mesh, uint32_t material)
     array_push(reader->scene->objects, object);
 }
 
-// A ring with a hole, as triangles: the circles deviate by less than a ten-thousandth of their radius.
+// Adds a ring with a hole as triangles: the circles deviate by less than a ten-thousandth of their radius.
 static Mesh ring_mesh(Vector3 center, Vector3 normal, double inner, double outer)
 {
     enum { SEGMENTS = 256 };

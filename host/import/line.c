@@ -72,7 +72,7 @@ int word_shown(Word word)
     return word.length < WORD_SHOWN ? (int)word.length : WORD_SHOWN;
 }
 
-// The next word; reports an error if there is none.
+// Returns the next word, or reports an error if there is none.
 static bool line_field(Line *line, const char *name, Word *word)
 {
     *word = line_word(line);

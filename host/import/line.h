@@ -15,14 +15,15 @@ typedef struct {
     size_t next;           // start of the next line
 } Line;
 
-// Positions before the first line of the report's source. Reports an error and returns false if that contains
-// a NUL.
+// Moves before the first line of the report's source. Reports an error and returns false if it contains a
+// NUL.
 bool line_open(Line *line, Report *report);
-// Moves to the next line. Lines end with a newline, a carriage return or both; `comment`: the character that
-// starts a comment, or '\0'. False at the end.
+// Moves to the next line. Lines end with a newline, a carriage return or both; `comment` is the character
+// that starts a comment, or '\0'. Returns false at the end.
 bool line_next(Line *line, char comment);
 
-// Words are separated by spaces, tabs and carriage returns. Empty at the end of the line.
+// Returns the next word, empty at the end of the line. Words are separated by spaces, tabs and carriage
+// returns.
 Word line_peek(const Line *line);
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
@@ -32,9 +33,10 @@ int word_shown(Word word);      // bytes of it that a message shows
 
 // Reads the next word as a number. Reports an error and returns false if it is missing or invalid.
 bool line_number(Line *line, const char *name, const Range *range, double *value);
-// The same for an integer; the range lies within that of unsigned.
+// Reads the next word as an integer, whose range lies within that of unsigned. Reports an error and returns
+// false if it is missing or invalid.
 bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value);
-// Three numbers: one word with commas, or three words.
+// Reads three numbers: one word with commas, or three words.
 bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value);
 bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value);
 // Reports an error and returns false if anything is left on the line.

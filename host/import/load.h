@@ -1,4 +1,4 @@
-// Scene files; the name's ending chooses the reader.
+// Reads scene files; the name's ending chooses the reader.
 #pragma once
 
 #include "host/base/stage.h"
@@ -16,9 +16,9 @@ typedef struct {
     const char *mesh_program;
 } SceneOptions;
 
-// Reads a scene; its ending gives the format (.yaml .yml .rt .cfg .nff .dat, or one of a mesh), or its first
-// word that of .dat. On a mistake in
-// the file returns false with errors in `messages` and an empty scene. Warnings may be added in either case.
+// Reads a scene. Its ending gives the format (.yaml .yml .rt .cfg .nff .dat, or one of a mesh), or its first
+// word that of .dat. On a mistake in the file returns false with errors in `messages` and an empty scene.
+// Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // The readers, from memory; `source->file` is used in messages only.
@@ -28,13 +28,12 @@ bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages);
 
-// A file that mesh_is_known has: its triangles, materials, camera and lights. Without a camera one frames it,
-// without lights there are two.
+// Reads a file that mesh_is_known accepts: its triangles, materials, camera and lights. Without a camera one
+// frames it; without lights there are two.
 bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // Makes a scene of a mesh, which it takes: gray, with a camera that frames it and two lights.
 void scene_of_mesh(Scene *scene, Mesh *mesh);
 
-// For the readers: closes the report. Warns of what makes an image black; frees the scene if there are
-// errors.
+// Closes a reader's report, warns of what makes an image black, and frees the scene if there are errors.
 bool scene_finish(Scene *scene, Report *report);

@@ -1,5 +1,5 @@
 // `.nff`, Eric Haines' Neutral File Format: elements made of words separated by whitespace.
-// docs/scene-format.md says what is read and how lights and materials map to glint's.
+// docs/scene-format.md lists what is read and how lights and materials map to glint's.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
@@ -28,7 +28,8 @@ typedef struct {
 
 static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
-// Moves to the next line with a word on it unless words are left on this one. False at the end of the source.
+// Moves to the next line with a word on it unless words are left on this one. Returns false at the end of the
+// source.
 static bool reach_word(NffReader *reader)
 {
     while (!line_peek(&reader->line).length) {
@@ -214,7 +215,7 @@ static bool read_sphere(NffReader *reader)
     return true;
 }
 
-// A cone, or a cylinder where both radii are equal.
+// Reads a cone, or a cylinder where both radii are equal.
 static bool read_cone(NffReader *reader)
 {
     Vector3 base, apex;
@@ -309,7 +310,8 @@ static bool read_patch(NffReader *reader)
     return read_any_polygon(reader, true);
 }
 
-// Each reads what follows its name up to the end of a line. Reports the first error and returns false.
+// These read what follows an element's name up to the end of a line. They report the first error and return
+// false.
 static const struct {
     const char *name;
     bool (*read)(NffReader *reader);

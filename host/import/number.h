@@ -11,16 +11,16 @@
 
 typedef enum { NUMBER_READ, NUMBER_MALFORMED, NUMBER_TOO_LARGE } NumberStatus;
 
-// The nearest double. Reads exactly `length` bytes: sign, digits with an optional point, exponent; nothing
+// Reads exactly `length` bytes to the nearest double: sign, digits with an optional point, exponent; nothing
 // else (no hex, inf, nan). `value` is set on NUMBER_READ only.
 NumberStatus number_read(const char *text, size_t length, double *value);
-// The same for the longest number that starts at `*text`, which moves behind it unless it is malformed.
+// Reads the longest number that starts at `*text`, which moves behind it unless it is malformed.
 NumberStatus number_scan(const char **text, const char *end, double *value);
 
 typedef struct {
     double low, high;
     bool open;        // excludes the limits
-    const char *must; // what a message says the number must be
+    const char *must; // the requirement as messages state it
 } Range;
 
 extern const Range range_positive, range_not_negative, range_unit, range_byte, range_field_of_view,
@@ -28,6 +28,7 @@ extern const Range range_positive, range_not_negative, range_unit, range_byte, r
 
 bool range_holds(const Range *range, double value);
 
-// Reads the number called `name`; reports an error and returns false if it is invalid. `range` NULL: any.
+// Reads the number called `name`. Reports an error and returns false if it is invalid. A `range` of NULL
+// allows any number.
 bool number_read_field(Report *report, size_t offset, const char *name, const char *text, size_t length,
                        const Range *range, double *value);

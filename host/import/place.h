@@ -14,6 +14,6 @@ typedef struct {
 
 Places places_open(const Source *source);
 void places_close(Places *places);
-// Gives the line of an offset to all objects that were added since the last call. The offsets may be in any
-// order: an alias leads back to where its target stands.
+// Sets the line of an offset in all objects that were added since the last call. Offsets may come in any
+// order, because an alias leads back to its target.
 void places_note(Places *places, Scene *scene, size_t offset);

@@ -52,8 +52,8 @@ static bool message_is_before(const Message *a, const Message *b)
     return a->line != b->line ? a->line < b->line : a->column < b->column;
 }
 
-// Whether the message repeats one from `first` up to `end`: an alias brings in the same mistake several
-// times.
+// Returns whether the message repeats one from `first` up to `end`: an alias brings in the same mistake
+// several times.
 static bool message_is_among(const Message *message, const MessageList *list, size_t first, size_t end)
 {
     for (size_t i = first; i < end; i++) {

@@ -3,7 +3,7 @@
 
 #include "host/base/message.h"
 
-// How many messages about other files a report remembers.
+// The number of messages about other files that a report remembers.
 enum { REPORT_FILE_MESSAGES = 256 };
 
 // A message shows at most this many bytes of a word of the source.
@@ -21,7 +21,7 @@ typedef struct {
 
 Report report_open(const Source *source, MessageList *messages);
 
-// Returns false, as what found the error does.
+// Reports an error and returns false.
 bool report_error(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 void report_warning(Report *report, size_t offset, const char *format, ...)
@@ -31,13 +31,13 @@ void report_warning(Report *report, size_t offset, const char *format, ...)
 // times, in different places.
 bool report_repeats(Report *report, const char *file, unsigned line, unsigned column, const char *text);
 
-// Whether the error limit is reached: a reader stops there, which bounds the time for a hostile file.
+// Returns whether the error limit is reached. A reader then stops, which bounds the time for a hostile file.
 bool report_is_full(const Report *report);
 
-// Closes the report of a file that the source names: its messages, which must be a list of their own, follow
-// those of the source and count as its.
+// Closes the report of a file that the source names. Its messages, which must be in a separate list, follow
+// those of the source and count as the source's.
 void report_include(Report *report, Report *included);
 
-// Sorts the messages into source order, drops repeats and adds a count of those beyond the limit. True if
-// there was no error.
+// Sorts the messages into source order, drops repeats and adds a count of those beyond the limit. Returns
+// true if there was no error.
 bool report_close(Report *report);

@@ -1,5 +1,5 @@
 // `.rt`, the scenes of miniRT: one element per line, fields separated by blanks, vectors by commas.
-// docs/scene-format.md says what is read and tolerated.
+// docs/scene-format.md lists what is read and tolerated.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
@@ -23,7 +23,7 @@ static bool read_color(Line *line, Color *color)
     return true;
 }
 
-// A unit vector; other lengths are common and are normalized. Zero is returned as it is.
+// Reads a unit vector. Other lengths are common and are normalized; zero is returned unchanged.
 static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
 {
     const double tolerated = 0.01; // files round to two or three digits
@@ -43,7 +43,7 @@ static bool read_axis(Line *line, const char *name, Vector3 *axis)
     return !vector_is_zero(*axis);
 }
 
-// The line must end here; with --lenient the rest (such as textures) is skipped.
+// Requires the end of the line; with --lenient the rest (such as textures) is skipped.
 static bool element_end(RtReader *reader)
 {
     if (!reader->lenient) return line_end(&reader->line);
@@ -52,7 +52,7 @@ static bool element_end(RtReader *reader)
     return true;
 }
 
-// Whether specular and shininess follow. With --lenient a single number is an unknown field.
+// Returns whether specular and shininess follow. With --lenient a single number is an unknown field.
 static bool finish_follows(const RtReader *reader)
 {
     Line ahead = reader->line;
@@ -119,7 +119,7 @@ static bool read_only_camera(RtReader *reader)
     return read_camera(reader, &reader->scene->camera);
 }
 
-// The older subject's `c`, which a file may repeat.
+// Reads the older subject's `c`, which a file may repeat.
 static bool read_one_camera(RtReader *reader)
 {
     if (!reader->has_camera) return read_only_camera(reader);
@@ -209,7 +209,7 @@ static bool read_cylinder(RtReader *reader)
     return true;
 }
 
-// The bonus cone: base center, axis towards the tip, height.
+// Reads the bonus cone: base center, axis towards the tip, height.
 static bool read_cone(RtReader *reader)
 {
     Line *line = &reader->line;
@@ -227,7 +227,8 @@ static bool read_cone(RtReader *reader)
     return true;
 }
 
-// A square has one pair of horizontal sides; the subject leaves the rotation about the normal unspecified.
+// Reads a square with one pair of horizontal sides, because the subject leaves the rotation about the normal
+// unspecified.
 static bool read_square(RtReader *reader)
 {
     Vector3 center, normal;
@@ -266,7 +267,7 @@ static bool read_triangle(RtReader *reader)
     return true;
 }
 
-// Each reads the rest of its line. Reports the first error and returns false.
+// These read the rest of their line. They report the first error and return false.
 static const struct {
     const char *name;
     bool (*read)(RtReader *reader);

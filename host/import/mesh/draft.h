@@ -1,5 +1,5 @@
-// A mesh as its file has it, before it is placed in the world. Every reader of meshes fills a draft, which is
-// then checked, cut into triangles, transformed and made one Mesh.
+// A mesh as its file stores it, before it is placed in the world. Every reader of meshes fills a draft, which
+// is then checked, cut into triangles, transformed and made one Mesh.
 #pragma once
 
 #include "host/base/array.h"
@@ -64,13 +64,13 @@ typedef struct {
         DraftMaterialRun *items;
         size_t count, capacity;
     } materials;
-    // The positions that are no numbers, which is an error only where a face uses them.
+    // Positions that are not numbers, which is an error only where a face uses them.
     struct {
         DraftPlace *items;
         size_t count, capacity;
     } unread;
-    // Of each part one more than the largest index that a corner names before the file has that position, uv
-    // or normal: draft_check compares it with how many there are in the end.
+    // For each part one more than the largest index that a corner names before the file has that position, uv
+    // or normal. draft_check compares it with the final number.
     DraftPlace needed[DRAFT_PART_COUNT];
     size_t first_index;   // from which the file counts them, for messages: 0 or 1
     size_t face_start;    // the first corner of the face that is being added
@@ -79,15 +79,15 @@ typedef struct {
 
 extern const char *const draft_part_names[DRAFT_PART_COUNT];
 
-// Reports an error at an offset of the file; always false.
+// Reports an error at an offset of the file and returns false.
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// An error or a warning of the file as a whole, at its name in the scene. The first is always false.
+// Report an error or a warning about the whole file, at its name in the scene. The first returns false.
 bool draft_refuse(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void draft_warn(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 size_t draft_part_count(const MeshDraft *draft, DraftPart part);
-// Gives all corners from this one on a part, and those before none.
+// Sets a part in all corners from this one on, and in none before.
 void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
 void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
 // Makes the part share the indices of the positions, and gives each of the first `count` positions that lacks
@@ -98,8 +98,8 @@ void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
 // no index of it remains.
 void draft_drop_missing(MeshDraft *draft);
 
-// The index, whose place in the file is `offset`, of the next corner; one that the file has later is checked
-// at the end. Position first.
+// Adds the index of the next corner, position first; `offset` is its place in the file. An index that the
+// file defines later is checked at the end.
 static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t index, size_t offset)
 {
     if (index >= draft_part_count(draft, part)) draft_note_index(draft, part, index, offset);
@@ -129,20 +129,21 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner);
 uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, const char *owner);
 
-// Ends the face at the corners since the last one: points and lines are skipped. False: too many corners.
+// Ends the face at the corners since the last one; points and lines are skipped. Returns false if there are
+// too many corners.
 bool draft_end_face(MeshDraft *draft, size_t offset);
 
-// False with an error if a face has corners that are missing or no numbers, or if there are no triangles or
-// too many.
+// Checks the draft. Returns false with an error if a face has corners that are missing or not numbers, or if
+// there are no triangles or too many.
 bool draft_check(MeshDraft *draft);
-// A checked draft as a mesh in the world. Its arrays are used up.
+// Turns a checked draft into a mesh in the world and uses up its arrays.
 void draft_finish(MeshDraft *draft, Mesh *mesh);
 void draft_free(MeshDraft *draft);
 
-// The readers. False with an error.
+// The readers return false with an error.
 bool obj_read(MeshDraft *draft);
 bool ply_read(MeshDraft *draft);
 bool stl_read(MeshDraft *draft);
 bool gltf_read(MeshDraft *draft);
-// By assimp.
+// Reads a file by assimp.
 bool assimp_process_read(MeshDraft *draft);

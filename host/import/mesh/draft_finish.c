@@ -1,5 +1,5 @@
-// From a draft to a mesh: checked, its polygons cut into triangles, placed in the world, and for each
-// combination of position, normal and texture coordinates one vertex.
+// Turns a draft into a mesh: checked, its polygons cut into triangles, placed in the world, with one vertex
+// for each combination of position, normal and texture coordinates.
 #include "host/base/memory.h"
 #include "host/import/mesh/affine.h"
 #include "host/import/mesh/draft.h"
@@ -70,8 +70,8 @@ static bool positions_are_sound(MeshDraft *draft)
     return true;
 }
 
-// Texture coordinates that are no numbers become 0; normals, no normal.
-static void parts_mend(MeshDraft *draft)
+// Replaces texture coordinates that are not numbers by 0, and such normals by no normal.
+static void parts_repair(MeshDraft *draft)
 {
     size_t uv_count = 0, normal_count = 0;
     for (size_t i = 0; i < draft->uvs.count; i++) {
@@ -208,7 +208,7 @@ static void vectors_transform(MeshDraft *draft, const Affine *affine)
     }
 }
 
-// A vertex of the mesh among those of one position.
+// A vertex of the mesh in the list of those with one position.
 typedef struct {
     uint32_t uv, normal, next;
 } Combination;
@@ -345,7 +345,7 @@ bool draft_check(MeshDraft *draft)
 void draft_finish(MeshDraft *draft, Mesh *mesh)
 {
     *mesh = (Mesh){0};
-    parts_mend(draft);
+    parts_repair(draft);
     polygons_cut(draft);
     const Affine affine = affine_of_transform(&draft->import->transform);
     triangles_orient(draft, affine_determinant(&affine) < 0);

@@ -115,8 +115,8 @@ typedef struct {
     size_t count, width;
 } GltfNumbers;
 
-// Reads the accessor that a member names, of scalars or vectors of `width` components. There are
-// no rows without the member. Returns false with an error. The caller frees the rows in either case.
+// Reads the accessor that a member names, of scalars or vectors of `width` components. Without the member the
+// number of rows is 0. Returns false with an error. The caller frees the rows in either case.
 bool gltf_accessor_read(Gltf *gltf, const GltfItem *item, const char *key, size_t width,
                         GltfNumbers *numbers);
 // Finds the bytes of the buffer view that a member names. Returns false with an error.

@@ -1,4 +1,4 @@
-// glTF: buffers, views of them and accessors. Whatever the file claims, nothing is read outside a buffer, and
+// glTF: buffers, views of them and accessors. Whatever the file claims, nothing outside a buffer is read, and
 // memory grows with what the buffers have.
 #include "host/base/base64.h"
 #include "host/base/file.h"
@@ -169,7 +169,7 @@ static size_t component_size(size_t type)
     return type >= GLTF_INT8 && type <= GLTF_FLOAT ? sizes[type - GLTF_INT8] : 0;
 }
 
-// Integers that are normalized stand for -1 or 0 to 1.
+// Reads a component. A normalized integer stands for -1 or 0 to 1.
 static double component_read(const char *bytes, size_t type, bool is_normalized)
 {
     int8_t int8;

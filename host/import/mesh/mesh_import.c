@@ -28,7 +28,7 @@ bool mesh_is_known(const char *path)
     return reader_of(path) != assimp_process_read || assimp_knows(path);
 }
 
-// The text is gone before the draft becomes a mesh, which needs memory too.
+// Frees the text before the draft becomes a mesh, which also needs memory.
 static bool file_read(MeshDraft *draft, Mesh *mesh)
 {
     bool (*read)(MeshDraft *) = reader_of(draft->import->path);
@@ -62,8 +62,8 @@ static void warn_of_triangles(MeshDraft *draft, const Mesh *mesh)
                    draft->crossed_count);
 }
 
-// Of the triangles of files that a scene names again, each of which has a copy: bounds the cost of a hostile
-// file, as SCENE_TEXTURES_MAX does.
+// The most triangles of mesh files that a scene names more than once, each of which has a copy. Bounds the
+// cost of a hostile file, as SCENE_TEXTURES_MAX does.
 enum { COPIED_TRIANGLES_MAX = 1 << 24 };
 
 static bool copies_fit(MeshDraft *draft, Mesh *mesh)

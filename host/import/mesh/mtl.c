@@ -1,5 +1,5 @@
 // Wavefront MTL (Alias|Wavefront, Advanced Visualizer manual, MTL material format, 1995), as far as materials
-// of scenes have it: docs/scene-format.md.
+// of scenes support it (docs/scene-format.md).
 #include "host/import/mesh/mtl.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
@@ -93,7 +93,7 @@ static void name_read(MtlReader *reader, MtlMaterial *previous)
     array_push(reader->materials, material);
 }
 
-// Returns false with a warning where it is not a number of the range.
+// Reads a number. Returns false with a warning if it is not a number of the range.
 static bool number_of_line(MtlReader *reader, const Range *range, double *value)
 {
     double number;
@@ -112,7 +112,7 @@ static bool number_of_line(MtlReader *reader, const Range *range, double *value)
     return true;
 }
 
-// One number stands for three.
+// Reads a color, of which one number stands for three.
 static bool color_of_line(MtlReader *reader, Color *color)
 {
     double numbers[3];
@@ -175,7 +175,7 @@ static void illumination_read(MtlReader *reader, MtlMaterial *material)
     number_of_line(reader, &range_illumination, &material->illumination);
 }
 
-// An option of a texture starts with `-`; up to three numbers or one word are its own.
+// Skips an option of a texture, which starts with `-` and has up to three numbers or one word.
 static bool texture_option_skip(Scan *scan)
 {
     Scan ahead = *scan;
@@ -220,7 +220,8 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
     free(path);
 }
 
-// What a material mostly has where it says nothing by it: no light of its own, no filter.
+// Reads and ignores numbers, with a warning unless they have the value that means no effect: no emission, no
+// filter.
 static void neutral_read(MtlReader *reader, Word word, double neutral)
 {
     double numbers[3] = {neutral, neutral, neutral};
@@ -266,7 +267,7 @@ static void line_read(MtlReader *reader)
         unused_note(&reader->unused, &reader->report, word, "is not used");
 }
 
-// By whatever name.
+// Returns whether the file was read, by whatever name.
 static bool file_was_read(const MtlReader *reader, const struct stat *file)
 {
     for (size_t i = 0; i < reader->files.count; i++)
@@ -275,7 +276,7 @@ static bool file_was_read(const MtlReader *reader, const struct stat *file)
     return false;
 }
 
-// Once for each file, however often it is named.
+// Reads each file once, however often it is named.
 static bool library_read(MtlReader *reader, const char *path)
 {
     struct stat file = {0};
@@ -321,7 +322,7 @@ static bool library_of_word_read(MtlReader *reader, Word name)
     return read;
 }
 
-// The name may have blanks, or be several names.
+// Reads a name that may have blanks, or several names.
 static bool libraries_of_line_read(MtlReader *reader, Word line)
 {
     bool read = library_of_word_read(reader, line);
@@ -332,7 +333,7 @@ static bool libraries_of_line_read(MtlReader *reader, Word line)
     return true;
 }
 
-// The file of the OBJ file's own name stands in for one that is missing.
+// Reads the MTL file with the OBJ file's name in place of one that is missing.
 static bool fallback_read(MtlReader *reader)
 {
     const char *obj_path = reader->draft->import->path;
@@ -368,7 +369,7 @@ static int name_compare(const void *name, const void *material)
     return order != 0 ? order : other->name[word->length] == '\0' ? 0 : -1;
 }
 
-// The image times the diffuse color is what a surface has by MTL.
+// Multiplies the image by the diffuse color, as MTL defines.
 static void texture_use(MeshDraft *draft, MtlMaterial *material)
 {
     if (!material->image) return;

@@ -20,7 +20,7 @@ static size_t offset_of(const ObjReader *reader)
     return scan_offset(&reader->scan);
 }
 
-// Numbers up to the first word that is none. Whether that is the line's end.
+// Reads numbers up to the first word that is not one. Returns whether that is the line's end.
 static bool numbers_read(ObjReader *reader, double *numbers, int most, int *count)
 {
     for (*count = 0; scan_more(&reader->scan); ++*count)
@@ -95,7 +95,7 @@ static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t
     return true;
 }
 
-// The next index, of a vertex or behind a slash: from 1, or below 0 back from the last one so far.
+// Reads the next index, of a vertex or behind a slash: from 1, or below 0 back from the latest one.
 static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
 {
     enum { DIGITS_MAX = 18 };
@@ -117,7 +117,7 @@ static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
     return true;
 }
 
-// `v`, `v/vt`, `v//vn` or `v/vt/vn`.
+// Reads a corner: `v`, `v/vt`, `v//vn` or `v/vt/vn`.
 static bool corner_read(ObjReader *reader)
 {
     static const DraftPart parts[] = {DRAFT_UV, DRAFT_NORMAL};

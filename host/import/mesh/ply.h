@@ -50,11 +50,12 @@ static inline size_t ply_blanks_skip(Scan *line)
     return scan_offset(line);
 }
 
-// The next line without its end, which is a newline, a carriage return or both. False at the end of the file.
+// Reads the next line without its end, which is a newline, a carriage return or both. Returns false at the
+// end of the file.
 bool ply_line(PlyReading *reading, Scan *line);
-// The next word of a line, empty at its end. Words are separated by spaces and tabs.
+// Returns the next word of a line, empty at its end. Words are separated by spaces and tabs.
 Word ply_word(Scan *line);
 
-// Reads up to the first byte of the body. False with an error if there is no valid header.
+// Reads up to the first byte of the body. Returns false with an error if there is no valid header.
 bool ply_header_read(PlyHeader *header, PlyReading *reading);
 void ply_header_free(PlyHeader *header);

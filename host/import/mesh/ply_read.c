@@ -5,7 +5,7 @@
 #include <string.h>
 #include <strings.h>
 
-// What a property is to a mesh: a number of a vertex, or a list of a face.
+// The use of a property by a mesh: a number of a vertex, or a list of a face.
 typedef enum {
     ROLE_X,
     ROLE_Y,
@@ -38,7 +38,7 @@ typedef struct {
     } roles; // of the element's properties
     bool has_role[ROLE_NONE + 1];
     double numbers[ROLE_NONE + 1]; // of the current vertex
-    size_t unread;                 // the offset of its first coordinate that is no number in range, or 0
+    size_t unread;                 // the offset of its first coordinate that is not a number in range, or 0
     Numbers corners, corner_uvs;   // of the current face
 } PlyReader;
 
@@ -89,7 +89,7 @@ static bool elements_are_sound(PlyReader *reader)
     return true;
 }
 
-// One warning for each element: of all that it has where nothing of it is used.
+// Warns once for each element, of all its properties if none is used.
 static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
 {
     Text unused = {0};
@@ -114,7 +114,7 @@ static bool is_binary(const PlyReader *reader)
     return reader->header.format != PLY_ASCII;
 }
 
-// The offset of the read position.
+// Returns the offset of the read position.
 static size_t place_of(const PlyReader *reader)
 {
     return scan_offset(is_binary(reader) ? &reader->reading.left : &reader->line);
@@ -144,7 +144,7 @@ static bool whole_read(const char **text, const char *end, PlyNumberKind kind, d
     return true;
 }
 
-// What is not finite or too large becomes NAN.
+// Replaces what is not finite or too large by NAN.
 static bool real_read(const char **text, const char *end, double *value)
 {
     static const char *const not_finite[] = {"infinity", "inf", "nan"};
@@ -162,7 +162,7 @@ static bool real_read(const char **text, const char *end, double *value)
     return false;
 }
 
-// The line's next word as a number of the type; `is_there` says whether there is one.
+// Reads the line's next word as a number of the type; `is_there` tells whether there is one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
     ply_blanks_skip(&reader->line);
@@ -201,7 +201,7 @@ static double binary_number(const PlyReader *reader, const PlyType *type)
     return type->size == sizeof single ? single : number;
 }
 
-// The row's next number, which must be there.
+// Reads the row's next number, which must exist.
 static bool number_next(PlyReader *reader, const PlyProperty *property, const PlyType *type, double *value)
 {
     if (is_binary(reader)) {

@@ -1,4 +1,5 @@
-// Words and numbers of the lines of a mesh file, in one pass. A NUL stands behind the text and none within.
+// Reads words and numbers of the lines of a mesh file in one pass. A NUL stands behind the text and none
+// within.
 #pragma once
 
 #include "host/import/line.h"
@@ -15,13 +16,13 @@ static inline Scan scan_open(const Source *source)
     return (Scan){source->bytes, source->bytes + source->length, source->bytes};
 }
 
-// Of the position, in the text.
+// Returns the offset of the position in the text.
 static inline size_t scan_offset(const Scan *scan)
 {
     return (size_t)(scan->at - scan->start);
 }
 
-// Or that of what counts of it: `#` begins a comment.
+// Returns whether the line, or the part of it before a comment, ends at the character.
 static inline bool scan_is_line_end(char character)
 {
     return character == '\n' || character == '\r' || character == '\0' || character == '#';
@@ -32,14 +33,14 @@ static inline bool scan_is_blank(char character)
     return character == ' ' || character == '\t';
 }
 
-// The bytes of a backslash at the end of a line, which continues on the next; else 0.
+// Returns the bytes of a backslash at the end of a line, which continues on the next, otherwise 0.
 static inline size_t scan_continuation(const char *at)
 {
     if (*at != '\\') return 0;
     return at[1] == '\n' ? 2 : at[1] == '\r' ? (at[2] == '\n' ? 3 : 2) : 0;
 }
 
-// Skips blanks. Whether the line has more.
+// Skips blanks and returns whether the line has more.
 static inline bool scan_more(Scan *scan)
 {
     for (;;) {
@@ -56,7 +57,7 @@ static inline bool scan_is_word_end(const char *at)
     return scan_is_blank(*at) || scan_is_line_end(*at) || scan_continuation(at) > 0;
 }
 
-// The next word of the line, empty at its end.
+// Returns the next word of the line, empty at its end.
 static inline Word scan_word(Scan *scan)
 {
     scan_more(scan);
@@ -66,7 +67,7 @@ static inline Word scan_word(Scan *scan)
     return (Word){start, (size_t)(start - scan->start), (size_t)(scan->at - start)};
 }
 
-// The rest of the line without the blanks around it.
+// Returns the rest of the line without the blanks around it.
 static inline Word scan_rest(Scan *scan)
 {
     scan_more(scan);
@@ -79,7 +80,7 @@ static inline Word scan_rest(Scan *scan)
     return (Word){start, (size_t)(start - scan->start), (size_t)(end - start)};
 }
 
-// The next word as a number, where it is one; else the place stays.
+// Reads the next word if it is a number; otherwise the position stays.
 static inline NumberStatus scan_number(Scan *scan, double *value)
 {
     scan_more(scan);
@@ -90,7 +91,7 @@ static inline NumberStatus scan_number(Scan *scan, double *value)
     return status;
 }
 
-// Moves to the next line. False at the end of the text.
+// Moves to the next line. Returns false at the end of the text.
 static inline bool scan_line(Scan *scan)
 {
     while (scan->at < scan->end) {
@@ -104,7 +105,7 @@ static inline bool scan_line(Scan *scan)
     return scan->at < scan->end;
 }
 
-// Whether there is no NUL in the text; reports an error otherwise. Skips a byte order mark.
+// Returns whether the text has no NUL, and reports an error otherwise. Skips a byte order mark.
 bool scan_is_text(Scan *scan, Report *report);
 
 // Words that a warning was for, of which there is one for each.

@@ -48,7 +48,7 @@ bool key_is_word(YamlReader *reader, const YamlNode *key)
     return report_error(&reader->report, key->offset, "a key must be a word");
 }
 
-// Index of the field named by the key, or field_count.
+// Returns the index of the field named by the key, or field_count.
 static size_t field_find(const YamlReader *reader, const YamlNode *key, const Field *fields,
                          size_t field_count)
 {
@@ -58,7 +58,7 @@ static size_t field_find(const YamlReader *reader, const YamlNode *key, const Fi
     return index;
 }
 
-// Keeps in `forms` those that the key allows. `seen`: the fields before it.
+// Keeps in `forms` those that the key allows. `seen` are the fields before it.
 static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *field, const Field *fields,
                         const bool *seen, unsigned *forms)
 {

@@ -46,18 +46,19 @@ struct Field {
     const Range *range; // of its values; NULL: any
 };
 
-// Fills `target` from a mapping, called `what` in messages. `form` receives the mapping's form; may be NULL.
-// Missing fields leave their members unchanged. True if nothing was reported.
+// Fills `target` from a mapping, called `what` in messages. `form`, which may be NULL, receives the mapping's
+// form. Missing fields leave their members unchanged. Returns true if nothing was reported.
 bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target, Form *form);
 
-// The value of a key, or the mapping itself if the key is missing.
+// Returns the value of a key, or the mapping itself if the key is missing.
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name);
 
 // Reports an error and returns false if a key is a list or a mapping.
 bool key_is_word(YamlReader *reader, const YamlNode *key);
 
-// The only key of a mapping and its value, as in `sphere: {…}`; reports an error and returns false otherwise.
+// Returns the only key of a mapping and its value, as in `sphere: {…}`. Reports an error and returns false
+// otherwise.
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value);
 
@@ -69,7 +70,7 @@ FieldReader read_node, read_number, read_vector, read_direction, read_color, rea
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target);
 
-// Reports `must be …, not 'text'` at the node; returns false.
+// Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
 // Reports `unknown kind 'word'`, with a suggestion if a known word is similar.
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,

@@ -240,7 +240,7 @@ void yaml_read_objects(YamlReader *reader, const YamlNode *node)
     Places places = places_open(reader->report.source);
     for (const YamlNode *item = yaml_first(&reader->tree, node); item && !report_is_full(&reader->report);
          item = yaml_next(&reader->tree, item)) {
-        if (mesh_count != reader->scene->meshes.count) // the last one had stages of its own
+        if (mesh_count != reader->scene->meshes.count) // the last one had separate stages
             stage_begin(stage, "reading the objects of", reader->report.source->file, node->child_count);
         mesh_count = reader->scene->meshes.count;
         stage_set(stage, done++);

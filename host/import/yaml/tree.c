@@ -176,7 +176,7 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
     }
 }
 
-// Byte offset of libfyaml's line and column, both from 1; columns count characters.
+// Returns the byte offset of libfyaml's line and column, both from 1; columns count characters.
 static size_t place_offset(const Source *source, int line, int column)
 {
     size_t at = 0;

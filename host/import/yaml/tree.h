@@ -33,7 +33,7 @@ typedef struct {
 bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage);
 void yaml_tree_free(YamlTree *tree);
 
-// NULL at the end. A mapping's children are key, value, key, value …
+// Returns the next child, or NULL at the end. A mapping's children are key, value, key, value …
 const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node);
 const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node);
 

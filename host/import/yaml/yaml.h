@@ -10,11 +10,11 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node);
 // Reads a material's name or an inline material; the target is a uint32_t, the material's index.
 FieldReader read_material;
 
-// The default material's index.
+// Returns the default material's index.
 uint32_t material_default_index(YamlReader *reader);
 
-// The path of a file named in the scene, relative to the scene file's folder. Reports an error and returns
-// NULL if the node is not a name. Caller frees.
+// Returns the path of a file named in the scene, relative to the scene file's folder. Reports an error and
+// returns NULL if the node is not a name. The caller frees it.
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node);
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node);
