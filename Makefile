@@ -271,8 +271,10 @@ lint-cppcheck:
 lint-man:
 	@! groff -man -ww -z -Tutf8 $(man_pages) 2>&1 | grep .
 
-# The folders whose comments are free of what tools/lint-words finds.
-worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] $(foreach room,base image import opencl scene,host/$(room)/*.[ch] host/$(room)/*/*.[ch]))
+# What is free of the wording that tools/lint-words finds.
+worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
+          $(foreach room,base image import opencl scene,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
+          $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/numerics/* tools/peers/* tools/peers/embree/*))
 
 lint-words:
 	@tools/lint-words $(worded)

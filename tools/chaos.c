@@ -15,7 +15,7 @@
 // GLINT_CHAOS_LOG is a file that receives "failed NAME" when something is made to fail, and the number of
 // calls of each kind when the process ends.
 //
-// System calls are trapped by seccomp, so that those within libc are seen, too. Only on x86-64 Linux with
+// System calls are trapped by seccomp, so that those within libc are also seen. Only on x86-64 Linux with
 // glibc.
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -438,7 +438,7 @@ static void on_trap(int signal, siginfo_t *info, void *context)
     errno = error;
 }
 
-// LLVM has a handler for this signal, too.
+// LLVM also has a handler for this signal.
 int sigaction(int signal, const struct sigaction *action, struct sigaction *old)
 {
     static int (*function)(int, const struct sigaction *, struct sigaction *);

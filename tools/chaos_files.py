@@ -82,7 +82,7 @@ def jpeg(width, height):
 
 
 def pixels(content):
-    """Of a PNG only its size and pixels: its texts name the device."""
+    """Returns a file's content, of a PNG only its size and pixels, because its texts name the device."""
     if content is None or not content.startswith(b"\x89PNG"):
         return content
     kept, at = b"", 8

@@ -29,7 +29,7 @@ static double timeval_seconds(struct timeval time)
     return (double)time.tv_sec + 1e-6 * (double)time.tv_usec;
 }
 
-// Of all threads, and of the linkers that a driver started.
+// Returns the processor time of all threads, and of the linkers that a driver started.
 static double processor_seconds(void)
 {
     double seconds = 0;

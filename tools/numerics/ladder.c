@@ -1,7 +1,7 @@
 // How far t is off, by shape, precision and distance: random rays through the kernels that this program was
-// built with, each beside the quadruple-precision reference of host/verify/reference.c on the very bits that
-// the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --check it prints
-// what exceeds the hard cases' bounds instead.
+// built with, each compared with the quadruple-precision reference of host/verify/reference.c on the very
+// bits that the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --check it
+// prints what exceeds the hard cases' bounds instead.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
@@ -237,7 +237,7 @@ typedef struct {
     const char *name;
 } LadderShape;
 
-// Of the shape's first form.
+// Makes a shape of the first form.
 static LadderShape shape_make(ShapeKind kind)
 {
     LadderShape shape = {.name = shape_names[kind]};

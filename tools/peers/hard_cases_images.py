@@ -46,7 +46,7 @@ class Camera:
 
 
 class Look:
-    """Of every object in an image: what it gives off by itself, what it scatters, and its highlight."""
+    """The emission, the diffuse reflection and the highlight of every object in an image."""
 
     def __init__(self, ambient=0.0, diffuse=0.0, specular=0.0, shininess=1.0):
         self.ambient, self.diffuse, self.specular, self.shininess = ambient, diffuse, specular, shininess
@@ -146,7 +146,7 @@ def tachyon_scene(program, camera, objects, look, light):
 
 
 def silhouette(program, camera, objects):
-    """Of each pixel its ray's direction and whether anything is hit."""
+    """Returns, for each pixel, its ray's direction and whether anything is hit."""
     if isinstance(program, Embree):
         directions = [list(struct.unpack("3f", struct.pack("3f", *camera.ray(*pixel)))) for pixel in camera.pixels()]
         rays = [(camera.eye, direction, 0.0) for direction in directions]

@@ -68,7 +68,7 @@ class Embree:
 
 
 class Glint:
-    """Of images alone: what glint makes of rays, glint verify reports."""
+    """Results from images alone, because glint verify reports those of rays."""
 
     def __init__(self, program, precision):
         self.program, self.precision, self.name = program, precision, f"glint {precision}"
@@ -80,7 +80,7 @@ class Glint:
 
 
 def pixel_object(path):
-    """Of a PPM of one pixel."""
+    """Returns the color of a PPM of one pixel."""
     code = path.read_bytes()[-3]
     return None if code == 0 else (code - 1, None)
 
@@ -124,7 +124,7 @@ class Povray:
 
     def trace(self, objects, rays):
         """All rays in one run, a frame of an animation each."""
-        if len(rays) == 1:  # one frame is no animation
+        if len(rays) == 1:  # one frame is not an animation
             return self.trace(objects, rays * 2)[:1]
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)

@@ -52,7 +52,7 @@ def material_of(numbers):
 
 
 def finish_lights(scene):
-    """Of n lights without a color each has the intensity sqrt(n) / 2n; so has the ambient light."""
+    """Each of n lights without a color has the intensity sqrt(n) / 2n; so has the ambient light."""
     if scene.lights:
         white = [len(scene.lights) ** -0.5 / 2] * 3
         scene.ambient = white

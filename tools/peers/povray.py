@@ -9,7 +9,7 @@ def vector(values):
 
 
 def material_text(name, material, ambient):
-    """Of a transparent one POV-Ray shows only the opaque fraction of ambient and diffuse light."""
+    """POV-Ray shows the ambient and diffuse light of a transparent material by its opaque fraction only."""
     transmission = material.get("transmission", 0)
     opaque = 1 - transmission
     finish = [part * material.get("ambient", 1) / opaque for part in ambient]
@@ -85,5 +85,5 @@ def command(scene_path, image, size):
 
 
 def trace_seconds(run):
-    """What the program reports of its own time."""
+    """Returns the time that the program reports."""
     return float(re.search(r"Trace Time:.*\(([0-9.]+) seconds\)", run.stderr).group(1))

@@ -9,7 +9,7 @@ import time
 
 
 def apart(function, *arguments):
-    """In a process of its own: Linux counts what this one has held into the peak of the programs that it starts."""
+    """Runs in a separate process, because Linux counts what this one has held in the peak of the programs that it starts."""
     with concurrent.futures.ProcessPoolExecutor(1) as child:
         return child.submit(function, *arguments).result()
 

@@ -35,7 +35,7 @@ class Scene:
     cones: list = field(default_factory=list)    # open, of (from, its radius, to, its radius, material)
 
     def half_tangent(self):
-        """Of the vertical field of view."""
+        """Returns the tangent of half the vertical field of view."""
         return math.tan(math.radians(self.camera.get("fov", 50)) / 2)
 
     def view(self):
@@ -103,7 +103,7 @@ def smooth_normals(vertices, faces):
 
 
 def read_mesh(keys, folder):
-    """An OBJ of triangles without normals of its own."""
+    """An OBJ of triangles without normals."""
     transform = keys.get("transform", {})
     scale = transform.get("scale", 1)
     scale = scale if isinstance(scale, list) else [scale] * 3

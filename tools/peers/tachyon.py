@@ -5,7 +5,7 @@ from scene import NotModelled, triple
 
 
 def place(values):
-    """Of a point or direction: Tachyon's coordinates are left-handed, so x is turned over."""
+    """Returns a point or direction with x negated, because Tachyon's coordinates are left-handed."""
     return triple([-values[0], *values[1:]])
 
 
@@ -72,5 +72,5 @@ def command(scene_path, image, size):
 
 
 def trace_seconds(run):
-    """What the program reports of its own time."""
+    """Returns the time that the program reports."""
     return float(re.search(r"Ray Tracing Time:\s*([0-9.]+)", run.stdout).group(1))

@@ -22,7 +22,7 @@ typedef struct {
 // Flat arrays, here and in a mesh: only from those do compilers gather.
 enum {
     MATERIAL_AMBIENT = 0, // a color; the ambient light and the material's own color are in it
-    MATERIAL_DIFFUSE = 3, // a color, likewise
+    MATERIAL_DIFFUSE = 3, // a color
     MATERIAL_SPECULAR = 6,
     MATERIAL_SHININESS = 7,
     MATERIAL_PARTS = 8
@@ -57,8 +57,8 @@ typedef struct {
     size_t light_count, material_count, plane_count, sphere_count, mesh_count;
 } Description;
 
-// Ends the program with a message where the file cannot be read or is no description. What it gives is held
-// to the end of the program.
+// Ends the program with a message if the file cannot be read or is not a description. The result lives until
+// the end of the program.
 Description description_read(const char *path);
 
 // Zeroed and aligned for any vector; ends the program where there is no memory.

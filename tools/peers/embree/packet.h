@@ -30,5 +30,5 @@ typedef struct {
     float *film;          // height * width * 3, from the top left
 } Renderer;
 
-// Of the pixels from x, y on that are in the image.
+// Renders the pixels from x, y on that are in the image.
 void packet_render(const Renderer *renderer, unsigned x, unsigned y);
