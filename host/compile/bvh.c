@@ -136,7 +136,7 @@ static BvhChild leaf_make(const Builder *builder, const Range *range)
     return leaf;
 }
 
-// Of a range whose leaves come soon: they may be anywhere.
+// Prefetches the boxes of a range whose leaves come soon: they may be anywhere.
 static void boxes_prefetch(const Builder *builder, const Range *range)
 {
     if (range->end - range->begin > builder->leaves.size_max) return;

@@ -236,7 +236,7 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
     bvh_widen(&wide, bvh, width);
     flat_wide_array_renew(compiled, FLAT_NODES, wide.node_count, width);
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
-    // a visit replaces a node by at most `width` children: a ray from far away meets the empty places, too
+    // a visit replaces a node by at most `width` children: a ray from far away also enters the empty slots
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
     uint32_t *order = order_in_kinds(bvh);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);

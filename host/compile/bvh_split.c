@@ -9,7 +9,7 @@
 
 enum {
     BIN_COUNT = 16,
-    SMALL_RANGE = 32, // below it fewer bins, which cost less to fill and to sweep, split as well
+    SMALL_RANGE = 32, // below it fewer bins split equally well and cost less to fill and to sweep
     SMALL_BIN_COUNT = 8,
     FEW_MAX = 8, // up to as many primitives are sorted by their bins, which then need not be filled
     THREAD_BINNED_MIN = 8192 // below it a thread costs more than it saves

@@ -13,11 +13,11 @@
 static const double node_cost = 1, visit_cost = 1, intersection_cost = 0.4, block_cost = 2;
 
 // What takes one slot where it might take several costs something even where its area is nothing: this
-// decides ties, and vanishes beside other costs, which are of the order of 1.
+// decides ties, and vanishes against other costs, which are of the order of 1.
 static const float tie_cost = 0x1p-40f;
 
 // Entry i: a subtree's least cost where it takes at most i slots of the wide node above it, minus
-// leaves_cost; entry 0 is unused. In one slot it is a wide node of its own, or a leaf. The leaves cost the
+// leaves_cost; entry 0 is unused. In one slot it is a separate wide node, or a leaf. The leaves cost the
 // same in all slots: left out, they leave the float's digits, and ties, to what differs.
 typedef float Costs[BVH_WIDTH_MAX + 1];
 

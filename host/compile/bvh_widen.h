@@ -5,7 +5,7 @@
 #include "host/compile/flat_types.h"
 
 typedef struct {
-    const BvhChild *children[BVH_WIDTH_MAX]; // inner ones, with count 0, are wide nodes too
+    const BvhChild *children[BVH_WIDTH_MAX]; // inner ones, with count 0, are also wide nodes
     unsigned child_count;
     uint32_t first_node; // its inner children are this wide node and those behind it, in their order
 } BvhWideNode;

@@ -12,8 +12,8 @@
 bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                    MessageList *messages);
 // Takes another camera, size, samples or bounces; all else in `scene` and `settings` is what the scene was
-// compiled with. The BVH keeps its tree, so that this takes a fraction of the time. False as above;
-// `compiled` is then no scene's until a move succeeds.
+// compiled with. The BVH keeps its tree, so that this takes a fraction of the time. Returns false with
+// messages if it fails; `compiled` then belongs to no scene until a move succeeds.
 bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages);
 

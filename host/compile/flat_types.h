@@ -1,5 +1,5 @@
-// kernels/types.h on the host. The kernels' Light and Material are FlatLight and FlatMaterial here, beside
-// the Scene's own.
+// kernels/types.h on the host. The kernels' Light and Material are FlatLight and FlatMaterial here, because
+// the Scene has types of those names.
 #pragma once
 
 #define Light    FlatLight

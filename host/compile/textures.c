@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Of a side: beyond it a position in float, 24 bits, cannot resolve a texel. Of all textures: a kernel
-// counts texels in 32 bits.
+// SIDE_MAX: a position in float, 24 bits, cannot resolve a texel of a longer side. TEXELS_MAX: a kernel
+// counts the texels of all textures in 32 bits.
 enum { SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
 typedef struct {
@@ -38,7 +38,7 @@ static void levels_free(LevelList *list)
     free(list->levels.items);
 }
 
-// A line of texels divided anew: `part` from 0 to `count` covers the old texels first .. last, the outer ones
+// A line of texels re-divided: `part` from 0 to `count` covers the old texels first .. last, the outer ones
 // in part.
 typedef struct {
     double start, end;

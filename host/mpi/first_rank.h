@@ -1,4 +1,4 @@
-// MPI rank 0: glint render, with the other ranks' devices as well.
+// MPI rank 0: glint render, with the other ranks' devices added.
 #pragma once
 
 #include <stddef.h>

@@ -33,8 +33,8 @@ typedef struct {
     char **arguments;
 } Call;
 
-// Of the arguments, the scenes' files and the images' names: the same for two ranks only if both render the
-// same and see the same files.
+// Returns a hash of the arguments, the scenes' files and the images' names, which is the same for two ranks
+// only if both render the same and see the same files.
 static uint64_t files_hash(const RenderCommand *command, Call call)
 {
     uint64_t hash = HASH_START;

@@ -62,7 +62,7 @@ static void device_close_quietly(Worker *worker)
     worker->is_open = false;
 }
 
-// For another image; a device that failed is opened anew.
+// Prepares for another image; a device that failed is reopened.
 static void worker_begin(Worker *worker, const Job *job, const char *selector)
 {
     Rank *own = &worker->own;

@@ -1,4 +1,4 @@
-// The other MPI ranks: each renders rows of the first one's images on a device of its own.
+// The other MPI ranks: each renders rows of the first one's images on its device.
 #pragma once
 
 #include <stddef.h>

@@ -30,7 +30,7 @@ void verify_highlights(VerifyRun *run)
                  "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
                  power);
         Scene scene = verify_scene(text);
-        // whole, lit from the side and partly behind; closely, lit from beside the eye
+        // whole, lit from the side and partly behind; closely, lit from next to the eye
         Vector3 direction = vector_normalize(closely ? light_beside : light_behind);
         scene.lights.items[0].direction = direction;
         const Vector3 center = {0, 0, 0};

@@ -9,7 +9,7 @@
 
 static const Vector3 origin;
 
-// Of rays from the center outward no pixel that is farther out is brighter.
+// Checks that no pixel farther from the center is brighter.
 static void check_radial_brightness(VerifyRun *run, const Film *image)
 {
     const uint32_t side = image->width;
@@ -220,8 +220,8 @@ static size_t count_parts(const Film *image)
     return parts;
 }
 
-// At 30 degrees the ring is half a pixel thick, so that the exact one has gaps as well; the second image,
-// where it is 1.4 pixels thick, has none.
+// At 30 degrees the ring is half a pixel thick, so that the exact one also has gaps; the second image, where
+// it is 1.4 pixels thick, has none.
 void verify_thin_ring(VerifyRun *run)
 {
     static const struct {

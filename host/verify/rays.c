@@ -29,7 +29,7 @@ static double nudged(const VerifyRun *run, double value, double toward)
     return verify_is_double(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
 }
 
-// The ray and those beside it. A component of 0 has only subnormal numbers beside it, and stays.
+// Adds the ray and its neighbors. A component of 0 has only subnormal neighbors, and stays.
 static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const VerifyRays *set,
                          const VerifyRay *given)
 {

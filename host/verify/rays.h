@@ -32,7 +32,7 @@ typedef struct {
     size_t checked_count; // of a family: how many have exact answers; all have points and normals
     bool closed;          // every ray of the family hits something
     // The tiers, as in "BCD", at which hit or miss is not open, however near the boundary; of rays by numbers
-    // not for those beside them.
+    // not for their neighbors.
     const char *decided_tiers;
     const VerifyLimits *limits; // or NULL
 } VerifyRays;
@@ -40,7 +40,7 @@ typedef struct {
 extern const VerifyRays verify_rays[];
 extern const size_t verify_rays_count;
 
-// A ray as it is traced, and what is required of its hit: of one beside a given ray no decided tiers.
+// A ray as it is traced, and what is required of its hit: a neighbor of a given ray has no decided tiers.
 typedef struct {
     TraceRay ray;
     VerifyRay required;

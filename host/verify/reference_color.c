@@ -39,7 +39,7 @@ static Quad square_of(Quad coordinate, double size, Quad *margin)
 }
 
 // Solids are cut from a checkered block of the world, the cube found a 1024th of its side behind the surface,
-// so that a face between two cubes has one color; planes and discs carry squares of their own.
+// so that a face between two cubes has one color; planes and discs have separate squares.
 static Color checker_color(const Object *object, const Material *material, const ReferenceHit *hit,
                            Quad3 point, Quad *margin)
 {

@@ -9,7 +9,7 @@ typedef struct {
     void (*hit)(const Object *object, const ReferenceRay *ray, ReferenceHit *hit);
     // Measures the surface and adds its sheets.
     void (*surface)(const Object *object, Quad3 point, ReferenceSurface *surface);
-    // Of the shape's members in Object: doubles in a row, points first, then flags.
+    // The shape's members in Object: doubles in a row, points first, then flags.
     unsigned point_count, number_count;
 } ReferenceShape;
 

@@ -10,8 +10,8 @@ typedef struct {
     bool inexact; // quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp
     VerifyResult *result;
     VerifyKernels *kernels;
-    // Of the last scene of verify_trace and of verify_render; NULL: none. The next scene takes it over with
-    // its kernels, as loading them for each scene would take longer than most scenes.
+    // The renderers of the last scene of verify_trace and of verify_render, or NULL. The next scene takes
+    // them over with their kernels, as loading them for each scene would take longer than most scenes.
     Renderer **tracer, **painter;
 } VerifyRun;
 

@@ -12,7 +12,7 @@ typedef struct {
     const char *text; // of the object
     // Sets its numbers for a size. All are exact in double, but not in float.
     void (*resize)(Object *object, double size);
-    // Of a flat shape the directions along it are open, of others those around the tangents.
+    // A flat shape leaves the directions along it open, others those around the tangents.
     bool is_flat;
 } SizedShape;
 

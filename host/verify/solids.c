@@ -161,8 +161,8 @@ static const char *const coincident[] = {
 };
 enum { COINCIDENT = sizeof coincident / sizeof *coincident };
 
-// Of objects that are met at the same distance the first in the list is seen; the distance does not depend on
-// the list's order. A scene of each object alone gives it.
+// The first in the list is seen of objects that are hit at the same distance, which does not depend on the
+// list's order. A scene of each object alone gives it.
 void verify_coincident_faces(VerifyRun *run)
 {
     enum { COUNT = 1200 };

@@ -154,7 +154,7 @@ static void hash_integers(VerifyRun *run, const uint32_t *integers, size_t count
         hash_word(run, integers[i]);
 }
 
-// Of a miss only `light` has a meaning.
+// Hashes a hit, or the `light` of a miss, whose other members have no meaning.
 static void hash_hit(VerifyRun *run, const TraceHit *hit)
 {
     hash_word(run, hit->object);

@@ -5,6 +5,7 @@
 #include "host/import/report.h"
 #include "host/scene/scene.h"
 
-// The file's text with another position, look_at and up of its camera; all other bytes stay, comments too.
-// False with a message where the text is no scene, or these have no place of their own in it: an alias.
+// Replaces position, look_at and up of the camera in the file's text; all other bytes stay, including
+// comments. Returns false with a message if the text is not a scene, or these have no separate place in it,
+// as in an alias.
 bool camera_replace(Text *text, const Source *source, const Camera *camera, MessageList *messages);

@@ -1,4 +1,4 @@
-// Renders what the window shows, on a thread of its own: coarse frames while the camera moves; at rest the
+// Renders what the window shows on a separate thread: coarse frames while the camera moves, and at rest the
 // image in passes, until it has all samples. A new request ends the work on the last one. When the scene's
 // files change they are read again.
 #pragma once

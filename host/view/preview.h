@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 
-// Per frame. Of 33 ms this leaves some to the display, and to a launch that the frame had to wait for.
+// The time of a frame. It leaves some of 33 ms to the display, and to a launch that the frame had to wait
+// for.
 #define PREVIEW_SECONDS 0.022
 
 // Initially zero.

@@ -4,7 +4,7 @@
 #include "host/image/image.h"
 #include "host/render/film.h"
 
-// VIEW(NAME, name, aovs): `aovs` are those it shows, besides the color.
+// VIEW(NAME, name, aovs): `aovs` are those that it shows in addition to the color.
 #define VIEW_LIST(VIEW)                                                                                      \
     VIEW(COLOR, "color", 0)                                                                                  \
     VIEW(DEPTH, "depth", AOV_T | AOV_OBJECT)                                                                 \

@@ -5,10 +5,10 @@
 
 typedef struct Watch Watch;
 
-// Calls `changed` on a thread of its own. NULL, with a warning printed: the system cannot watch files.
+// Calls `changed` on a separate thread. Returns NULL and prints a warning if the system cannot watch files.
 Watch *watch_open(void (*changed)(void *context), void *context);
 void watch_close(Watch *watch); // accepts NULL
-// watch_only watches this file alone, watch_add this one, too. It need not exist. Both accept NULL, and
-// print a warning where the system cannot watch it.
+// watch_only watches this file alone, watch_add also this one. It need not exist. Both accept NULL, and print
+// a warning if the system cannot watch it.
 void watch_only(Watch *watch, const char *path);
 void watch_add(Watch *watch, const char *path);

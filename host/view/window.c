@@ -203,7 +203,7 @@ static void window_close(Window *window)
     if (window->texture) SDL_DestroyTexture(window->texture);
     if (window->target) SDL_DestroyRenderer(window->target);
     // X11's window stays until the process ends: the loop's last event to it may still be on its way, on a
-    // connection of its own, and Xlib ends the process with status 1 where it finds no window.
+    // separate connection, and Xlib ends the process with status 1 where it finds no window.
     const char *driver = SDL_GetCurrentVideoDriver();
     if (driver && strcmp(driver, "x11") == 0) return;
     if (window->window) SDL_DestroyWindow(window->window);
@@ -217,8 +217,8 @@ static bool display_exists(void)
     return (wanted && wanted[0]) || (strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0);
 }
 
-// Of text: the pixels of a point of the window; where that has one, as X11's, more on a display of many
-// pixels per inch.
+// Returns the scale of text: the pixels of a point of the window; where that has one, as X11's, more on a
+// display of many pixels per inch.
 static float text_scale(const Window *window, ImageSize size)
 {
     const float pixels = (float)window->size.width / (float)size.width, usual_dpi = 96;

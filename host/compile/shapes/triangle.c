@@ -96,7 +96,7 @@ static void triangle_take_height(Triangle *triangle, Flattening *flattening, Vec
     const double above = fabs((double)(height / length)),
                  moved = fabs((double)(stored_height / stored_length - height / length));
     if (!(moved > 4 * roundoff_of(rounding) * above)) return;
-    // the normal takes the height's rounding to float: the plane stays where it is, in double too
+    // the normal takes the height's rounding to float: the plane stays where it is, also in double
     const float eye_height = height == 0 ? -0.0f : (float)height;
     if (!isfinite(eye_height) || (eye_height == 0 && height != 0)) return;
     const Quad scale = height == 0 ? 1 : eye_height / height;
