@@ -96,9 +96,6 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 // latencies of the others' roots and quotients, and their data stays near. With bounces, which go packet by
 // packet, one.
 #define PACKETS (HAS_BVH ? TILES : HAS_REFLECTION || HAS_TRANSMISSION || TILES < 4 ? 1 : 4)
-// Packets whose shadow rays are all made before any is tested with what is outside the BVH: more
-// would push each other out of the nearest cache.
-#define NEAR_PACKETS (HAS_BVH ? 2u : PACKETS)
 #if LANES == 1
 #define LANE_X ((integer)(0))
 #define LANE_Y ((integer)(0))

@@ -15,8 +15,9 @@ typedef struct {
     real color_error;
 } ShadedHit;
 
-// The surface that a packet's rays hit, in ambient light.
-static inline void hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
+// Sets the surface that a packet's rays hit and what it reflects of ambient light. Returns whether any lane
+// hit one.
+static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
     if (IS_CERTIFIED) traversal_judge(traversal);
     hit->surface.object = traversal->hit.object;
@@ -26,43 +27,31 @@ static inline void hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
         hit->color_error = (real)(0);
     }
     mask found = surface_found(&hit->surface);
-    if (!lanes_any(found)) return;
+    if (!lanes_any(found)) return false;
     hit->surface = visible_surface(scene, ray, &traversal->hit);
     if (IS_CERTIFIED) hit->doubt = hit->doubt | (found & hit->surface.doubt);
     hit->color = vector_select(found, hit->surface.ambient, hit->color);
-}
-
-// A packet's shadow rays to a light.
-static inline void shadow_rays_make(const Scene *scene, const ShadedHit *hit, uint index,
-                                    LightVisibility *light, Ray *shadow_ray)
-{
-    shadow_ray->active = light->lit = mask_none();
-    shadow_ray->tmax = (real)(0);
-    if (IS_CERTIFIED) {
-        light->facing_doubt = mask_none();
-        light->color_error = (real)(0);
-    }
-    if (lanes_any(surface_found(&hit->surface)))
-        *light = light_reach(scene, &hit->surface, index, shadow_ray);
+    return true;
 }
 
 // Adds a light that a packet's shadow rays have been traced to.
-static inline void hit_light(const Scene *scene, uint index, LightVisibility *light, Traversal *traversal,
-                             ShadedHit *hit)
+static inline void hit_add_light(const Scene *scene, uint index, LightVisibility *light, Traversal *traversal,
+                                 ShadedHit *hit)
 {
-    if (IS_CERTIFIED) traversal_judge(traversal);
-    if (IS_CERTIFIED && lanes_any(surface_found(&hit->surface))) {
+    if (IS_CERTIFIED) {
+        traversal_judge(traversal);
         mask glossy = hit->surface.specular > (real)(0);
         light_add_doubt(light, &traversal->hit);
         mask matters = glossy | !light->facing_doubt;
         hit->doubt = hit->doubt | (light->doubt & matters) | (light->facing_doubt & glossy);
     }
-    if (lanes_any(light->lit)) light_occlude(light, traversal_transmittance(traversal));
+    light_occlude(light, traversal_transmittance(traversal));
     if (IS_CERTIFIED)
         hit->color_error =
             hit->color_error + lanes_select(light->lit | light->facing_doubt, light->color_error, (real)(0));
-    if (!lanes_any(light->lit)) return;
-    Color3 reflected = phong_shade(scene, &hit->surface, light, index);
+    const Color3 black = {(real)(0), (real)(0), (real)(0)};
+    Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light->fraction);
+    Color3 reflected = vector_select(light->lit, color_multiply(light->reflected, arriving), black);
     hit->color = vector_add(hit->color, reflected);
 }
 
@@ -73,24 +62,22 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
     Ray shadow_rays[PACKETS];
     LightVisibility lights[PACKETS];
     const uint light_count = COMPUTE_SIGNATURE ? 0 : scene->header->image.w;
-    uint packets = 0; // that traverse the BVH
+    uint packets = 0, found = 0; // as bits: those that traverse the BVH, and those that hit anything
     for (uint i = 0; i < count; i++)
         if (traversal_begin(&traversals[i], scene, &rays[i], CLOSEST_HIT)) packets |= 1u << i;
     if (HAS_BVH) packets_traverse_bvh(traversals, scene, rays, packets);
     for (uint i = 0; i < count; i++)
-        hit_shade(scene, &rays[i], &traversals[i], &hits[i]);
-    for (uint light = 0; light < light_count; light++) {
+        if (hit_shade(scene, &rays[i], &traversals[i], &hits[i])) found |= 1u << i;
+    for (uint light = 0; found != 0 && light < light_count; light++) {
         packets = 0;
-        for (uint first = 0; first < count; first += NEAR_PACKETS) {
-            const uint end = min(first + NEAR_PACKETS, count);
-            for (uint i = first; i < end; i++)
-                shadow_rays_make(scene, &hits[i], light, &lights[i], &shadow_rays[i]);
-            for (uint i = first; i < end; i++)
-                if (traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION)) packets |= 1u << i;
-        }
+        for (uint i = 0; i < count; i++)
+            if (found >> i & 1) lights[i] = light_reach(scene, &hits[i].surface, light, &shadow_rays[i]);
+        for (uint i = 0; i < count; i++)
+            if (found >> i & 1 && traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION))
+                packets |= 1u << i;
         if (HAS_BVH) packets_traverse_bvh(traversals, scene, shadow_rays, packets);
         for (uint i = 0; i < count; i++)
-            hit_light(scene, light, &lights[i], &traversals[i], &hits[i]);
+            if (found >> i & 1) hit_add_light(scene, light, &lights[i], &traversals[i], &hits[i]);
     }
 }
 

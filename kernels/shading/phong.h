@@ -6,6 +6,7 @@
 
 typedef struct {
     Vector direction; // from the surface to the light, unit
+    real facing;      // the cosine between the shading normal and that
     real strength;    // 0..1: a spotlight's falloff
     Ray shadow_ray;   // ends at the light
 } LightRay;
@@ -33,12 +34,14 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
+        to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
         to_light.shadow_ray =
             ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface_found(surface));
         return to_light;
     }
     Vector position = vector_of(light->position);
     to_light.direction = vector_normalize(vector_subtract(position, surface->position));
+    to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
     to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),
@@ -68,8 +71,7 @@ static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye,
 // How a light reaches the surface.
 typedef struct {
     mask lit;         // lanes that it reaches: they face it and are not occluded
-    Vector direction; // from the surface to the light, unit
-    real facing;      // the cosine between the shading normal and that
+    Color3 reflected; // what the surface reflects of it, as a factor
     real fraction;    // of the light's color that arrives
     // At `certified`: lanes where the shadow is in doubt, and others that may or may not face the light,
     // which matters to highlights and masks of shadows alone: the rest fades to 0.
@@ -91,7 +93,7 @@ enum { SHADOW_ERROR_MAX = 1 << 9 };
 #define COLOR_ROUNDING ((real)(128 * UNIT_ROUNDOFF))
 
 // The light's direction mirrored by the shading normal.
-static inline Vector light_reflected(const Surface *surface, const LightVisibility *light)
+static inline Vector light_reflected(const Surface *surface, const LightRay *light)
 {
     return vector_fma(surface->shading_normal, light->facing + light->facing,
                       vector_negate(light->direction));
@@ -104,8 +106,7 @@ static inline Vector light_reflected(const Surface *surface, const LightVisibili
 // a function of their distance d it falls, and is (1 - d^2 / 2)^n: its slope for n >= 1 is at most 0.61
 // sqrt(n) + 0.81, for smaller n at most n over 1 - d^2 / 2. Nor is the error more than the highlight at d -
 // error.
-static inline real highlight_error(const Surface *surface, const LightVisibility *light, real brightness,
-                                   real error)
+static inline real highlight_error(const Surface *surface, const LightRay *light, real brightness, real error)
 {
     const real zero = (real)(0), one = (real)(1), one_half = (real)(0.5f), n = surface->shininess;
     real bound = error * real_fma((real)(0.61f), real_sqrt(n), (real)(0.81f));
@@ -125,24 +126,24 @@ static inline real highlight_error(const Surface *surface, const LightVisibility
 
 // A bound on the error of what a light adds where it shines in full. `angle_error`: of its direction,
 // `strength_error`: of a spotlight's falloff.
-static inline real light_color_error(const Light *light, const Surface *surface,
-                                     const LightVisibility *visibility, real angle_error, real facing_error,
-                                     real strength_error)
+static inline real light_color_error(const Light *light, const Surface *surface, const LightRay *to_light,
+                                     real angle_error, real facing_error, real strength_error)
 {
     Color3 diffuse = surface->diffuse;
     real largest = real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
     real brightest = (real)(light->color.w), shiny = brightest * surface->specular;
     real compared = real_fma((real)(2), surface->normal_error, angle_error + surface->eye_error);
-    real highlight = highlight_error(surface, visibility, shiny, compared);
+    real highlight = highlight_error(surface, to_light, shiny, compared);
     real error = real_fma(brightest * largest, facing_error, highlight);
     return real_fma(real_fma(brightest, largest, shiny), strength_error + COLOR_ROUNDING, error);
 }
 
 // Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes whose
 // errors are too large for cull spheres.
-static inline mask light_set_errors(const Light *light, const Surface *surface, LightVisibility *visibility,
-                                    Ray *shadow_ray)
+static inline mask light_set_errors(const Light *light, const Surface *surface, LightRay *to_light,
+                                    LightVisibility *visibility)
 {
+    Ray *shadow_ray = &to_light->shadow_ray;
     const real zero = (real)(0);
     real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
     mask far_off = mask_none(), skips_culling = far_off;
@@ -151,7 +152,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
         // without another root: a unit vector is off by 14.5 u, a dot product by 3 u
         shadow_ray->length =
-            vector_dot(visibility->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
+            vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
         // nothing is known of a light so near that rounding moves it onto the surface, or too far away to
         // square
         real squared = shadow_ray->squared;
@@ -165,12 +166,12 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     }
     shadow_ray->origin_error = place_error;
     shadow_ray->left = surface->object;
-    real geometric = vector_dot(surface_normal(surface), visibility->direction);
+    real geometric = vector_dot(surface_normal(surface), to_light->direction);
     real facing_error = surface->normal_error + angle_error;
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
     shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
-    mask turned = (visibility->facing < -facing_error) | !surface_found(surface);
-    mask open = !turned & !(visibility->facing > facing_error);
+    mask turned = (to_light->facing < -facing_error) | !surface_found(surface);
+    mask open = !turned & !(to_light->facing > facing_error);
     Color3 diffuse = surface->diffuse;
     real reflected = (real)(light->color.w) * real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
     real brightness = real_max(reflected, (real)(1));
@@ -183,8 +184,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real strength_error = (real)(0);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {
-        Vector difference =
-            vector_subtract(vector_negate(visibility->direction), vector_of(light->direction));
+        Vector difference = vector_subtract(vector_negate(to_light->direction), vector_of(light->direction));
         real s = (real)(0.5f) * vector_dot(difference, difference), edge = (real)(light->cone.x);
         real error = angle_error + (real)(16 * UNIT_ROUNDOFF);
         real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
@@ -197,8 +197,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         self_doubt = self_doubt | (at_edge & !fades);
         visibility->facing_doubt = visibility->facing_doubt | (at_edge & fades);
     }
-    real color_error =
-        light_color_error(light, surface, visibility, angle_error, facing_error, strength_error);
+    real color_error = light_color_error(light, surface, to_light, angle_error, facing_error, strength_error);
     visibility->color_error = lanes_select(turned, (real)(0), color_error);
     visibility->lit = visibility->lit & !behind;
     visibility->doubt = self_doubt | (visibility->lit & far_off);
@@ -212,22 +211,32 @@ static inline void light_add_doubt(LightVisibility *visibility, const Hit *occlu
     visibility->doubt = visibility->doubt | (occlusion->doubt & visibility->lit);
 }
 
-// A LightVisibility without occlusion, for which the shadow ray is set, active in the lanes that may be lit.
+// Returns what the surface reflects of a light, as a factor, in the lanes that it reaches.
+static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_light, mask lit)
+{
+    Color3 color = vector_scale(surface->diffuse, to_light->facing);
+    mask glossy = lit & (surface->specular > (real)(0));
+    if (!lanes_any(glossy)) return color;
+    real highlight = surface->specular * phong_highlight(glossy, light_reflected(surface, to_light),
+                                                         surface->to_eye, surface->shininess);
+    return (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
+}
+
+// Returns how a light reaches the surface unless something occludes it. Sets the shadow ray, which is active
+// in the lanes that may be lit.
 static inline LightVisibility light_reach(const Scene *scene, const Surface *surface, uint index,
                                           Ray *shadow_ray)
 {
     Light light = scene->lights[index];
     LightRay to_light = light_ray(&light, surface);
     LightVisibility visibility;
-    visibility.direction = to_light.direction;
-    visibility.facing = vector_dot(surface->shading_normal, to_light.direction);
     visibility.fraction = to_light.strength;
-    visibility.lit =
-        surface_found(surface) & (visibility.facing > (real)(0)) & (to_light.strength > (real)(0));
-    *shadow_ray = to_light.shadow_ray;
-    shadow_ray->active = shadow_ray->active & visibility.lit;
+    visibility.lit = surface_found(surface) & (to_light.facing > (real)(0)) & (to_light.strength > (real)(0));
+    to_light.shadow_ray.active = to_light.shadow_ray.active & visibility.lit;
     mask skips_culling = mask_none();
-    if (IS_CERTIFIED) skips_culling = light_set_errors(&light, surface, &visibility, shadow_ray);
+    if (IS_CERTIFIED) skips_culling = light_set_errors(&light, surface, &to_light, &visibility);
+    visibility.reflected = phong_reflect(surface, &to_light, to_light.shadow_ray.active);
+    *shadow_ray = to_light.shadow_ray;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
         ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index, skips_culling);
     ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
@@ -255,22 +264,6 @@ static inline LightVisibility light_visibility(const Scene *scene, const Surface
     }
     if (lanes_any(visibility.lit)) light_occlude(&visibility, transmittance(scene, &shadow_ray));
     return visibility;
-}
-
-// One light's contribution; black in lanes that it does not reach.
-static inline Color3 phong_shade(const Scene *scene, const Surface *surface, const LightVisibility *light,
-                                 uint index)
-{
-    const Color3 black = {(real)(0), (real)(0), (real)(0)};
-    Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light->fraction);
-    Color3 color = vector_scale(surface->diffuse, light->facing);
-    mask glossy = light->lit & (surface->specular > (real)(0));
-    if (lanes_any(glossy)) {
-        real highlight = surface->specular * phong_highlight(glossy, light_reflected(surface, light),
-                                                             surface->to_eye, surface->shininess);
-        color = (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
-    }
-    return vector_select(light->lit, color_multiply(color, arriving), black);
 }
 
 #endif

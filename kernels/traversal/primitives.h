@@ -98,8 +98,16 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
     return false;
 }
 
-// Intersects all primitives outside the BVH: the unbounded and the huge, or all in a scene without a BVH.
-static inline void intersect_outside_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
+// Intersects the planes, which are never in the BVH.
+static inline void intersect_all_planes(Traversal *traversal, const Scene *scene, const Ray *ray)
+{
+    global const uint *counts = (global const uint *)scene->header->counts;
+    if (HAS_PLANES) intersect_planes(traversal, scene, ray, 0, counts[KIND_PLANES], 0);
+}
+
+// Intersects all other primitives outside the BVH: the unbounded and the huge, or all in a scene without a
+// BVH.
+static OUT_OF_LINE void intersect_outside_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
     global const uint *bvh_counts = (global const uint *)scene->header->bvh_counts;
@@ -109,11 +117,10 @@ static inline void intersect_outside_bvh(Traversal *traversal, const Scene *scen
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
     if (cull_spheres) cull_spheres++; // the first is the BVH's
 #define INTERSECT_OUTSIDE_BVH(feature, Type, name, names)                                                    \
-    if (HAS_##feature && lanes_any(traversal->active)) {                                                     \
+    if (HAS_##feature && KIND_##feature != KIND_PLANES && lanes_any(traversal->active)) {                    \
         uint first = bvh_counts[KIND_##feature], last = counts[KIND_##feature];                              \
-        bool has_cull_spheres = cull_spheres && KIND_##feature != KIND_PLANES;                               \
-        intersect_##names(traversal, scene, ray, first, last, has_cull_spheres ? cull_spheres : 0);          \
-        if (has_cull_spheres) cull_spheres += last - first;                                                  \
+        intersect_##names(traversal, scene, ray, first, last, cull_spheres);                                 \
+        if (cull_spheres) cull_spheres += last - first;                                                      \
     }
     SHAPE_LIST(INTERSECT_OUTSIDE_BVH)
 }

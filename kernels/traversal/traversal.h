@@ -7,8 +7,8 @@
 #include "traversal/single.h"
 #include "traversal/tile_traversal.h"
 
-// Starts a packet's traversal with what is outside the BVH. Whether the BVH is left to traverse.
-static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
+// Starts a packet's traversal with what is outside the BVH. Returns whether the BVH is left to traverse.
+static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
 {
     traversal->query = query;
     traversal->active = ray->active;
@@ -22,7 +22,9 @@ static OUT_OF_LINE bool traversal_begin(Traversal *traversal, const Scene *scene
         traversal->hit.doubt = mask_none();
     }
     if (!lanes_any(ray->active)) return false;
-    intersect_outside_bvh(traversal, scene, ray);
+    intersect_all_planes(traversal, scene, ray);
+    // without cull spheres, or if there are others than the BVH's
+    if (scene->header->cull_spheres.x != 1) intersect_outside_bvh(traversal, scene, ray);
     if (!HAS_BVH || !lanes_any(traversal->active)) return false;
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
     return !cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0;
