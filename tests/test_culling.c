@@ -1,6 +1,6 @@
 // Cull spheres of rays from the eye or to a light (test_invariances compares whole scenes with and without
-// them). No sphere within the error bound of a line is culled; every sphere clearly outside it is.
-// run_tests: sanitize-long-only
+// them). No sphere within the error bound of a line is culled; every sphere clearly outside it is. The cull
+// of several packets is tried with one ray, where it bounds a single direction. run_tests: sanitize-long-only
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/stages.h"
@@ -19,14 +19,17 @@ static const char kernel_text[] =
     "#include \"cull_sphere.h\"\n"
     "kernel void misses(global const scalar *lines, global const CullSphere *cull_spheres, uint "
     "common_origin, global int "
-    "*missed)\n"
+    "*missed, global int *missed_by_bounds)\n"
     "{\n"
     "    size_t i = get_global_id(0);\n"
     "    global const scalar *line = lines + 6 * i;\n"
     "    Vector origin = {line[0], line[1], line[2]}, direction = {line[3], line[4], line[5]};\n"
     "    Ray ray = ray_make(origin, direction, 0, 1, mask_all());\n"
     "    ray_set_common_origin(&ray, common_origin, mask_none());\n"
-    "    missed[i] = lanes_any(ray_misses_cull_sphere(&ray, &cull_spheres[i]));\n"
+    "    missed[i] = !lanes_any(ray_meets_cull_sphere(&ray, &cull_spheres[i]));\n"
+    "    DirectionBounds bounds;\n"
+    "    missed_by_bounds[i] = rays_bound_directions(&ray, 1, &bounds) &&\n"
+    "                          directions_meet_cull_spheres(&bounds, &cull_spheres[i]) == 0;\n"
     "}\n";
 
 typedef struct {
@@ -37,8 +40,8 @@ typedef struct {
     Vector3 common_origin;
     CompiledScene flat; // a light at the common origin, and a sphere for each line
     double *lines;      // origin and direction of each
-    int *missed;
-    size_t met_count, missed_count, between_count;
+    int *missed, *missed_by_bounds;
+    size_t met_count, missed_count, between_count, missed_by_bounds_count;
 } Trial;
 
 static double trial_rounded(const Trial *trial, double value)
@@ -123,14 +126,17 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
     const size_t count = SPHERES_PER_ORIGIN, missed_size = SPHERES_PER_ORIGIN * sizeof(int);
     cl_mem buffers[] = {buffer_create(&probe_compute, lines_size, lines, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, row_size, row_bytes, CL_MEM_READ_ONLY),
+                        buffer_create(&probe_compute, missed_size, NULL, CL_MEM_WRITE_ONLY),
                         buffer_create(&probe_compute, missed_size, NULL, CL_MEM_WRITE_ONLY)};
     kernel_argument(&probe_compute, kernel, 0, sizeof(cl_mem), &buffers[0]);
     kernel_argument(&probe_compute, kernel, 1, sizeof(cl_mem), &buffers[1]);
     kernel_argument(&probe_compute, kernel, 2, sizeof common_origin, &common_origin);
     kernel_argument(&probe_compute, kernel, 3, sizeof(cl_mem), &buffers[2]);
+    kernel_argument(&probe_compute, kernel, 4, sizeof(cl_mem), &buffers[3]);
     kernel_launch(&probe_compute, kernel, 1, &count, NULL);
     buffer_read(&probe_compute, buffers[2], missed_size, trial->missed);
-    for (size_t i = 0; i < 3; i++)
+    buffer_read(&probe_compute, buffers[3], missed_size, trial->missed_by_bounds);
+    for (size_t i = 0; i < 4; i++)
         buffer_release(buffers[i]);
     clReleaseKernel(kernel);
     free(row_bytes);
@@ -145,6 +151,9 @@ static long double dot(const long double *a, const long double *b)
 // The enlargement of the squared radius, 256 + 128 (CULL_SPHERE_SLACK, CULL_DIRECTION_SLACK), and as much
 // again for roundings.
 #define CLEAR_MISS 800
+// Of the square of the distance that bounds of directions must tell from the radius: 2^-13 in each component
+// are up to 3^(1/2) 2^-12 of the square, and as much again.
+#define CLEAR_MISS_BY_BOUNDS 0x1p-10L
 
 // Judges one answer by the line's distance from the center, in long double.
 static void line_judge(Trial *trial, size_t index, bool from_eye)
@@ -175,6 +184,19 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
                      distance);
     } else {
         trial->between_count++;
+    }
+    // half a line: none of the ray lies beyond the common origin
+    const long double away = dot(v, d) * (from_eye ? 1 : -1);
+    if (away <= 0) distance = sqrtl(dot(v, v));
+    if (distance <= radius + slack) {
+        if (trial->missed_by_bounds[index])
+            fail_msg("sphere %zu of radius %a: culled by bounds although a ray is %La from its center", index,
+                     c.w, distance);
+    } else if (distance * distance - radius * radius > CLEAR_MISS_BY_BOUNDS * reach * reach) {
+        trial->missed_by_bounds_count++;
+        if (!trial->missed_by_bounds[index])
+            fail_msg("sphere %zu of radius %a: not culled by bounds although a ray is %La from its center",
+                     index, c.w, distance);
     }
 }
 
@@ -209,6 +231,7 @@ static void culling_check(void **state)
                    .random = {7}};
     trial.lines = memory_allocate((size_t)SPHERES_PER_ORIGIN * 6, sizeof *trial.lines);
     trial.missed = memory_allocate(SPHERES_PER_ORIGIN, sizeof *trial.missed);
+    trial.missed_by_bounds = memory_allocate(SPHERES_PER_ORIGIN, sizeof *trial.missed_by_bounds);
     for (size_t i = 0; i < ORIGIN_COUNT; i++) {
         trial_make(&trial, from_eye);
         trial_run(&trial, program, from_eye ? COMMON_ORIGIN_EYE : COMMON_ORIGIN_FIRST_LIGHT);
@@ -219,8 +242,10 @@ static void culling_check(void **state)
     // few answers are too near to call
     assert_true(trial.met_count > SPHERE_COUNT / 4);
     assert_true(trial.missed_count > SPHERE_COUNT / 8);
+    assert_true(trial.missed_by_bounds_count > SPHERE_COUNT / 8);
     free(trial.lines);
     free(trial.missed);
+    free(trial.missed_by_bounds);
     clReleaseProgram(program);
 }
 

@@ -206,9 +206,43 @@ static void precision_holds(void **state)
     }
 }
 
+// Without BVH, mirrors and glass up to 32 objects are culled for several packets at once. With one lane there
+// are no packets.
+static void culls_of_several_packets_change_nothing(void **state)
+{
+    (void)state;
+    static const size_t counts[] = {3, 9, 31, 32, 33, 34, OBJECTS};
+    Scene scene = random_scene(1, 2 * OBJECTS);
+    for (size_t i = 0; i < OBJECTS; i++) // all bounded
+        scene.objects.items[i] = scene.objects.items[2 * OBJECTS - 1 - i];
+    scene.objects.count = OBJECTS;
+    for (size_t i = 0; i < scene.materials.count; i++)
+        scene.materials.items[i].reflection = scene.materials.items[i].transmission = 0;
+    RenderSettings settings = film_settings(8 * WIDTH, 8 * HEIGHT, PRECISION_SINGLE);
+    settings.extra_features = features_of(&scene);
+    assert_int_equal(settings.extra_features & (FEATURE_REFLECTION | FEATURE_TRANSMISSION), 0);
+    settings.bvh = BVH_OFF;
+    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+        scene.objects.count = counts[i];
+        Case c = {.scene = &scene, .settings = settings, .name = "without mirrors and glass"};
+        c.settings.lanes = 1;
+        c.film = render_alone(&scene, &c.settings);
+        for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
+            char what[48];
+            snprintf(what, sizeof what, "%zu objects, %u lanes", counts[i], *lanes);
+            c.settings.lanes = *lanes;
+            Film film = render_alone(&scene, &c.settings);
+            same_and_freed(&c, &film, what);
+        }
+        film_free(&c.film);
+    }
+    scene_free(&scene);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(culls_of_several_packets_change_nothing),
         {"single_holds", precision_holds, NULL, NULL, &(Precision){PRECISION_SINGLE}},
         {"strict_holds", precision_holds, NULL, NULL, &(Precision){PRECISION_STRICT}},
         {"double_holds", precision_holds, NULL, NULL, &(Precision){PRECISION_DOUBLE}},

@@ -69,7 +69,8 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
         return;
     }
     compiled->cull_sphere_count = (uint32_t)count;
-    flat_array_renew(compiled, FLAT_CULL_SPHERES, count * (1 + lights->count));
+    // with unused ones at the end, because kernels read as many at once as they have lanes
+    flat_array_renew(compiled, FLAT_CULL_SPHERES, count * (1 + lights->count) + BVH_WIDTH_MAX);
     CullSphere *row = compiled->arrays[FLAT_CULL_SPHERES].items;
     row_fill(compiled, compiled->eye_offset, slack, row);
     for (size_t i = 0; i < lights->count; i++)

@@ -92,10 +92,10 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define MACRO_TILE_COLUMNS_LOG2 MACRO_TILE_COLUMNS_LOG2_OF(LANES)
 #define MACRO_TILE_ROWS         MACRO_TILE_ROWS_OF(LANES)
 #define TILES                   LANES // of a macro-tile
-// Packets traced together: a macro-tile's, where they traverse a BVH. Else four: each one's work fills the
-// latencies of the others' roots and quotients, and their data stays near. With bounces, which go packet by
-// packet, one.
-#define PACKETS (HAS_BVH ? TILES : HAS_REFLECTION || HAS_TRANSMISSION || TILES < 4 ? 1 : 4)
+// Packets traced together: a macro-tile's, where they traverse a BVH. Else up to eight: each one's work fills
+// the latencies of the others' roots and quotients, and their data stays near. With bounces, which go packet
+// by packet, one.
+#define PACKETS (HAS_BVH ? TILES : HAS_REFLECTION || HAS_TRANSMISSION ? 1 : TILES < 8 ? TILES : 8)
 #if LANES == 1
 #define LANE_X ((integer)(0))
 #define LANE_Y ((integer)(0))
@@ -226,12 +226,15 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-// 1 / a, off by 2^-14 of itself at most. MASK_BITS says that the compiler knows __has_builtin.
+// 1 / a and 1 / sqrt(a), off by 2^-14 of themselves at most. MASK_BITS says that the compiler knows
+// __has_builtin.
 #ifdef MASK_BITS
 #if LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
-#define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)
+#define RECIPROCAL_14_BITS(a)   __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)
+#define INVERSE_ROOT_14_BITS(a) __builtin_ia32_rsqrt14ps512_mask(a, a, 0xffff)
 #elif LANES == 8 && !IS_DOUBLE && defined(__AVX512VL__) && __has_builtin(__builtin_ia32_rcp14ps256_mask)
-#define RECIPROCAL_14_BITS(a) __builtin_ia32_rcp14ps256_mask(a, a, 0xff)
+#define RECIPROCAL_14_BITS(a)   __builtin_ia32_rcp14ps256_mask(a, a, 0xff)
+#define INVERSE_ROOT_14_BITS(a) __builtin_ia32_rsqrt14ps256_mask(a, a, 0xff)
 #endif
 #endif
 

@@ -97,6 +97,15 @@ static inline real reciprocal_estimate(real a)
     return device_divide((real)(1), a);
 }
 
+// 1 / sqrt(a) within 2^-14 and a few u of itself; a and the result are normal.
+static inline real inverse_root_estimate(real a)
+{
+#if defined(INVERSE_ROOT_14_BITS)
+    if (!PERTURB) return INVERSE_ROOT_14_BITS(a);
+#endif
+    return device_divide((real)(1), device_sqrt(a));
+}
+
 // Whether |a / b| < 1 / SMALLEST_RATIO, without dividing. Scales b: of the height of a shadow ray's start
 // above its own plane the product with SMALLEST_RATIO is subnormal, which costs x86 processors more than a
 // hundred cycles.

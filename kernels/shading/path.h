@@ -63,8 +63,9 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
     LightVisibility lights[PACKETS];
     const uint light_count = COMPUTE_SIGNATURE ? 0 : scene->header->image.w;
     uint packets = 0, found = 0; // as bits: those that traverse the BVH, and those that hit anything
+    uint near = packets_near(scene, rays, (1u << count) - 1);
     for (uint i = 0; i < count; i++)
-        if (traversal_begin(&traversals[i], scene, &rays[i], CLOSEST_HIT)) packets |= 1u << i;
+        if (traversal_begin(&traversals[i], scene, &rays[i], CLOSEST_HIT, near)) packets |= 1u << i;
     if (HAS_BVH) packets_traverse_bvh(traversals, scene, rays, packets);
     for (uint i = 0; i < count; i++)
         if (hit_shade(scene, &rays[i], &traversals[i], &hits[i])) found |= 1u << i;
@@ -72,8 +73,9 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
         packets = 0;
         for (uint i = 0; i < count; i++)
             if (found >> i & 1) lights[i] = light_reach(scene, &hits[i].surface, light, &shadow_rays[i]);
+        near = packets_near(scene, shadow_rays, found);
         for (uint i = 0; i < count; i++)
-            if (found >> i & 1 && traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION))
+            if (found >> i & 1 && traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION, near))
                 packets |= 1u << i;
         if (HAS_BVH) packets_traverse_bvh(traversals, scene, shadow_rays, packets);
         for (uint i = 0; i < count; i++)

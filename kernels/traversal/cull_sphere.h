@@ -5,19 +5,19 @@
 #include "scene.h"
 #include "traversal/ray.h"
 
-// The lanes whose lines certainly miss the sphere. A line along d through a common origin misses a sphere
-// around v, seen from there, if (v . d)^2 < p d^2 for the origin's power p = v^2 - r^2. The sphere is
-// enlarged by 64 u (|v| + |d|), for the error of the shape's own test, the roundings here and the line's
-// distance from the common origin: p is lowered by 256 u v^2, on the host, and by 128 u d^2, which times d^2
-// is the ray's cull slack. A shadow ray's |d| is the distance to the light; rays from the eye start there and
-// need only the former.
-static inline mask ray_misses_cull_sphere(const Ray *ray, global const CullSphere *sphere)
+// Returns the lanes whose rays may hit what is inside the sphere. A line along d through a common origin
+// misses a sphere around v, seen from there, if (v . d)^2 < p d^2 for the origin's power p = v^2 - r^2, which
+// is lowered by 256 u v^2, on the host, and here by 128 u d^2, the ray's cull slack. A shadow ray's |d| is
+// the distance to the light; rays from the eye start there and need only the former. docs/numerics.md derives
+// this and the cull of several packets.
+static inline mask ray_meets_cull_sphere(const Ray *ray, global const CullSphere *sphere)
 {
     global const scalar *center_power = (global const scalar *)sphere;
     real along = real_fma(
         (real)(center_power[0]), ray->direction.x,
         real_fma((real)(center_power[1]), ray->direction.y, (real)(center_power[2]) * ray->direction.z));
-    return real_fma(along, along, ray->cull_slack) < ray->squared * (real)(center_power[3]);
+    real power = (real)(center_power[3]) - ray_cull_slack(ray);
+    return RAY_ACTIVE(ray) & !(along * along < ray->squared * power);
 }
 
 // The row of cull spheres of the ray's common origin, 0 if there is none: first that of the BVH, then those
@@ -29,13 +29,84 @@ static inline global const CullSphere *ray_cull_spheres(const Scene *scene, cons
     return scene->cull_spheres + (size_t)(ray->common_origin - COMMON_ORIGIN_EYE) * count;
 }
 
-// The length of the run of spheres, from the first, up to `count`, that all lanes miss.
-static inline uint cull_spheres_missed(global const CullSphere *cull_spheres, uint count, const Ray *ray)
+// Bounds of the unit directions in which rays are seen from their common origin.
+typedef struct {
+    scalar4 center, reach; // of each component
+    scalar slack;          // the largest cull slack
+} DirectionBounds;
+
+// More than the error of inverse_root_estimate, and all roundings here and in directions_meet_cull_spheres.
+#define DIRECTION_REACH_SLACK ((scalar)(0x1p-13f))
+
+// Bounds the active rays of `packets`, given as bits. Returns false if a length is too small to square.
+static inline bool rays_bound_directions(const Ray *rays, uint packets, DirectionBounds *bounds)
 {
-    uint missed = 0;
-    while (missed < count && lanes_all(ray_misses_cull_sphere(ray, &cull_spheres[missed])))
-        missed++;
-    return missed;
+    const Ray *first = &rays[lowest_bit(packets)];
+    LaneMinima minima;
+#pragma unroll
+    for (uint i = 0; i < MINIMA_COUNT; i++)
+        minima.all[i] = (real)(LARGEST);
+// a packet that is not among them counts as the first one: branches would keep the bounds out of registers
+#pragma unroll
+    for (uint packet = 0; packet < PACKETS; packet++) {
+        const Ray *ray = packets >> packet & 1 ? &rays[packet] : first;
+        const mask active = RAY_ACTIVE(ray);
+        const real squared = real_max(ray->squared, (real)(SMALLEST_RATIO));
+        const Vector unit = vector_scale(ray->direction, inverse_root_estimate(squared));
+        const real values[MINIMA_COUNT] = {unit.x, -unit.x, unit.y,  -unit.y,
+                                           unit.z, -unit.z, squared, -ray_cull_slack(ray)};
+#pragma unroll
+        for (uint i = 0; i < MINIMA_COUNT; i++)
+            minima.all[i] = lanes_select(active, real_min(values[i], minima.all[i]), minima.all[i]);
+    }
+    lane_minima_reduce(&minima);
+    const scalar *least = minima.each;
+    const scalar side = first->common_origin == COMMON_ORIGIN_EYE ? 0.5f : -0.5f; // rays to a light end there
+    bounds->center = (scalar4)(least[0] - least[1], least[2] - least[3], least[4] - least[5], 0) * side;
+    bounds->reach =
+        (scalar4)(-least[0] - least[1], -least[2] - least[3], -least[4] - least[5], 0) * fabs(side) +
+        DIRECTION_REACH_SLACK;
+    bounds->slack = -least[7];
+    return least[6] > SMALLEST_RATIO;
+}
+
+// Returns which of the next LANES spheres, as bits, any ray may intersect.
+static inline uint directions_meet_cull_spheres(const DirectionBounds *bounds,
+                                                global const CullSphere *spheres)
+{
+    RealLanes x, y, z, power;
+    for (uint lane = 0; lane < LANES; lane++) {
+        global const scalar *center_power = (global const scalar *)&spheres[lane];
+        x.each[lane] = center_power[0];
+        y.each[lane] = center_power[1];
+        z.each[lane] = center_power[2];
+        power.each[lane] = center_power[3];
+    }
+    const Vector v = {x.all, y.all, z.all}, size = {fabs(x.all), fabs(y.all), fabs(z.all)};
+    real along = vector_dot(v, vector_of(bounds->center)) + vector_dot(size, vector_of(bounds->reach));
+    along = real_max(along, (real)(0)); // behind the origin there is no ray
+    return lanes_bits(!(along * along < power.all - (real)(bounds->slack)));
+}
+
+// Without BVH and bounces several packets are culled at once. With fewer spheres each packet's own test is
+// faster, more do not fit the bits.
+#define HAS_GROUP_CULLS (PACKETS > 1 && !HAS_BVH)
+enum { GROUP_CULLS_MIN = 4, GROUP_CULLS_MAX = 32 };
+
+// Returns which primitives with cull spheres any active ray of `packets` may hit. Both are bits; bits beyond
+// the last primitive are undefined. If there are more than 32 primitives, all bits are set.
+static inline uint packets_near(const Scene *scene, const Ray *rays, uint packets)
+{
+    const uint count = scene->header->cull_spheres.x; // with the BVH's
+    DirectionBounds bounds;
+    if (!HAS_GROUP_CULLS || packets == 0 || count <= GROUP_CULLS_MIN || count > 1 + GROUP_CULLS_MAX)
+        return ~0u;
+    global const CullSphere *spheres = ray_cull_spheres(scene, &rays[lowest_bit(packets)]);
+    if (!spheres || !rays_bound_directions(rays, packets, &bounds)) return ~0u;
+    uint near = 0;
+    for (uint i = 0; i + 1 < count; i += LANES)
+        near |= directions_meet_cull_spheres(&bounds, spheres + 1 + i) << i;
+    return near;
 }
 
 #endif

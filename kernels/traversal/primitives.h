@@ -59,17 +59,14 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
 #endif
 SHAPE_LIST(INTERSECT_SHAPE)
 
-// Intersects primitives first .. last - 1 of one kind; `cull_spheres`, if not 0, are theirs. One function per
-// kind: if one function tested all kinds, Mesa, which inlines before it knows the kind asked for, would
-// compile them all at each call.
+// Intersects primitives first .. last - 1 of one kind. One function per kind: if one function tested all
+// kinds, Mesa, which inlines before it knows the kind asked for, would compile them all at each call.
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
     static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
-                                         uint first, uint last, global const CullSphere *cull_spheres)       \
+                                         uint first, uint last)                                              \
     {                                                                                                        \
         bool found_any = false;                                                                              \
         for (uint i = first; i < last; i++) {                                                                \
-            if (cull_spheres) i += cull_spheres_missed(cull_spheres + (i - first), last - i, ray);           \
-            if (i == last) break;                                                                            \
             if (!intersect_##name(traversal, scene, ray, scene->names[i])) continue;                         \
             found_any = true;                                                                                \
             if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;                       \
@@ -77,6 +74,25 @@ SHAPE_LIST(INTERSECT_SHAPE)
         return found_any;                                                                                    \
     }
 SHAPE_LIST(INTERSECT_SHAPES)
+
+// Intersects those of `count` primitives of one kind whose bits are set in `near` and whose cull spheres, if
+// these are not 0, a ray may hit. More than 32 primitives have no bits: all count as near.
+#define INTERSECT_NEAR_SHAPES(feature, Type, name, names)                                                    \
+    static inline void intersect_near_##names(Traversal *traversal, const Scene *scene, const Ray *ray,      \
+                                              uint first, uint count, uint near,                             \
+                                              global const CullSphere *cull_spheres)                         \
+    {                                                                                                        \
+        for (uint next = 0; next < count; next += 32, near = ~0u) {                                          \
+            if (count - next < 32) near &= (1u << (count - next)) - 1;                                       \
+            for (; near != 0; near &= near - 1) {                                                            \
+                const uint i = next + lowest_bit(near);                                                      \
+                if (cull_spheres && !lanes_any(ray_meets_cull_sphere(ray, &cull_spheres[i]))) continue;      \
+                intersect_##names(traversal, scene, ray, first + i, first + i + 1);                          \
+                if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) return;                  \
+            }                                                                                                \
+        }                                                                                                    \
+    }
+SHAPE_LIST(INTERSECT_NEAR_SHAPES)
 
 // The first triangle of a block.
 static inline uint block_first(const Scene *scene, uint block)
@@ -92,8 +108,7 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
     const uint first = LANES > 1 && kind == KIND_TRIANGLES ? block_first(scene, index) : index;
     const uint last = first + (leaf >> 8);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && kind == KIND_##feature)                                                             \
-        return intersect_##names(traversal, scene, ray, first, last, 0);
+    if (HAS_##feature && kind == KIND_##feature) return intersect_##names(traversal, scene, ray, first, last);
     SHAPE_LIST(INTERSECT_LEAF)
     return false;
 }
@@ -102,12 +117,12 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
 static inline void intersect_all_planes(Traversal *traversal, const Scene *scene, const Ray *ray)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
-    if (HAS_PLANES) intersect_planes(traversal, scene, ray, 0, counts[KIND_PLANES], 0);
+    if (HAS_PLANES) intersect_planes(traversal, scene, ray, 0, counts[KIND_PLANES]);
 }
 
 // Intersects all other primitives outside the BVH: the unbounded and the huge, or all in a scene without a
-// BVH.
-static OUT_OF_LINE void intersect_outside_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
+// BVH. `near` has the bits that packets_near returns.
+static OUT_OF_LINE void intersect_outside_bvh(Traversal *traversal, const Scene *scene, Ray *ray, uint near)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
     global const uint *bvh_counts = (global const uint *)scene->header->bvh_counts;
@@ -118,9 +133,10 @@ static OUT_OF_LINE void intersect_outside_bvh(Traversal *traversal, const Scene 
     if (cull_spheres) cull_spheres++; // the first is the BVH's
 #define INTERSECT_OUTSIDE_BVH(feature, Type, name, names)                                                    \
     if (HAS_##feature && KIND_##feature != KIND_PLANES && lanes_any(traversal->active)) {                    \
-        uint first = bvh_counts[KIND_##feature], last = counts[KIND_##feature];                              \
-        intersect_##names(traversal, scene, ray, first, last, cull_spheres);                                 \
-        if (cull_spheres) cull_spheres += last - first;                                                      \
+        uint first = bvh_counts[KIND_##feature], count = counts[KIND_##feature] - first;                     \
+        intersect_near_##names(traversal, scene, ray, first, count, near, cull_spheres);                     \
+        near = count < 32 ? ~(~near >> count) : ~0u;                                                         \
+        if (cull_spheres) cull_spheres += count;                                                             \
     }
     SHAPE_LIST(INTERSECT_OUTSIDE_BVH)
 }

@@ -21,7 +21,7 @@ typedef struct {
     real travelled;  // distance from the eye to the origin, for texture filtering
     // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|
     uint common_origin;
-    real cull_slack; // enlarges cull spheres by the rounding of the direction
+    real cull_slack; // at `certified`: ray_cull_slack
     // At `certified`: bounds on the distance of the origin from the exact ray's line, and of the direction,
     // relative to its length; the object that the ray leaves, -1: none; whether it leaves it outward for
     // certain; whether the exact rays end at one point, a light, where their origins' errors have vanished.
@@ -182,16 +182,23 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     return ray;
 }
 
-// Call once ray->active is final: inactive lanes miss every cull sphere. `skips_culling`: lanes that are too
-// far off to be culled.
+// `skips_culling`: lanes that are too far off to be culled.
 static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask skips_culling)
 {
     ray->common_origin = common_origin;
-    const scalar units = IS_CERTIFIED ? CERTIFIED_CULL_DIRECTION_SLACK : CULL_DIRECTION_SLACK;
-    real slack = (real)(units * UNIT_ROUNDOFF) * (ray->squared * ray->squared);
+    if (!IS_CERTIFIED) return;
+    real slack = (real)(CERTIFIED_CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * ray->squared;
     if (common_origin == COMMON_ORIGIN_EYE) slack = (real)(0); // rays start exactly there
-    if (IS_CERTIFIED) slack = lanes_select(skips_culling, (real)(LARGEST), slack);
-    ray->cull_slack = lanes_select(ray->active, slack, (real)(-LARGEST));
+    ray->cull_slack = lanes_select(skips_culling, (real)(LARGEST), slack);
+}
+
+// Returns by how much the powers of cull spheres are lowered because rays to a light miss it by the rounding
+// of their direction.
+static inline real ray_cull_slack(const Ray *ray)
+{
+    if (IS_CERTIFIED) return ray->cull_slack;
+    if (ray->common_origin == COMMON_ORIGIN_EYE) return (real)(0);
+    return (real)(CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * ray->squared;
 }
 
 // The nearer of two crossings, near_t <= far_t, beyond the ray's start: far_t if near_t lies before it.

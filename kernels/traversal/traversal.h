@@ -7,8 +7,9 @@
 #include "traversal/single.h"
 #include "traversal/tile_traversal.h"
 
-// Starts a packet's traversal with what is outside the BVH. Returns whether the BVH is left to traverse.
-static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
+// Starts a packet's traversal with what is outside the BVH. `near` has the bits that packets_near returns.
+// Returns whether the BVH is left to traverse.
+static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query, uint near)
 {
     traversal->query = query;
     traversal->active = ray->active;
@@ -24,10 +25,10 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     if (!lanes_any(ray->active)) return false;
     intersect_all_planes(traversal, scene, ray);
     // without cull spheres, or if there are others than the BVH's
-    if (scene->header->cull_spheres.x != 1) intersect_outside_bvh(traversal, scene, ray);
+    if (near != 0 && scene->header->cull_spheres.x != 1) intersect_outside_bvh(traversal, scene, ray, near);
     if (!HAS_BVH || !lanes_any(traversal->active)) return false;
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
-    return !cull_spheres || cull_spheres_missed(cull_spheres, 1, ray) == 0;
+    return !cull_spheres || lanes_any(ray_meets_cull_sphere(ray, cull_spheres));
 }
 
 // Traverses the BVH with `packets`, as bits: those for which traversal_begin left it. Their rays all have the
@@ -51,7 +52,7 @@ static OUT_OF_LINE void packets_traverse_bvh(Traversal *traversals, const Scene 
 // Traces one packet.
 static OUT_OF_LINE void ray_traverse(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
 {
-    if (traversal_begin(traversal, scene, ray, query)) packets_traverse_bvh(traversal, scene, ray, 1);
+    if (traversal_begin(traversal, scene, ray, query, ~0u)) packets_traverse_bvh(traversal, scene, ray, 1);
     if (IS_CERTIFIED) traversal_judge(traversal);
 }
 
