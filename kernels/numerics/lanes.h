@@ -238,6 +238,17 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
+// Returns floor(a), by one instruction where the processor has it: PoCL's own floor takes ten.
+static inline real real_floor(real a)
+{
+#if IS_CPU_CLANG && LANES > 1 && (defined(__SSE4_1__) || defined(__aarch64__))
+#if __has_builtin(__builtin_elementwise_floor)
+    return __builtin_elementwise_floor(a);
+#endif
+#endif
+    return floor(a);
+}
+
 // The mask as bits, lane 0 lowest.
 static inline uint lanes_bits(mask condition)
 {

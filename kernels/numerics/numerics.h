@@ -246,7 +246,7 @@ static inline real real_exp_negative(real x)
     const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
 #endif
     real within = real_max(x, lowest);
-    real k = floor(real_fma(within, log2_e, (real)(0.5f)));
+    real k = real_floor(real_fma(within, log2_e, (real)(0.5f)));
     real r = real_fma(-k, ln2_low, real_fma(-k, ln2_high, within));
     real series;
 #if IS_DOUBLE

@@ -187,7 +187,7 @@ static inline real point_normal_error(const SurfacePoint *point, real place_erro
 
 static inline mask floor_is_doubtful(real a, real error)
 {
-    return !(floor(a - error) == floor(a + error));
+    return !(real_floor(a - error) == real_floor(a + error));
 }
 
 // Where the checker has its second color. On planes and discs squares lie in the surface; elsewhere they are
@@ -199,7 +199,7 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
     real cells;
     if (kind_has_grid(kind)) {
         GridCoordinates square = grid_coordinates(scene, kind, index, point->position);
-        cells = floor(square.u) + floor(square.v);
+        cells = real_floor(square.u) + real_floor(square.v);
         if (IS_CERTIFIED) {
             real error = grid_error(scene, kind, index, point->position, place_error);
             *doubt = floor_is_doubtful(square.u, error) | floor_is_doubtful(square.v, error);
@@ -209,7 +209,7 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
         Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
         Vector cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
         cell = vector_fma(inward, (real)(0x1p-10f), cell);
-        cells = floor(cell.x) + floor(cell.y) + floor(cell.z);
+        cells = real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z);
         if (IS_CERTIFIED) {
             const scalar cells_per_unit = fabs(grid.w);
             real error = (real)(cells_per_unit)*place_error +
@@ -221,7 +221,7 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
         }
     }
     real halved = cells * (real)(0.5f);
-    return floor(halved) != halved;
+    return real_floor(halved) != halved;
 }
 
 // The object's color at the hit: plain, checkered or textured. `entry` is the object's kind_index_material.
