@@ -1,9 +1,9 @@
 // glint: the subcommands by name.
+#include "host/api/version.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
-#include "host/api/version.h"
 #include "host/import/mesh/assimp_process.h"
 #include <errno.h>
 #include <signal.h>

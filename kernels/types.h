@@ -255,8 +255,8 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define MACRO_TILE_COLUMNS_OF(lanes)      (1 << MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 #define MACRO_TILE_ROWS_OF(lanes)         ((lanes) >> MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 
-// The scalars of an explicit ray and of its result (kernels/trace.h): the offset of each vector. closest.cl fills
-// CLOSEST_SCALARS per ray, trace.cl all.
+// The scalars of an explicit ray and of its result (kernels/trace.h): the offset of each vector. closest.cl
+// fills CLOSEST_SCALARS per ray, trace.cl all.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };
 enum {
     RESULT_T,

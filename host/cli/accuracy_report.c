@@ -1,8 +1,8 @@
 #include "host/cli/accuracy_report.h"
 
+#include "host/api/version.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/api/version.h"
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>

@@ -1,9 +1,9 @@
 #include "host/cli/bench_report.h"
 
+#include "host/api/version.h"
 #include "host/base/fault.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/api/version.h"
 #include "host/measure/baseline.h"
 #include <inttypes.h>
 #include <math.h>

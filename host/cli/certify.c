@@ -1,5 +1,6 @@
 // glint certify: a scene's image at each precision against the reference, on a sample of its pixels.
 #include "host/verify/certify.h"
+#include "host/api/version.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
@@ -10,7 +11,6 @@
 #include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
-#include "host/api/version.h"
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>

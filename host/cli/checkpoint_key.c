@@ -1,7 +1,7 @@
 #include "host/cli/checkpoint_key.h"
 
-#include "host/base/hash.h"
 #include "host/api/version.h"
+#include "host/base/hash.h"
 #include "host/opencl/compose.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,12 +1,12 @@
 #include "host/cli/image_output.h"
 
+#include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
 #include "host/base/text.h"
 #include "host/cli/options.h"
-#include "host/api/version.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>

@@ -1,9 +1,9 @@
 #include "host/cli/timing.h"
 
+#include "host/api/version.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
-#include "host/api/version.h"
 #include <stdio.h>
 
 bool timing_style_read(const char *value, TimingStyle *style)

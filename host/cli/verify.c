@@ -1,5 +1,6 @@
 // glint verify: the hard cases on a device, one line each.
 #include "host/verify/verify.h"
+#include "host/api/version.h"
 #include "host/base/clock.h"
 #include "host/base/json.h"
 #include "host/base/text.h"
@@ -9,7 +10,6 @@
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/cli/verify_journal.h"
-#include "host/api/version.h"
 #include "host/render/arithmetic.h"
 #include <getopt.h>
 #include <inttypes.h>
