@@ -133,6 +133,7 @@ MEANINGS = {
     "precisions[].color.{max_right,max_wrong}": "number; where nothing is wrong, and where something is",
     "precisions[].color.{x,y}": "count; the pixel of the larger",
     "precisions[].wrong_decided": "count; at `certified`: wrong pixels that are not undecided, contradicted ones among them",
+    "precisions[].claim": "text; `kept` or `broken`; at `certified`",
     "precisions[].unconfirmed": "count; at `certified`: pixels that it decides and the reference does not",
     "precisions[].contradicted": "count; of these, whose answer differs from the reference's",
     "precisions[].undecided": "object; at `certified`",

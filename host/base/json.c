@@ -109,17 +109,22 @@ void json_text(Json *json, const char *key, const char *value)
     json_quote(json, value);
 }
 
+void json_number_print(char word[JSON_NUMBER_SIZE], double value)
+{
+    snprintf(word, JSON_NUMBER_SIZE, "null");
+    if (!isfinite(value)) return;
+    // 17 digits always suffice (Goldberg, What every computer scientist should know about floating-point
+    // arithmetic, 1991, theorem 15).
+    int digits = 1;
+    do
+        snprintf(word, JSON_NUMBER_SIZE, "%.*g", digits, value);
+    while (digits++ < 17 && strtod(word, NULL) != value);
+}
+
 void json_number(Json *json, const char *key, double value)
 {
-    char word[32] = "null";
-    if (isfinite(value)) {
-        // 17 digits always suffice (Goldberg, What every computer scientist should know about
-        // floating-point arithmetic, 1991, theorem 15).
-        int digits = 1;
-        do
-            snprintf(word, sizeof word, "%.*g", digits, value);
-        while (digits++ < 17 && strtod(word, NULL) != value);
-    }
+    char word[JSON_NUMBER_SIZE];
+    json_number_print(word, value);
     json_word(json, key, word);
 }
 
@@ -140,13 +145,20 @@ void json_none(Json *json, const char *key)
     json_word(json, key, "null");
 }
 
-void json_print(Json *json, FILE *stream)
+Text json_close(Json *json)
 {
     while (json->count)
         json_end(json);
     text_append(&json->text, "\n", 1);
-    fwrite(json->text.items, 1, json->text.count, stream);
-    text_free(&json->text);
+    const Text text = json->text;
     free(json->items);
     free(json);
+    return text;
+}
+
+void json_print(Json *json, FILE *stream)
+{
+    Text text = json_close(json);
+    fwrite(text.items, 1, text.count, stream);
+    text_free(&text);
 }

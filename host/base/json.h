@@ -2,6 +2,7 @@
 // Calls nest: json_begin_object ... json_end.
 #pragma once
 
+#include "host/base/text.h"
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -17,5 +18,10 @@ void json_number(Json *json, const char *key, double value);    // shortest that
 void json_int64(Json *json, const char *key, int64_t value);
 void json_bool(Json *json, const char *key, bool value);
 void json_none(Json *json, const char *key);
+// Writes a number as JSON has it: the shortest that reads back; null where it is not finite.
+enum { JSON_NUMBER_SIZE = 32 };
+void json_number_print(char word[JSON_NUMBER_SIZE], double value);
+// Returns the document with one newline at its end, and frees the writer.
+Text json_close(Json *json);
 // Prints the document and one newline, and frees it.
 void json_print(Json *json, FILE *stream);

@@ -17,7 +17,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_BUDGET, OPTION_SAVE, OPTION_JSON, OPTION_HTML };
+enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_BUDGET, OPTION_SAVE, OPTION_HTML };
 
 static const struct option long_options[] = {
     {"reference", required_argument, NULL, OPTION_REFERENCE},
@@ -25,7 +25,7 @@ static const struct option long_options[] = {
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"save", required_argument, NULL, OPTION_SAVE},
-    {"json", no_argument, NULL, OPTION_JSON},
+    FORMAT_LONG_OPTIONS,
     {"html", required_argument, NULL, OPTION_HTML},
     VARIANT_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
@@ -45,13 +45,13 @@ static const char help_text[] =
     "      --save FOLDER     write all compared arrays there, as .npy\n"
     "      --html FILE       self-contained HTML report\n"
     "      --precision LIST  of single, strict, double, certified (default: the first three)\n" //
-    HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_JSON HELP_HELP;
+    HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_FORMAT HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
     const char *reference_path, *folder, *page_path;
     AccuracyBudgets budgets;
-    bool as_json;
+    ReportOptions report;
 } AccuracyOptions;
 
 typedef struct {
@@ -78,6 +78,7 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
 {
     bool valid = true;
     if (variant_option(&options->variants, option, value, &valid)) return valid;
+    if (option_report(&options->report, option, value, &valid)) return valid;
     switch (option) {
     case OPTION_REFERENCE:
         options->reference_path = value;
@@ -88,8 +89,6 @@ static bool option_take(AccuracyOptions *options, int option, const char *value)
     case OPTION_SAVE:
         options->folder = value;
         return true;
-    case OPTION_JSON:
-        options->as_json = true;
         return true;
     case OPTION_HTML:
         options->page_path = value;
@@ -113,6 +112,7 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
         return option_usage_fault("accuracy", "--html takes a file's name");
     if (options->reference_path && optind + 1 != argument_count)
         return option_usage_fault("accuracy", "a reference is for one scene");
+    if (!report_options_check(&options->report, &accuracy_table)) return EXIT_USER;
     return OPTIONS_READ;
 }
 
@@ -360,10 +360,10 @@ static int accuracy_run(Accuracy *accuracy)
         fputs("glint: interrupted\n", stderr);
     if (status != EXIT_DONE) return status;
     const AccuracyReport report = report_of(accuracy);
-    if (accuracy->options.as_json)
-        json_print(accuracy_json(&report), stdout);
-    else
-        accuracy_print_text(&report, stdout);
+    const ReportOptions *options = &accuracy->options.report;
+    if (report_has_text(options)) accuracy_print_text(&report, stdout);
+    if (options->format != FORMAT_TEXT && !report_write(accuracy_json(&report), &accuracy_table, options))
+        return EXIT_USER;
     if (!page_commit(accuracy, &report)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     fputs("glint accuracy: no variant could be rendered\n", stderr);

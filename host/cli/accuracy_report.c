@@ -7,6 +7,35 @@
 #include <math.h>
 #include <string.h>
 
+const ResultTable accuracy_table = {
+    .command = "accuracy",
+    .rows = "scenes.variants",
+    .columns = {{"scene", "scene"},
+                {"size", "size"},
+                {"precision", "precision"},
+                {"lanes", "lanes"},
+                {"BVH", "bvh"},
+                {"samples", "samples"},
+                {"frame ms", "frame_ms.median"},
+                {"kernel ms", "kernel_ms.median"},
+                {"objects at edges", "errors.object.edge"},
+                {"objects away", "errors.object.away"},
+                {"shadows at edges", "errors.shadow.edge"},
+                {"shadows away", "errors.shadow.away"},
+                {"paths at edges", "errors.path.edge"},
+                {"paths away", "errors.path.away"},
+                {"shading RMSE", "errors.shading.rmse"},
+                {"t ulp 99.9%", "errors.t.ulps.p99_9"},
+                {"normal 99.9%", "errors.normal.p99_9"},
+                {"PSNR dB", "errors.image.psnr"},
+                {"FLIP mean", "errors.image.flip_mean"},
+                {"crossed out", "crossed_out"}},
+    .name_count = 6,
+    .verdicts = {"crossed_out"},
+    .failed = "true",
+    .times = "frame_ms.median",
+};
+
 static const char is_reference[] =
     "it is the reference that the others are compared with, and has no errors of its own";
 

@@ -1,8 +1,8 @@
 // What glint accuracy reports: text or JSON.
 #pragma once
 
-#include "host/base/json.h"
 #include "host/base/text.h"
+#include "host/cli/format.h"
 #include "host/measure/accuracy.h"
 #include "host/opencl/device.h"
 
@@ -15,6 +15,7 @@ typedef struct {
 } AccuracyReport;
 
 void accuracy_print_text(const AccuracyReport *report, FILE *stream);
+extern const ResultTable accuracy_table;           // of accuracy_json
 Json *accuracy_json(const AccuracyReport *report); // docs/glint-json.5; to be printed
 
 // Path prefix of the saved arrays of a scene's variant, or of its reference if `variant` is NULL:

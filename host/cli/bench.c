@@ -13,8 +13,7 @@
 #include <sys/utsname.h>
 
 enum {
-    OPTION_JSON = OPTION_BEYOND_VARIANTS,
-    OPTION_COMPARE,
+    OPTION_COMPARE = OPTION_BEYOND_VARIANTS,
     OPTION_AGAINST,
     OPTION_WORKER,
     OPTION_TOLERANCE,
@@ -22,7 +21,7 @@ enum {
 };
 
 static const struct option long_options[] = {
-    {"json", no_argument, NULL, OPTION_JSON},
+    FORMAT_LONG_OPTIONS,
     {"compare", required_argument, NULL, OPTION_COMPARE},
     {"against", required_argument, NULL, OPTION_AGAINST},
     {"worker", no_argument, NULL, OPTION_WORKER},
@@ -48,13 +47,14 @@ static const char help_text[] =
     "      --launches        list the kernel launches of each row's last run\n"
     "      --precision LIST  of single, strict, double, certified (default: single)\n"
     "      --samples LIST    per pixel, one row each (default: 1)\n" //
-    HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_JSON HELP_HELP;
+    HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_FORMAT HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
     double tolerance; // 0: not given
     const char *baseline, *against;
-    bool as_json, launches, is_worker;
+    ReportOptions report;
+    bool launches, is_worker;
 } BenchOptions;
 
 typedef struct {
@@ -67,6 +67,7 @@ static bool option_take(BenchOptions *options, int option, const char *value)
 {
     bool valid = true;
     if (variant_option(&options->variants, option, value, &valid)) return valid;
+    if (option_report(&options->report, option, value, &valid)) return valid;
     switch (option) {
     case OPTION_TOLERANCE:
         if (option_positive("tolerance", value, &options->tolerance) && options->tolerance >= 1) return true;
@@ -81,9 +82,6 @@ static bool option_take(BenchOptions *options, int option, const char *value)
         return true;
     case OPTION_WORKER:
         options->is_worker = true;
-        return true;
-    case OPTION_JSON:
-        options->as_json = true;
         return true;
     case OPTION_LAUNCHES:
         options->launches = true;
@@ -138,12 +136,11 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         .calibration = &set->calibration,
         .comparisons = comparisons,
     };
-    if (options->as_json)
-        bench_print_json(&report);
-    else
-        bench_print_text(&report, stdout);
+    if (report_has_text(&options->report)) bench_print_text(&report, stdout);
+    const bool is_written = options->report.format == FORMAT_TEXT ||
+                            report_write(bench_json(&report), &bench_table, &options->report);
     free(reports);
-    int status = EXIT_DONE;
+    int status = is_written ? EXIT_DONE : EXIT_USER;
     if (!variant_set_any_measured(set)) {
         fputs("glint bench: no row could be measured\n", stderr);
         status = EXIT_USER;
@@ -171,7 +168,7 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     if (bench->options.is_worker) return bench_work(&bench->set, compute);
     const VariantOptions *options = &bench->options.variants;
     Progress progress;
-    progress_open(&progress, bench->options.as_json);
+    progress_open(&progress, !report_has_text(&bench->options.report));
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
     if (!whole) {
@@ -189,7 +186,7 @@ static int against_run(Bench *bench, int argument_count, char **arguments)
         .other = options->against,
         .tolerance = options->tolerance > 0 ? options->tolerance : against_tolerance,
         .seconds = seconds > 0 ? seconds : against_seconds * (double)bench->set.count,
-        .as_json = options->as_json,
+        .report = options->report,
         .argument_count = argument_count,
         .arguments = arguments,
     };
@@ -237,6 +234,7 @@ int command_bench(int argument_count, char **arguments)
     for (int i = optind; options->against && i < argument_count; i++)
         if (strcmp(arguments[i], "-") == 0)
             return option_usage_fault("bench", "--against reads each scene again and again: not from '-'");
+    if (!report_options_check(&bench.options.report, &bench_table)) return EXIT_USER;
 
     int status = EXIT_USER;
     if (variant_set_open(&bench.set, &options->variants, arguments + optind,

@@ -255,7 +255,7 @@ static int pairs_run(Against *against, Progress *progress)
     }
 }
 
-static void against_print_json(const Against *against, const Device *device)
+static Json *against_json(const Against *against, const Device *device)
 {
     Json *json = json_open();
     report_start_json(json);
@@ -281,7 +281,8 @@ static void against_print_json(const Against *against, const Device *device)
         }
         json_end(json);
     }
-    json_print(json, stdout);
+    json_end(json);
+    return json;
 }
 
 static void against_print_text(const Against *against, const Device *device)
@@ -320,16 +321,16 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
             set->rows[i].key.lanes =
                 device_lanes(device, set->variants[i].settings.precision == PRECISION_DOUBLE);
     Progress progress;
-    progress_open(&progress, options->as_json);
+    progress_open(&progress, !report_has_text(&options->report));
     int status = pairs_run(&against, &progress);
     progress_close(&progress);
     if (status == EXIT_DONE) {
         passports_recall(device); // the workers' have them
-        if (options->as_json)
-            against_print_json(&against, device);
-        else
-            against_print_text(&against, device);
-        status = comparisons_status(against.comparisons, set->count, options->other);
+        if (report_has_text(&options->report)) against_print_text(&against, device);
+        if (options->report.format != FORMAT_TEXT &&
+            !report_write(against_json(&against, device), &bench_table, &options->report))
+            status = EXIT_USER;
+        if (status == EXIT_DONE) status = comparisons_status(against.comparisons, set->count, options->other);
     }
     if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);
     for (size_t i = 0; i < set->count; i++) {

@@ -1,13 +1,14 @@
 // glint bench --against: two builds, measured interleaved by pairs of processes.
 #pragma once
 
+#include "host/cli/format.h"
 #include "host/cli/options.h"
 #include "host/cli/variants.h"
 
 typedef struct {
     const char *other; // the program to compare with
     double tolerance, seconds;
-    bool as_json;
+    ReportOptions report;
     int argument_count; // of glint bench, for the workers
     char **arguments;
 } AgainstOptions;

@@ -68,6 +68,33 @@ int comparisons_status(const RowComparison *comparisons, size_t count, const cha
     return EXIT_DONE;
 }
 
+const ResultTable bench_table = {
+    .command = "bench",
+    .rows = "runs",
+    .columns = {{"scene", "scene"},
+                {"size", "size"},
+                {"precision", "precision"},
+                {"lanes", "lanes"},
+                {"BVH", "bvh"},
+                {"samples", "samples"},
+                {"bounces", "bounces"},
+                {"frame ms", "frame_ms.median"},
+                {"least", "frame_ms.min"},
+                {"most", "frame_ms.max"},
+                {"kernel ms", "kernel_ms.median"},
+                {"clock", "clock"},
+                {"processor ms", "processor_ms"},
+                {"runs", "frame_ms.runs"},
+                {"Mrays/s", "mrays_per_s"},
+                {"verdict", "comparison.verdict"},
+                {"new over old", "comparison.ratio"}},
+    .name_count = 7,
+    .verdicts = {"comparison.verdict"},
+    .failed = "slower",
+    .times = "frame_samples_ms",
+    .processor_times = "processor_samples_ms",
+};
+
 static void device_print(const BenchReport *report, FILE *stream)
 {
     fprintf(stream, "%s, %s %s\n", report->device->name, report->device->platform_name,
@@ -266,7 +293,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 
-void bench_print_json(const BenchReport *report)
+Json *bench_json(const BenchReport *report)
 {
     Json *json = json_open();
     report_start_json(json);
@@ -290,5 +317,6 @@ void bench_print_json(const BenchReport *report)
         if (report->lists_launches && report->reports[i]) launches_json(json, report->reports[i]);
         json_end(json);
     }
-    json_print(json, stdout);
+    json_end(json);
+    return json;
 }

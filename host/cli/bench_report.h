@@ -1,7 +1,7 @@
-// The report of glint bench: a table or JSON.
+// The report of glint bench: a table, or JSON, of which other formats are made.
 #pragma once
 
-#include "host/base/json.h"
+#include "host/cli/format.h"
 #include "host/measure/bench.h"
 #include "host/measure/calibration.h"
 #include "host/measure/comparison.h"
@@ -28,7 +28,8 @@ typedef struct {
 } BenchReport;
 
 void bench_print_text(const BenchReport *report, FILE *stream);
-void bench_print_json(const BenchReport *report);
+Json *bench_json(const BenchReport *report); // the caller closes it
+extern const ResultTable bench_table;        // of this and of --against
 
 // Parts of a report, shared with glint bench --against.
 void report_start_json(Json *json); // schema, version, date, host and build

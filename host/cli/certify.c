@@ -7,6 +7,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
+#include "host/cli/format.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
@@ -15,14 +16,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES, OPTION_JSON };
+enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES };
 enum { PIXELS_DEFAULT = 2000, PIXELS_MOST = 1 << 24 };
 
 static const struct option long_options[] = {
     {"size", required_argument, NULL, OPTION_SIZE},
     {"pixels", required_argument, NULL, OPTION_PIXELS},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    {"json", no_argument, NULL, OPTION_JSON},
+    FORMAT_LONG_OPTIONS,
     COMMON_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     REFERENCE_LONG_OPTION,
@@ -41,7 +42,28 @@ static const char help_text[] =
     "      --precision LIST  of single, strict, double, certified (default: all that fit)\n" //
     HELP_BOUNCES HELP_DEVICE HELP_REFERENCE HELP_LANES                                       //
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n"   //
-    HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_JSON HELP_HELP;
+    HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_FORMAT HELP_HELP;
+
+static const ResultTable certify_table = {
+    .command = "certify",
+    .rows = "precisions",
+    .columns = {{"scene", "scene"},
+                {"size", "size"},
+                {"precision", "precision"},
+                {"pixels", "compared"},
+                {"wrong objects", "wrong.object"},
+                {"wrong shadows", "wrong.shadow"},
+                {"wrong paths", "wrong.path"},
+                {"wrong colors", "wrong.color"},
+                {"largest error", "color.max_right"},
+                {"largest wrong", "color.max_wrong"},
+                {"certain and wrong", "wrong_decided"},
+                {"uncertain", "undecided.pixels"},
+                {"claim", "claim"}},
+    .name_count = 3,
+    .verdicts = {"claim"},
+    .failed = "broken",
+};
 
 typedef struct {
     CommonOptions common;
@@ -49,12 +71,13 @@ typedef struct {
     uint32_t width, height; // 0: not given
     uint32_t pixels, bounce_count;
     unsigned precisions; // a set; empty: not given
-    bool as_json;
+    ReportOptions report;
 } CertifyOptions;
 
 static bool option_take(CertifyOptions *options, int option, const char *value)
 {
     bool valid = true;
+    if (option_report(&options->report, option, value, &valid)) return valid;
     switch (option) {
     case OPTION_SIZE:
         return option_size("size", value, &options->width, &options->height);
@@ -64,9 +87,6 @@ static bool option_take(CertifyOptions *options, int option, const char *value)
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
     case OPTION_PRECISION:
         return option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
-    case OPTION_JSON:
-        options->as_json = true;
-        return true;
     default:
         return option_common(&options->common, option, value, &valid) && valid;
     }
@@ -81,6 +101,7 @@ static int options_read(CertifyOptions *options, int argument_count, char **argu
     }
     if (!option_only_scene("certify", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
+    if (!report_options_check(&options->report, &certify_table)) return EXIT_USER;
     return OPTIONS_READ;
 }
 
@@ -169,6 +190,7 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_end(json);
     if (precision == PRECISION_CERTIFIED) {
         json_int64(json, "wrong_decided", (int64_t)errors->wrong_decided);
+        json_text(json, "claim", errors->wrong_decided > 0 ? "broken" : "kept");
         json_int64(json, "unconfirmed", (int64_t)errors->unconfirmed);
         json_int64(json, "contradicted", (int64_t)errors->contradicted);
         json_begin_object(json, "undecided");
@@ -181,7 +203,7 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_end(json);
 }
 
-static void json_report(const Certification *certification)
+static Json *certify_json(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
     Json *json = json_open();
@@ -213,7 +235,7 @@ static void json_report(const Certification *certification)
         json_end(json);
     }
     json_end(json);
-    json_print(json, stdout);
+    return json;
 }
 
 // Renders at one precision and compares. EXIT_DONE, or why not. What does not fit the device or scene is the
@@ -285,10 +307,10 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
         if (!options->precisions || options->precisions >> i & 1)
             status = precision_compare(&certification, settings, (Precision)i);
     }
-    if (status == EXIT_DONE && options->as_json)
-        json_report(&certification);
-    else if (status == EXIT_DONE)
-        text_print(&certification);
+    if (status == EXIT_DONE && report_has_text(&options->report)) text_print(&certification);
+    if (status == EXIT_DONE && options->report.format != FORMAT_TEXT &&
+        !report_write(certify_json(&certification), &certify_table, &options->report))
+        status = EXIT_USER;
     if (status == EXIT_DONE) status = decided_check(&certification.rows[PRECISION_CERTIFIED].errors);
     for (unsigned i = 0; i < PRECISION_COUNT; i++)
         free(certification.rows[i].failure);

@@ -3,6 +3,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
+#include "host/cli/format.h"
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
 #include "host/image/heatmap.h"
@@ -24,7 +25,7 @@ static const struct {
     [LIMIT_ULP] = {"ulp", "ulp", "floating-point values"},
 };
 
-enum { OPTION_HEATMAP = OPTION_OWN, OPTION_JSON, OPTION_LAYER, OPTION_LIMIT };
+enum { OPTION_HEATMAP = OPTION_OWN, OPTION_LAYER, OPTION_LIMIT };
 
 static const struct option long_options[] = {
     {"max-rmse", required_argument, NULL, OPTION_LIMIT + LIMIT_RMSE},
@@ -34,7 +35,7 @@ static const struct option long_options[] = {
     {"heatmap", required_argument, NULL, OPTION_HEATMAP},
     {"layer", required_argument, NULL, OPTION_LAYER},
     {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},
-    {"json", no_argument, NULL, OPTION_JSON},
+    FORMAT_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -49,11 +50,12 @@ static const char help_text[] =
     "      --max-ulp N       allow N units in the last place of any value of EXR or NPY, such as distances\n"
     "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n"
     "      --layer NAME      compare this layer of EXR files, not the default or only "
-    "one\n" HELP_MAX_PIXELS HELP_JSON HELP_HELP;
+    "one\n" HELP_MAX_PIXELS HELP_FORMAT HELP_HELP;
 
 typedef struct {
     const char *reference_path, *test_path, *heatmap_path, *layer;
-    bool as_json, has_limits, has_limit[LIMIT_COUNT];
+    ReportOptions report;
+    bool has_limits, has_limit[LIMIT_COUNT];
     double limits[LIMIT_COUNT];
 } DiffOptions;
 
@@ -145,7 +147,27 @@ static const char *kind_word(const Image *image)
     return image->data ? "data" : image->display ? "display" : "linear";
 }
 
-static void json_report(const DiffOptions *options, const Comparison *comparison)
+static const ResultTable diff_table = {
+    .command = "diff",
+    .rows = "",
+    .columns = {{"reference", "reference"},
+                {"image", "image"},
+                {"equal", "equal"},
+                {"within limits", "met"},
+                {"differing values", "differing_values"},
+                {"largest error", "linear.max_abs"},
+                {"RMSE", "linear.rmse"},
+                {"PSNR dB", "linear.psnr"},
+                {"largest ulp", "max_ulp"},
+                {"8-bit off by 1", "srgb8.off_by_1"},
+                {"by more", "srgb8.off_by_2_or_more"},
+                {"FLIP mean", "flip.mean"}},
+    .name_count = 2,
+    .verdicts = {"met", "equal"},
+    .failed = "false",
+};
+
+static Json *diff_json(const DiffOptions *options, const Comparison *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
     const Image *reference = &comparison->reference;
@@ -199,7 +221,7 @@ static void json_report(const DiffOptions *options, const Comparison *comparison
         json_end(json);
     }
     limits_json(json, options, metrics);
-    json_print(json, stdout);
+    return json;
 }
 
 // With the digits that distinguish any two values of the file.
@@ -304,16 +326,18 @@ static bool limit_read(DiffOptions *options, LimitType type, const char *value)
 int command_diff(int argument_count, char **arguments)
 {
     DiffOptions options = {0};
+    bool valid;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
+        if (option_report(&options.report, option, optarg, &valid)) {
+            if (!valid) return EXIT_USER;
+            continue;
+        }
         switch (option) {
         case OPTION_HEATMAP:
             options.heatmap_path = optarg;
             break;
         case OPTION_LAYER:
             options.layer = optarg;
-            break;
-        case OPTION_JSON:
-            options.as_json = true;
             break;
         case OPTION_MAX_PIXELS:
             if (!option_max_pixels(optarg)) return EXIT_USER;
@@ -331,6 +355,7 @@ int command_diff(int argument_count, char **arguments)
         }
     }
     if (optind + 2 != argument_count) return option_usage_fault("diff", "takes two images");
+    if (!report_options_check(&options.report, &diff_table)) return EXIT_USER;
     options.reference_path = arguments[optind];
     options.test_path = arguments[optind + 1];
     if (options.heatmap_path && image_format_of(options.heatmap_path) == IMAGE_UNKNOWN)
@@ -340,13 +365,12 @@ int command_diff(int argument_count, char **arguments)
     MessageList messages = {0};
     bool compared = images_compare(&options, &comparison, &messages);
     messages_print(&messages, NULL);
-    if (compared && options.as_json)
-        json_report(&options, &comparison);
-    else if (compared)
-        text_print(&options, &comparison);
+    if (compared && report_has_text(&options.report)) text_print(&options, &comparison);
+    const bool is_written = !compared || options.report.format == FORMAT_TEXT ||
+                            report_write(diff_json(&options, &comparison), &diff_table, &options.report);
     image_free(&comparison.reference);
     image_free(&comparison.test);
-    if (!compared) return EXIT_USER;
+    if (!compared || !is_written) return EXIT_USER;
     const bool passes = options.has_limits ? limits_are_met(&options, &comparison.metrics)
                                            : comparison.metrics.differing_count == 0;
     return passes ? EXIT_DONE : EXIT_CHECK;

@@ -5,6 +5,7 @@
 #include "host/base/json.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
+#include "host/cli/format.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
@@ -17,7 +18,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { OPTION_JSON = OPTION_OWN, OPTION_LEAN };
+enum { OPTION_LEAN = OPTION_OWN };
 
 static const struct option long_options[] = {
     {"device", required_argument, NULL, OPTION_DEVICE},
@@ -25,7 +26,7 @@ static const struct option long_options[] = {
     {"lanes", required_argument, NULL, OPTION_LANES},
     {"no-cache", no_argument, NULL, OPTION_NO_CACHE},
     {"lean", no_argument, NULL, OPTION_LEAN},
-    {"json", no_argument, NULL, OPTION_JSON},
+    FORMAT_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     DRIVER_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
@@ -39,11 +40,37 @@ static const char help_text[] =
     "      --precision P     single, strict or double (default: all that the device has)\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
-    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_JSON HELP_HELP;
+    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_FORMAT HELP_HELP;
+
+static const ResultTable verify_table = {
+    .command = "verify",
+    .rows = "precisions.cases",
+    .columns = {{"precision", "precision"},
+                {"case", "name"},
+                {"title", "title"},
+                {"passed", "passed"},
+                {"rays", "rays"},
+                {"wrong", "wrong"},
+                {"leaks", "leaks"},
+                {"unsound", "unsound"},
+                {"off the surface", "off"},
+                {"turned normals", "turned"},
+                {"differing", "differing"},
+                {"worst", "worst"},
+                {"bound", "bound"},
+                {"unit", "unit"},
+                {"crash", "crash"},
+                {"seconds", "seconds"}},
+    .name_count = 3,
+    .verdicts = {"passed"},
+    .failed = "false",
+    .seconds = "seconds",
+};
 
 typedef struct {
     CommonOptions common;
-    bool every_precision, json;
+    ReportOptions report;
+    bool every_precision;
     bool lean;          // each scene has kernels of its own
     VerifyChoice cases; // none named: all
 } VerifyOptions;
@@ -172,7 +199,8 @@ static bool case_start(void *context, const VerifyResult *result)
 {
     Verification *verification = context;
     CaseRecord *record = record_of(verification, result->name);
-    if (record->state == CASE_CRASHED && !record->is_printed && !verification->options->json) {
+    if (record->state == CASE_CRASHED && !record->is_printed &&
+        report_has_text(&verification->options->report)) {
         line_begin(verification);
         record_print(record, verification->tier);
     }
@@ -193,7 +221,7 @@ static bool case_take(void *context, const VerifyResult *result)
     record->result = *result;
     record->seconds = clock_seconds() - record->start_seconds;
     record->state = CASE_DONE;
-    if (verification->options->json) return true;
+    if (!report_has_text(&verification->options->report)) return true;
     line_begin(verification);
     record_print(record, verification->tier);
     return true;
@@ -223,7 +251,7 @@ static void precision_verify(Verification *verification, Compute *compute)
                     "glint: verify: the reference has %d bits here: tier D is checked against numbers of its "
                     "own precision\n",
                     verify_reference_bits());
-        if (!options->json) {
+        if (report_has_text(&options->report)) {
             line_begin(verification);
             printf("%s\n", precision_names[verification->precision]);
             fflush(stdout);
@@ -236,7 +264,7 @@ static void precision_verify(Verification *verification, Compute *compute)
     record->seconds = clock_seconds() - record->start_seconds;
     if (!compute_ok(compute)) return;
     record->is_ended = true;
-    if (options->json) return;
+    if (!report_has_text(&options->report)) return;
     const size_t count = records_count(record, has_ended);
     line_begin(verification);
     printf("  tier %c: %zu of %zu case%s passed, in %.1f s; kernels: trace %016" PRIx64 ", render %016" PRIx64
@@ -280,7 +308,7 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
     perturb_json(json, common->perturb_seed, common->perturb_scale);
 }
 
-static void journal_print_json(const Verification *verification)
+static Json *journal_json(const Verification *verification)
 {
     const VerifyOptions *options = verification->options;
     Json *json = json_open();
@@ -291,7 +319,7 @@ static void journal_print_json(const Verification *verification)
         if (record->is_started) precision_add_json(json, record, precision, options);
     }
     json_end(json);
-    json_print(json, stdout);
+    return json;
 }
 
 // Prints why the arithmetic of the device does not suit a precision.
@@ -320,7 +348,7 @@ static int device_verify(Verification *verification, Compute *compute)
     }
     if (!options->every_precision && !journal->is_headed && !arithmetic_is_suitable(compute, options, first))
         return EXIT_USER;
-    if (!options->json && !journal->is_headed) {
+    if (report_has_text(&options->report) && !journal->is_headed) {
         printf("%s; reference of %d bits\n", compute->device->name, verify_reference_bits());
         fflush(stdout);
     }
@@ -337,10 +365,10 @@ static int device_verify(Verification *verification, Compute *compute)
         failed += records_count(record, has_failed);
     }
     progress_close(&verification->progress);
-    if (options->json)
-        journal_print_json(verification);
-    else
-        passports_remark(compute->device, stdout);
+    if (report_has_text(&options->report)) passports_remark(compute->device, stdout);
+    if (options->report.format != FORMAT_TEXT &&
+        !report_write(journal_json(verification), &verify_table, &options->report))
+        return EXIT_USER;
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
 }
 
@@ -381,9 +409,9 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
         if (option == 'h') return option_help(help_text);
         if (option == '?') return EXIT_USER;
         if (option == OPTION_PRECISION) options->every_precision = false;
-        if (option == OPTION_JSON)
-            options->json = true;
-        else if (option == OPTION_LEAN)
+        if (option_report(&options->report, option, optarg, &valid)) {
+            if (!valid) return EXIT_USER;
+        } else if (option == OPTION_LEAN)
             options->lean = true;
         else if (option_common(&options->common, option, optarg, &valid) && !valid)
             return EXIT_USER;
@@ -393,6 +421,7 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
     options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
     for (size_t i = 0; i < options->cases.count; i++)
         if (!is_case(options->cases.names[i])) return refuse_case(options->cases.names[i]);
+    if (!report_options_check(&options->report, &verify_table)) return EXIT_USER;
     return OPTIONS_READ;
 }
 

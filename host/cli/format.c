@@ -1,0 +1,399 @@
+#include "host/cli/format.h"
+
+#include "host/base/fault.h"
+#include "host/base/output.h"
+#include "host/base/text.h"
+#include <inttypes.h>
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+static const char *const format_names[FORMAT_COUNT] = {"text",     "json",  "csv",
+                                                       "markdown", "junit", "benchmark"};
+
+bool option_report(ReportOptions *options, int option, const char *value, bool *valid)
+{
+    unsigned choice = 0;
+    *valid = true;
+    switch (option) {
+    case OPTION_REPORT_JSON:
+        options->format = FORMAT_JSON;
+        return true;
+    case OPTION_FORMAT:
+        *valid = option_choice("format", value, format_names, FORMAT_COUNT, &choice);
+        if (*valid) options->format = (ReportFormat)choice;
+        return true;
+    case OPTION_REPORT_OUTPUT:
+        options->output = value;
+        return true;
+    default:
+        return false;
+    }
+}
+
+// A command writes one report. Its file is opened before anything is measured.
+static OutputFile report_file;
+
+static ReportFormat format_of_ending(const char *path)
+{
+    static const struct {
+        const char *ending;
+        ReportFormat format;
+    } endings[] = {
+        {".json", FORMAT_JSON}, {".csv", FORMAT_CSV}, {".md", FORMAT_MARKDOWN}, {".xml", FORMAT_JUNIT}};
+    const char *ending = strrchr(path, '.');
+    for (size_t i = 0; ending && i < sizeof endings / sizeof *endings; i++)
+        if (strcasecmp(ending, endings[i].ending) == 0) return endings[i].format;
+    return FORMAT_TEXT;
+}
+
+bool report_options_check(ReportOptions *options, const ResultTable *table)
+{
+    if (options->output && options->format == FORMAT_TEXT)
+        options->format = format_of_ending(options->output);
+    const char *what = options->output && options->format == FORMAT_TEXT
+                           ? "--output: the file's ending gives no format; use --format"
+                       : options->format == FORMAT_BENCHMARK && !table->times
+                           ? "--format benchmark is for times, which bench and accuracy measure"
+                           : NULL;
+    if (what) option_usage_fault(table->command, what);
+    if (what || options->format == FORMAT_TEXT) return !what;
+    MessageList messages = {0};
+    const bool is_open = output_open(&report_file, options->output ? options->output : "-", &messages);
+    messages_print(&messages, NULL);
+    return is_open;
+}
+
+// A row, with the objects that its columns may come from.
+typedef struct {
+    const json_t *sources[3]; // the row, the object around it, the document
+} Row;
+
+static const json_t *member_at(const json_t *object, const char *path)
+{
+    for (const char *dot; object && (dot = strchr(path, '.')) != NULL; path = dot + 1) {
+        char name[64];
+        snprintf(name, sizeof name, "%.*s", (int)(dot - path), path);
+        object = json_object_get(object, name);
+    }
+    return json_object_get(object, path);
+}
+
+static const json_t *value_at(const Row *row, const char *path)
+{
+    const json_t *value = NULL;
+    for (size_t i = 0; i < 3 && !value; i++)
+        value = row->sources[i] ? member_at(row->sources[i], path) : NULL;
+    return value;
+}
+
+static void value_append(Text *text, const json_t *value)
+{
+    char word[JSON_NUMBER_SIZE];
+    switch (value ? json_typeof(value) : JSON_NULL) {
+    case JSON_STRING:
+        text_append(text, json_string_value(value), json_string_length(value));
+        break;
+    case JSON_INTEGER:
+        text_appendf(text, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
+        break;
+    case JSON_REAL:
+        json_number_print(word, json_real_value(value));
+        text_appendf(text, "%s", word);
+        break;
+    case JSON_TRUE:
+    case JSON_FALSE:
+        text_appendf(text, json_is_true(value) ? "true" : "false");
+        break;
+    case JSON_ARRAY: // a size
+        for (size_t i = 0; i < json_array_size(value); i++) {
+            if (i > 0) text_appendf(text, "x");
+            value_append(text, json_array_get(value, i));
+        }
+        break;
+    case JSON_OBJECT: // a figure that is not available
+        value_append(text, json_object_get(value, "reason"));
+        break;
+    case JSON_NULL:
+        break;
+    }
+}
+
+static Text column_text(const Row *row, const ResultColumn *column)
+{
+    Text text = {0};
+    value_append(&text, value_at(row, column->path));
+    return text;
+}
+
+static size_t column_count(const ResultTable *table)
+{
+    size_t count = 0;
+    while (count < RESULT_COLUMNS_MAX && table->columns[count].heading)
+        count++;
+    return count;
+}
+
+// Appends the row's name, its first columns with `between` between them.
+static void name_append(Text *text, const Row *row, const ResultTable *table, const char *between)
+{
+    for (size_t i = 0; i < table->name_count; i++) {
+        Text value = column_text(row, &table->columns[i]);
+        text_appendf(text, "%s%s", i > 0 ? between : "", text_c(&value));
+        text_free(&value);
+    }
+}
+
+typedef enum { ROW_PASSED, ROW_FAILED, ROW_UNAVAILABLE } RowOutcome;
+
+static RowOutcome row_outcome(const Row *row, const ResultTable *table)
+{
+    const json_t *status = json_object_get(row->sources[0], "status");
+    if (json_is_string(status) && strcmp(json_string_value(status), "unavailable") == 0)
+        return ROW_UNAVAILABLE;
+    const json_t *verdict = NULL;
+    for (size_t i = 0; i < 2 && table->verdicts[i] && !verdict; i++)
+        verdict = member_at(row->sources[0], table->verdicts[i]);
+    Text text = {0};
+    value_append(&text, verdict);
+    const RowOutcome outcome = verdict && strcmp(text_c(&text), table->failed) == 0 ? ROW_FAILED : ROW_PASSED;
+    text_free(&text);
+    return outcome;
+}
+
+// Appends text with the characters that a format reserves replaced; `replace` returns NULL for all others.
+static void escaped_append(Text *text, const char *from, const char *(*replace)(char character))
+{
+    for (; *from; from++) {
+        const char *replacement = replace(*from);
+        if (replacement)
+            text_appendf(text, "%s", replacement);
+        else
+            text_append(text, from, 1);
+    }
+}
+
+static const char *xml_replace(char character)
+{
+    switch (character) {
+    case '&':
+        return "&amp;";
+    case '<':
+        return "&lt;";
+    case '>':
+        return "&gt;";
+    case '"':
+        return "&quot;";
+    default:
+        return (unsigned char)character < ' ' ? " " : NULL;
+    }
+}
+
+static const char *markdown_replace(char character)
+{
+    return character == '|' ? "\\|" : character == '\n' ? " " : NULL;
+}
+
+static const char *csv_replace(char character)
+{
+    return character == '"' ? "\"\"" : NULL;
+}
+
+typedef struct {
+    const ResultTable *table;
+    const json_t *document;
+    Text body;
+    size_t counts[ROW_UNAVAILABLE + 1];
+    size_t row_count;
+} Writing;
+
+typedef void RowWriter(Writing *writing, const Row *row);
+
+static void csv_row(Writing *writing, const Row *row)
+{
+    for (size_t i = 0; i < column_count(writing->table); i++) {
+        Text value = column_text(row, &writing->table->columns[i]);
+        const bool is_quoted = strpbrk(text_c(&value), ",\"\r\n") != NULL;
+        text_appendf(&writing->body, i > 0 ? "," : "");
+        text_appendf(&writing->body, is_quoted ? "\"" : "");
+        escaped_append(&writing->body, text_c(&value), csv_replace);
+        text_appendf(&writing->body, is_quoted ? "\"" : "");
+        text_free(&value);
+    }
+    text_appendf(&writing->body, "\n");
+}
+
+static void markdown_row(Writing *writing, const Row *row)
+{
+    for (size_t i = 0; i < column_count(writing->table); i++) {
+        const json_t *member = value_at(row, writing->table->columns[i].path);
+        Text value = {0};
+        if (json_is_real(member))
+            text_appendf(&value, "%.4g", json_real_value(member));
+        else
+            value_append(&value, member);
+        text_appendf(&writing->body, "| ");
+        escaped_append(&writing->body, text_c(&value), markdown_replace);
+        text_appendf(&writing->body, " ");
+        text_free(&value);
+    }
+    text_appendf(&writing->body, "|\n");
+}
+
+// What is not in the row's name, for those who read of its failure.
+static void details_append(Text *text, const Row *row, const ResultTable *table)
+{
+    const size_t start = text->count;
+    for (size_t i = table->name_count; i < column_count(table); i++) {
+        Text value = column_text(row, &table->columns[i]);
+        if (value.count > 0)
+            text_appendf(text, "%s%s %s", text->count > start ? ", " : "", table->columns[i].heading,
+                         text_c(&value));
+        text_free(&value);
+    }
+}
+
+static void junit_row(Writing *writing, const Row *row)
+{
+    Text name = {0}, details = {0}, *body = &writing->body;
+    name_append(&name, row, writing->table, " ");
+    const RowOutcome outcome = row_outcome(row, writing->table);
+    writing->counts[outcome]++;
+    text_appendf(body, "  <testcase classname=\"glint.%s\" name=\"", writing->table->command);
+    escaped_append(body, text_c(&name), xml_replace);
+    const json_t *seconds = writing->table->seconds ? value_at(row, writing->table->seconds) : NULL;
+    if (json_is_number(seconds)) text_appendf(body, "\" time=\"%.6f", json_number_value(seconds));
+    if (outcome == ROW_UNAVAILABLE)
+        value_append(&details, json_object_get(row->sources[0], "reason"));
+    else
+        details_append(&details, row, writing->table);
+    text_appendf(body, outcome == ROW_PASSED ? "\">\n    <system-out>" : "\">\n    <%s message=\"",
+                 outcome == ROW_FAILED ? "failure" : "skipped");
+    escaped_append(body, text_c(&details), xml_replace);
+    text_appendf(body, outcome == ROW_PASSED ? "</system-out>\n  </testcase>\n" : "\"/>\n  </testcase>\n");
+    text_free(&details);
+    text_free(&name);
+}
+
+// Writes one entry per run, as google/benchmark does with repetitions, so that its tools compare
+// distributions.
+static void benchmark_row(Writing *writing, const Row *row)
+{
+    Text name = {0};
+    name_append(&name, row, writing->table, "/");
+    const json_t *times = value_at(row, writing->table->times),
+                 *processor =
+                     writing->table->processor_times ? value_at(row, writing->table->processor_times) : NULL;
+    const size_t count = json_is_number(times) ? 1 : json_array_size(times);
+    for (size_t i = 0; i < count; i++) {
+        const double time = json_number_value(json_is_number(times) ? times : json_array_get(times, i));
+        const json_t *of_processor = json_array_get(processor, i);
+        json_t *entry =
+            json_pack("{s:s, s:s, s:s, s:I, s:i, s:i, s:i, s:f, s:f, s:s}", "name", text_c(&name), "run_name",
+                      text_c(&name), "run_type", "iteration", "repetitions", (json_int_t)count,
+                      "repetition_index", (int)i, "threads", 1, "iterations", 1, "real_time", time,
+                      "cpu_time", of_processor ? json_number_value(of_processor) : time, "time_unit", "ms");
+        char *dumped = entry ? json_dumps(entry, JSON_COMPACT) : NULL;
+        if (!dumped) fault("out of memory: JSON");
+        text_appendf(&writing->body, "%s    %s", writing->row_count++ > 0 ? ",\n" : "", dumped);
+        free(dumped);
+        json_decref(entry);
+    }
+    text_free(&name);
+}
+
+static void rows_write(Writing *writing, RowWriter *write)
+{
+    const char *path = writing->table->rows, *dot = strchr(path, '.');
+    const json_t *document = writing->document;
+    if (*path == '\0') {
+        write(writing, &(Row){{document, NULL, NULL}});
+        return;
+    }
+    char name[64];
+    snprintf(name, sizeof name, "%.*s", dot ? (int)(dot - path) : (int)strlen(path), path);
+    const json_t *outer = json_object_get(document, name);
+    for (size_t i = 0; i < json_array_size(outer); i++) {
+        const json_t *item = json_array_get(outer, i), *inner = dot ? json_object_get(item, dot + 1) : NULL;
+        if (!dot) write(writing, &(Row){{item, NULL, document}});
+        for (size_t k = 0; k < json_array_size(inner); k++)
+            write(writing, &(Row){{json_array_get(inner, k), item, document}});
+    }
+}
+
+static void headings_append(Writing *writing, const char *before, const char *between, const char *after)
+{
+    for (size_t i = 0; i < column_count(writing->table); i++)
+        text_appendf(&writing->body, "%s%s", i > 0 ? between : before, writing->table->columns[i].heading);
+    text_appendf(&writing->body, "%s", after);
+}
+
+static void document_write(Writing *writing, ReportFormat format, Text *text)
+{
+    const json_t *document = writing->document;
+    switch (format) {
+    case FORMAT_CSV:
+        headings_append(writing, "", ",", "\n");
+        rows_write(writing, csv_row);
+        break;
+    case FORMAT_MARKDOWN:
+        headings_append(writing, "| ", " | ", " |\n");
+        for (size_t i = 0; i < column_count(writing->table); i++)
+            text_appendf(&writing->body, "%s", i > 0 ? " --- |" : "| --- |");
+        text_appendf(&writing->body, "\n");
+        rows_write(writing, markdown_row);
+        break;
+    case FORMAT_JUNIT:
+        rows_write(writing, junit_row);
+        text_appendf(text,
+                     "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"glint %s\" "
+                     "tests=\"%zu\" "
+                     "failures=\"%zu\" errors=\"0\" skipped=\"%zu\">\n",
+                     writing->table->command,
+                     writing->counts[ROW_PASSED] + writing->counts[ROW_FAILED] +
+                         writing->counts[ROW_UNAVAILABLE],
+                     writing->counts[ROW_FAILED], writing->counts[ROW_UNAVAILABLE]);
+        text_appendf(&writing->body, "</testsuite>\n</testsuites>\n");
+        break;
+    case FORMAT_BENCHMARK: {
+        rows_write(writing, benchmark_row);
+        json_t *context =
+            json_pack("{s:O?, s:O?, s:O?, s:s, s:O?}", "date", json_object_get(document, "date"), "host_name",
+                      member_at(document, "host.name"), "num_cpus", member_at(document, "host.processors"),
+                      "executable", "glint", "device", member_at(document, "device.name"));
+        char *dumped = context ? json_dumps(context, JSON_COMPACT) : NULL;
+        if (!dumped) fault("out of memory: JSON");
+        text_appendf(text, "{\n  \"context\": %s,\n  \"benchmarks\": [\n", dumped);
+        text_appendf(&writing->body, "\n  ]\n}\n");
+        free(dumped);
+        json_decref(context);
+        break;
+    }
+    default:
+        break;
+    }
+    text_append(text, writing->body.items, writing->body.count);
+}
+
+bool report_write(Json *json, const ResultTable *table, const ReportOptions *options)
+{
+    Text document = json_close(json), text = {0};
+    if (options->format == FORMAT_JSON) {
+        text = document;
+    } else {
+        Writing writing = {.table = table,
+                           .document = json_loadb(text_c(&document), document.count, JSON_ALLOW_NUL, NULL)};
+        if (!writing.document) fault("JSON: a report cannot be read back");
+        document_write(&writing, options->format, &text);
+        text_free(&writing.body);
+        json_decref((json_t *)writing.document);
+        text_free(&document);
+    }
+    MessageList messages = {0};
+    fwrite(text_c(&text), 1, text.count, report_file.file);
+    const bool written = output_commit(&report_file, &messages);
+    messages_print(&messages, NULL);
+    text_free(&text);
+    return written;
+}

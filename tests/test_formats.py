@@ -1,0 +1,140 @@
+#!/usr/bin/env -S python3 -B
+"""Reports in the formats of other programs: each is read by its own reader and agrees with --json."""
+import csv
+import io
+import json
+import pathlib
+import unittest
+import xml.etree.ElementTree as ElementTree
+
+from glint import SPHERE, TestCase, main, need_device, read, write
+
+SMALL = "--size 32x24"
+HAS_DOUBLE = need_device()["fp64"]
+# Command, options, the members with its rows, the headings that name a row, and members by their headings.
+COMMANDS = {
+    "bench": (f"bench s.yaml {SMALL} --seconds 0.05 --samples 1,2", ["runs"], 7,
+              {"precision": ("precision",), "samples": ("samples",), "frame ms": ("frame_ms", "median"), "runs": ("frame_ms", "runs")}),
+    "verify": ("verify S1 P4 --precision single", ["precisions", "cases"], 3,
+               {"case": ("name",), "passed": ("passed",), "rays": ("rays",), "worst": ("worst",)}),
+}
+if HAS_DOUBLE:
+    COMMANDS["accuracy"] = (f"accuracy s.yaml {SMALL} --seconds 0.05 --precision single,double", ["scenes", "variants"], 6,
+                            {"precision": ("precision",), "objects away": ("errors", "object", "away"), "crossed out": ("crossed_out",)})
+    COMMANDS["certify"] = (f"certify s.yaml {SMALL} --pixels 100 --precision single,certified", ["precisions"], 3,
+                           {"precision": ("precision",), "pixels": ("compared",), "claim": ("claim",)})
+
+
+def rows_of(document, path):
+    rows = [document]
+    for member in path:
+        rows = [inner for row in rows for inner in row[member]]
+    return rows
+
+
+def member(row, path):
+    for name in path:
+        row = row.get(name) if isinstance(row, dict) else None
+    return row
+
+
+def text(value):
+    return "" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+
+
+class Formats(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("s.yaml", SPHERE)
+
+    def both(self, command, form):
+        """The report in a format by --output, and in JSON by another run of what does not change."""
+        self.glint(f"{command} --format {form} --output report")
+        return read("report")
+
+    def agrees(self, cells, row, members):
+        """Columns of what is measured may differ from run to run; the others are the document's."""
+        for heading, path in members.items():
+            value = member(row, path)
+            if isinstance(value, float) and path[0] == "frame_ms":
+                self.assertGreater(float(cells[heading]), 0)
+            elif path[-1] != "runs":
+                self.assertEqual(cells[heading], text(value), heading)
+
+    def test_csv(self):
+        for name, (command, path, _, members) in COMMANDS.items():
+            with self.subTest(name):
+                rows = rows_of(self.json(f"{command} --json"), path)
+                found = list(csv.DictReader(io.StringIO(self.both(command, "csv"))))
+                self.assertEqual(len(found), len(rows))
+                for cells, row in zip(found, rows):
+                    self.agrees(cells, row, members)
+
+    def test_markdown(self):
+        for name, (command, path, _, members) in COMMANDS.items():
+            with self.subTest(name):
+                rows = rows_of(self.json(f"{command} --json"), path)
+                head, rule, *lines = self.glint(f"{command} --format markdown").stdout.splitlines()
+                self.assertEqual(len(lines), len(rows))
+                self.assertRegex(rule, r"^\| ---( \| ---)* \|$")
+                self.assertEqual({line.count(" | ") for line in (head, *lines)}, {head.count(" | ")})
+                self.assertTrue(set(members) <= set(head.strip("| ").split(" | ")))
+
+    def test_junit(self):
+        for name, (command, path, named, _) in COMMANDS.items():
+            with self.subTest(name):
+                rows = rows_of(self.json(f"{command} --json"), path)
+                (suite,) = ElementTree.fromstring(self.both(command, "junit"))
+                self.assertEqual((suite.get("name"), suite.get("tests"), suite.get("failures")), (f"glint {name}", str(len(rows)), "0"))
+                self.assertEqual([case.get("classname") for case in suite], [f"glint.{name}"] * len(rows))
+                self.assertEqual(len({case.get("name") for case in suite}), len(rows), "names are unique")
+        failing = self.glint("verify S1 P4 --precision single --perturb 1:1000 --format junit", status=3).stdout
+        (suite,) = ElementTree.fromstring(failing)
+        self.assertEqual((suite.get("tests"), suite.get("failures")), ("2", "1"))
+        (failure,) = suite.iter("failure")
+        self.assertRegex(failure.get("message"), "passed false, rays 36, wrong [1-9]")
+
+    def test_junit_of_what_differs_or_is_missing(self):
+        for size in "8x6", "9x6":
+            self.glint(f"render s.yaml --size {size} -o {size}.npy --quiet")
+        self.glint("render s.yaml --size 8x6 --bounces 0 --samples 4 -o '8\"<&>.npy' --quiet")
+        (suite,) = ElementTree.fromstring(self.glint("diff 8x6.npy '8\"<&>.npy' --format junit", status=3).stdout)
+        self.assertEqual([case.get("name") for case in suite], ['8x6.npy 8"<&>.npy'])
+        self.assertRegex(next(suite.iter("failure")).get("message"), "equal false, differing values [1-9]")
+        (suite,) = ElementTree.fromstring(self.glint("diff 8x6.npy '8\"<&>.npy' --max-rmse 1 --format junit").stdout)
+        self.assertEqual(list(suite.iter("failure")), [])
+        if HAS_DOUBLE:
+            write("strong.yaml", SPHERE.replace("[3, 4, -5]", "[3, 4, -5], intensity: 1e30, color: [1e30, 1, 1]"))
+            (suite,) = ElementTree.fromstring(self.glint(f"certify strong.yaml {SMALL} --pixels 20 --format junit").stdout)
+            self.assertEqual((suite.get("tests"), suite.get("skipped")), ("4", "3"))
+
+    def test_benchmark(self):
+        """As google/benchmark writes repetitions; names, times and their unit are what its tools read."""
+        report = json.loads(self.glint(f"{COMMANDS['bench'][0]} --format benchmark").stdout)
+        self.assertEqual(report["context"]["executable"], "glint")
+        names = {entry["name"] for entry in report["benchmarks"]}
+        self.assertEqual({name.split("/")[0] for name in names}, {"s.yaml"})
+        self.assertEqual(len(names), 2)
+        for name in names:
+            entries = [entry for entry in report["benchmarks"] if entry["name"] == name]
+            self.assertEqual([entry["repetition_index"] for entry in entries], list(range(entries[0]["repetitions"])))
+            for entry in entries:
+                self.assertEqual((entry["run_type"], entry["time_unit"], entry["run_name"]), ("iteration", "ms", name))
+                self.assertGreater(entry["real_time"], 0)
+
+    def test_output(self):
+        """The text stays on standard output; the file's ending gives the format; nothing is written by a wrong call."""
+        out = self.glint("verify S1 --precision single --output report.xml").stdout
+        self.assertIn("tier B: 1 of 1 case passed", out)
+        ElementTree.fromstring(read("report.xml"))
+        self.glint("verify S1 --precision single --output report.json")
+        self.assertEqual(json.loads(read("report.json"))["schema"], 3)
+        self.refuses("verify S1 --output report.txt", "the file's ending gives no format")
+        self.refuses("verify S1 --format benchmark", "bench and accuracy")
+        self.refuses("verify S1 --format jnuit", "--format: .*did you mean junit")
+        self.refuses("verify S1 --precision single --output nowhere/report.xml", "nowhere/report.xml")
+        self.assertEqual(list(pathlib.Path().glob("report.txt*")), [])
+
+
+if __name__ == "__main__":
+    main()
