@@ -25,6 +25,7 @@ static const struct {
     {"accuracy", command_accuracy, "measure speed against error"},
     {"certify", command_certify, "compare an image with a reference of quadruple precision"},
     {"verify", command_verify, "run the hard cases on a device"},
+    {"golden", command_golden, "write or check the hashes of images at strict"},
     {"cache", command_cache, "list, check or empty the kernel cache"},
 };
 

@@ -68,6 +68,7 @@ NOTES = {
                       "an unavailable one with `reason`. The HTML report embeds the same object.",
     "glint certify": "A precision that the device or scene does not support has only `precision`, `status` and `reason`; one that "
                      "--precision names is an error.",
+    "glint golden check": "A scene that is the same has no rectangle.",
     "glint verify": "A case in which the driver crashed has `crash`, a text that names the call and the kernel, and only `name`, `title`, "
                     "`passed` and `seconds` otherwise.",
 }
@@ -84,6 +85,7 @@ ELSEWHERE = {
     "glint accuracy": ("glint", "device", *(f"scenes[].variants[].{name}" for name in (
         "frame_ms", "kernel_ms", "clock", "rays", "mrays_per_s"))),
     "glint certify": ("glint", "device"),
+    "glint golden check": ("glint", "device"),
     "glint verify": ("glint", "device"),
 }
 MEANINGS = {
@@ -122,6 +124,12 @@ MEANINGS = {
     "pixels": "count; of the sample",
     "reference_undecided": "count; of these, within 2^-80 of the distance of another answer: not counted as right or wrong",
     "reference_ms": "number; computing it",
+    "scenes[].same": "boolean; all hashes are those of the line",
+    "scenes[].verdict": "text; `same`, `different`, `another scene` (its hash differs as well) or `no line`",
+    "scenes[].first": "text or null; the layer that differs first",
+    "scenes[].tiles": "count; of 96, whose color differs",
+    "scenes[].{left,top,right,bottom}": "count; pixels of the rectangle that has these tiles; `right` and `bottom` are beyond it",
+    "scenes[].crop": "text or null; the file that shows the rectangle",
     "precisions[].compared": "count; pixels",
     "precisions[].wrong": "object; pixels, each in the first way that is wrong",
     "precisions[].wrong.{object,shadow,path}": "count",

@@ -7,7 +7,7 @@ GLINT=${GLINT:-build/glint}
 "$GLINT" --version >/dev/null
 
 failed=0
-subcommands='render view trace check devices diff bench accuracy certify verify cache'
+subcommands='render view trace check devices diff bench accuracy certify verify golden cache'
 for subcommand in $subcommands; do
     last=$("$GLINT" "$subcommand" --help | tail -n 1)
     case $last in

@@ -157,6 +157,13 @@ class Json(TestCase):
         self.check_members("glint certify", self.json(f"certify plain.yaml {SMALL} --precision single,certified --json"),
                            self.json(f"certify plain.yaml {SMALL} --precision single --json --perturb 1:1000"))
 
+    def test_golden(self):
+        self.glint(f"golden write plain.yaml {SMALL}")
+        same = self.json("golden check --json")
+        write("plain.yaml", PLAIN.replace("radius: 0.5", "radius: 0.25"))
+        self.check_members("glint golden check", same, self.json("golden check --json", status=3))
+        write("plain.yaml", PLAIN)
+
     def test_verify(self):
         """Cases with a measure and without, one of them an image."""
         self.check_members("glint verify", self.json("verify S5 P4 P6 --precision single --json"),

@@ -1,0 +1,88 @@
+#!/usr/bin/env -S python3 -B
+"""glint golden: the golden images of tests/golden keep their bits, and lines find what changes, where, and in which layer first."""
+import re
+import shutil
+import unittest
+
+from glint import ROOT, SPHERE, TestCase, main, png_read, read, write
+
+LINE = r"size=24x18 samples=1 bounces=5 scene=[0-9a-f]{16}( (object|t|normal|shadow|path|color)=[0-9a-f]{16}){6} tiles=[0-9a-f]{384} s\.yaml\n"
+
+
+class Golden(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("s.yaml", SPHERE)
+
+    def written(self):
+        self.glint("golden write s.yaml --size 24x18")
+        return read("golden.txt")
+
+    def test_images_of_the_repository(self):
+        for scene in (ROOT / "tests/golden").glob("*.yaml"):
+            shutil.copy(scene, ".")
+        process = self.glint(f"golden check --file {ROOT}/tests/golden/golden.txt")
+        self.assertEqual(process.stdout, "checkers.yaml: same\nhighlights.yaml: same\nshapes.yaml: same\n")
+
+    def test_lines(self):
+        """A line per scene, of its name; writing replaces it and keeps the others."""
+        first = self.written()
+        self.assertRegex(first, f"^(#.*\n)+{LINE}$")
+        write("other scene.yaml", SPHERE.replace("radius: 1", "radius: 0.9"))
+        self.glint("golden write 'other scene.yaml' --size 8x6 --samples 2 --bounces 0")
+        self.glint("golden write s.yaml --size 24x18")
+        both = read("golden.txt")
+        self.assertTrue(both.startswith(first) and both.count("\n") == first.count("\n") + 1)
+        self.assertEqual(self.glint("golden check").stdout, "s.yaml: same\nother scene.yaml: same\n")
+        self.assertEqual(self.glint("golden check 'other scene.yaml' --lanes 4 --bvh on").stdout, "other scene.yaml: same\n")
+
+    def test_differences(self):
+        """Each changed scene: the layer that differs first, and the pixels, whose crop shows the scene as it is now."""
+        self.written()
+        for change, layer, part in (
+                (("radius: 1", "radius: 1.0000001"), "object|t", None), (("fov: 60", "fov: 61"), "object|t", None),
+                (("[3, 4, -5]", "[-3, 4, -5]"), "color|shadow", None), (("[0.1, 0.2, 0.4]", "[0.1, 0.2, 0.5]"), "color", "0 to 23, 0 to 17")):
+            with self.subTest(change):
+                self.assertIn(change[0], SPHERE)
+                write("s.yaml", SPHERE.replace(*change))
+                out = self.glint("golden check", status=3).stdout
+                found = re.fullmatch(r"s\.yaml: different, first in (\w+); the scene is another one; (\d+) of 96 tiles, within pixels "
+                                     r"(\d+) to (\d+), (\d+) to (\d+): s\.yaml-golden\.png\n", out)
+                self.assertIsNotNone(found, out)
+                self.assertRegex(found[1], f"^({layer})$")
+                left, right, top, bottom = map(int, found.groups()[2:])
+                self.assertEqual(png_read("s.yaml-golden.png")[0][:2], (right - left + 1, bottom - top + 1))
+                if part:
+                    self.assertIn(f"within pixels {part}", out)
+
+    def test_every_part_of_a_line_counts(self):
+        """A digit of any hash that changes is a difference of that layer, although the scene is the same."""
+        line = self.written()
+        for layer in "object", "t", "normal", "shadow", "path", "color":
+            write("golden.txt", re.sub(rf"( {layer}=)(.)", lambda found: found[1] + "0123456789abcdef"[(int(found[2], 16) + 1) % 16], line))
+            self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: different, first in {layer}\n")
+
+    def test_reports(self):
+        self.written()
+        (scene,) = self.json("golden check --json")["scenes"]
+        self.assertEqual((scene["scene"], scene["same"], scene["verdict"], scene["tiles"]), ("s.yaml", True, "same", 0))
+        write("new.yaml", SPHERE)
+        self.assertEqual(self.glint("golden check new.yaml", status=3).stdout, "new.yaml: no line; glint golden write makes it\n")
+        write("s.yaml", SPHERE.replace("radius: 1", "radius: 0.5"))
+        out = self.glint("golden check --format csv", status=3).stdout.splitlines()
+        self.assertRegex(out[1], r"^s\.yaml,another scene,object,\d+,\d+,\d+,\d+,\d+,s\.yaml-golden\.png$")
+
+    def test_refused(self):
+        line = self.written()
+        for wrong in "size=0x18" + line.split("size=24x18")[1], line.replace("tiles=", "tiles=g"), line.replace(" path=", " paths="), "x\n":
+            write("golden.txt", wrong)
+            self.refuses("golden check", r"golden\.txt:\d+:1: error: expected a line of glint golden write")
+        self.refuses("golden check --file missing.txt", "missing.txt")
+        self.refuses("golden", "expected write or check")
+        self.refuses("golden write", "no scene given")
+        self.refuses("golden write s.yaml --format csv", "--format is for check")
+        self.refuses("golden write missing.yaml --file new.txt", "missing.yaml")
+
+
+if __name__ == "__main__":
+    main()
