@@ -241,9 +241,9 @@ static void test_refusals(void **state)
     close_checked(open_checked(), false);
     const size_t header_size = file_size();
     file_write_bytes(path, bytes.items, bytes.count);
-    refused("size: 6x12\nscene: 1234\n", "is of another image (size: 5x12, not 6x12)");
-    refused("size: 5x12\nscene: 9\n", "is of another image (scene: 1234, not 9)");
-    refused("size: 5x12\nlanes: 4\nscene: 1234\n", "is of another image (lanes: none, not 4)");
+    refused("size: 6x12\nscene: 1234\n", "belongs to another image (size: 5x12, not 6x12)");
+    refused("size: 5x12\nscene: 9\n", "belongs to another image (scene: 1234, not 9)");
+    refused("size: 5x12\nlanes: 4\nscene: 1234\n", "belongs to another image (lanes: none, not 4)");
     Checkpoint *checkpoint = open_checked();
     refused(key, "is in use by another process");
     close_checked(checkpoint, false);

@@ -124,7 +124,7 @@ class Checkpoints(TestCase):
                                 (f"{RENDER} --region 0,0,64,64", "region"), (f"{RENDER} --bounces 3", "bounces"),
                                 (f"{RENDER} --aov t", "AOVs"), (f"{RENDER} --perturb 1", "perturb"),
                                 (f"{RENDER} --build-options=-DUNUSED", "build options")):
-            self.refuses(f"{command} -o other.npy --checkpoint saved", rf"'saved' is of another image \({reason}: ", env=POCL)
+            self.refuses(f"{command} -o other.npy --checkpoint saved", rf"'saved' belongs to another image \({reason}: ", env=POCL)
         self.refuses(f"{RENDER} -o other.npy --checkpoint sphere.yaml", "'sphere.yaml' is not a checkpoint", env=POCL)
         self.assertEqual(Path("saved").read_bytes(), saved)
         self.assertEqual(Path("sphere.yaml").read_text(encoding="utf-8"), SPHERE)
@@ -135,7 +135,7 @@ class Checkpoints(TestCase):
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
         self.glint(f"{single} -o other.png", env=POCL)
         self.refuses(f"{single} -o other.png --checkpoint saved", "File too large", env=POCL, preexec_fn=limit)
-        self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"of another image \(device: ", env=POCL)
+        self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"belongs to another image \(device: ", env=POCL)
 
     def test_the_image_itself(self):
         """A checkpoint of the image's own name is replaced by the image, not removed."""

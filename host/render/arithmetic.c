@@ -1,10 +1,11 @@
 #include "host/render/arithmetic.h"
 
-// The last one's pixels that stay open are re-rendered at the modes after the first.
+// The precision modes that a precision's passes use. The uncertain pixels of one pass are re-rendered at the
+// modes after the first.
 static const struct {
     PassportMode modes[2];
     unsigned mode_count;
-    bool relies; // refused where a property of a mode is broken
+    bool relies; // is refused if a property of a mode is broken
 } needs[PRECISION_COUNT] = {
     [PRECISION_SINGLE] = {{PASSPORT_SINGLE}, 1, false},
     [PRECISION_STRICT] = {{PASSPORT_STRICT}, 1, true},

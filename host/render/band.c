@@ -1,18 +1,18 @@
 #include "host/render/band.h"
 
-enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the last group to end would idle the other compute units
+enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
 
-// The pixels of a work-item: a macro-tile.
+// Returns the size of a work-item's macro-tile in pixels.
 static TileShape item_shape(uint32_t lanes)
 {
     const uint32_t width = TILE_WIDTH_OF(lanes), height = TILE_HEIGHT_OF(lanes);
     return (TileShape){width * MACRO_TILE_COLUMNS_OF(lanes), height * MACRO_TILE_ROWS_OF(lanes)};
 }
 
-// Work-items of a group, by --work-group or before the device's limits. Square groups are coherent:
-// neighboring pixels hit the same objects. But a work-item with whole tiles is alone in its group: PoCL
-// places the private variables of a group's items side by side, and 64 sets of them, each with the rays
-// waiting behind glass, exceed the cache.
+// Returns the work-items of a group, by --work-group or before the device's limits apply. Square groups are
+// coherent, since neighboring pixels hit the same objects. A work-item that renders whole tiles is alone in
+// its group, because PoCL places the private variables of a group's items next to each other. 64 sets of
+// them, each with the rays waiting behind glass, would exceed the cache.
 static TileShape group_items(const Renderer *renderer)
 {
     const Device *device = renderer->compute->device;
@@ -126,7 +126,7 @@ static size_t least(size_t a, size_t b)
 }
 
 // Returns how many of the `left` groups are next, at most `most`. The last two parts are about equal, since a
-// small launch would slow the growth of the next ones.
+// small launch would slow the growth of the launches that follow.
 static size_t groups_of_part(size_t most, size_t left)
 {
     return left <= most ? left : left < 2 * most ? (left + 1) / 2 : most;
@@ -177,7 +177,7 @@ Pace *renderer_pace(Renderer *renderer, KernelKind kind)
     return pace;
 }
 
-// Launches the kernel over the place, part by part; `samples` per pixel.
+// Launches the kernel over the place, part by part, with `samples` per pixel.
 static bool place_launch(Renderer *renderer, KernelKind kind, const Place *place, uint32_t samples)
 {
     Pace *pace = renderer_pace(renderer, kind);

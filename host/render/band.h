@@ -1,31 +1,31 @@
-// The pixels of one launch, a band of rows or a list, with the device's buffers that it fills.
+// Renders the pixels of one launch, a band of rows or a list, into the device's buffers.
 #pragma once
 
 #include "host/render/renderer_state.h"
 
 typedef struct {
     uint32_t rows;
-    cl_mem film;                      // layer after layer
-    unsigned layers;                  // in the film, as a set
-    size_t layer_begins[LAYER_COUNT]; // in the film, in bytes
+    cl_mem film;                      // one layer after another
+    unsigned layers;                  // the set of the film's layers
+    size_t layer_begins[LAYER_COUNT]; // offsets in the film, in bytes
     cl_mem ray_counts;
-    // at `certified`: of each tile which pixels' colors are in doubt, as bits; of a list's pixels how many
-    // samples
+    // At `certified`, the pixels of each tile whose colors are uncertain, one bit per pixel. In a list, the
+    // number of uncertain samples per pixel.
     cl_mem doubts;
-    cl_mem center_doubts; // likewise of the AOVs
-    cl_mem pixels;        // where a list is rendered: x and y of each
-    RepeatCounts repeats; // of the band, since its last delivery
+    cl_mem center_doubts; // the same for the AOVs' rays
+    cl_mem pixels;        // in a list, x and y of each pixel
+    RepeatCounts repeats; // since the band's last delivery
 } BandBuffers;
 
 // Returns the size of the buffer for a film's color and the layers that the kernels of these AOVs fill.
 // Unless `buffers` is NULL, its `layers` and `layer_begins` are set.
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 
-// For as many pixels as the film has.
+// Creates the buffers for as many pixels as the film has.
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film);
 void band_buffers_close(BandBuffers *buffers);
 
-// The pixels of a work-item or of a work-group.
+// The size of a work-item's or a work-group's tile in pixels.
 typedef struct {
     uint32_t width, height;
 } TileShape;
@@ -33,23 +33,23 @@ TileShape group_shape(const Renderer *renderer);
 
 // The pixels that a launch renders.
 typedef struct {
-    cl_uint4 band; // x, y, width, height; of a list its length and 1
+    cl_uint4 band; // x, y, width and height; in a list, 0, 0, its length and 1
     TileShape item;
     size_t first[2], items[2], group[2];
 } Place;
 
 Place band_place(const Renderer *renderer, BandRows rows);
-// Steps through a place in parts of whole work-groups: rows of them, or a part of one row. Each part has at
-// most `pixels_max` pixels, or one group. `part` is a Place of zeros before the first step; returns false
-// after the last part.
+// Steps through a place in parts that consist of whole work-groups: several rows of groups, or a part of one
+// row. Each part has at most `pixels_max` pixels, or one group if that has more. `part` is all zeros before
+// the first step. Returns false after the last part.
 bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
 uint64_t place_pixels(const Place *place);
-// The tiles of a film's work-items.
+// Returns the number of work-items, and so of tiles, that cover a film.
 size_t film_tile_count(const Renderer *renderer, const Film *film);
-// The first `count` pixels of a list.
+// Returns the place of a list's first `count` pixels.
 Place list_place(const Renderer *renderer, uint32_t count);
 
-// The film of these rows, without its layers.
+// Returns the description of the film of these rows, with no layers.
 Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count);
 
 static inline bool layer_in(unsigned layers, Layer layer)
@@ -57,17 +57,18 @@ static inline bool layer_in(unsigned layers, Layer layer)
     return layers >> layer & 1;
 }
 
-// Columns and rows of the image per pixel that is rendered.
+// Returns how many columns and rows of the image one rendered pixel stands for.
 static inline uint32_t settings_cell(const RenderSettings *settings)
 {
     return settings->cell > 0 ? settings->cell : 1;
 }
 
-// Renders samples first..last-1 of the place, in launches of the kernel's pace. Returns false if the device
-// failed or settings.stop ended it.
+// Renders samples first..last-1 of the place in launches whose size the kernel's pace decides. Returns false
+// if the device failed or settings.stop ended the render.
 bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
                  uint32_t last);
 
-// Launches a kernel that fills the AOVs of its list (kernels/aovs.h), paced and stopped as band_render is.
+// Launches a kernel that fills its AOVs (kernels/aovs.h) in launches whose size the kernel's pace decides.
+// Returns false if the device failed or settings.stop ended the render.
 bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, unsigned aovs,
                const Place *place);

@@ -1,5 +1,5 @@
 // Renders the region band by band. Each launch is short, so that a desktop stays responsive and an interrupt
-// takes effect soon; memory is that of a band.
+// takes effect soon. Only one band at a time is in memory.
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
@@ -8,7 +8,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-static const double PASS_SECONDS = 0.1; // of renderer_accumulate, about
+static const double PASS_SECONDS = 0.1; // the approximate duration of a pass of renderer_accumulate
 
 enum { BAND_BYTES_MAX = 4 << 20 }; // color and shadow, the one layer that grows with the lights
 
@@ -22,8 +22,8 @@ FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
     return header;
 }
 
-// Device lengths converted to the scene's unit: `lengths` itself where the unit is 1, as always at `double`;
-// else a float copy, which the caller frees.
+// Returns the device's lengths converted to the scene's unit: `lengths` itself if the unit is 1, as always at
+// `double`, else a float copy, which the caller frees.
 static void *lengths_restored(const Renderer *renderer, void *lengths, size_t count)
 {
     if (renderer->compiled.unit == 1) return lengths;
@@ -33,7 +33,7 @@ static void *lengths_restored(const Renderer *renderer, void *lengths, size_t co
     return restored;
 }
 
-// Where a band goes: to the queue that has its rows, or to a PassSink with its number of samples.
+// The destination of a band: the queue that handed out its rows, or a PassSink with its number of samples.
 typedef struct {
     const BandQueue *queue;
     PassSink pass_sink;
@@ -70,7 +70,7 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
     return go_on;
 }
 
-// Enough rows to keep the device busy.
+// Returns the number of rows that keeps the device busy.
 static uint32_t rows_min(const Renderer *renderer, const Pace *pace)
 {
     const TileShape group = group_shape(renderer);
@@ -136,7 +136,7 @@ static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows,
     return go_on && compute_ok(renderer->compute);
 }
 
-// Traces one ray per pixel. Returns false as band_fill does.
+// Traces one ray per pixel for the AOVs. Returns false if the device failed or the render is stopped.
 static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
     const Place place = band_place(renderer, rows);
@@ -163,7 +163,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     band_buffers_open(&buffers, renderer, aovs, film_of_rows(renderer, 0, rows_max(renderer, aovs)));
     renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
-    pace_begin_band(pace); // the last render's band may have been of another scene or size
+    pace_begin_band(pace); // the last render's band may belong to another scene or size
     bool go_on = compute_ok(compute);
     while (go_on) {
         uint32_t wanted = band_rows(renderer, pace, settings->sample_count, buffers.rows);
@@ -187,7 +187,7 @@ typedef struct {
     size_t count, capacity;
 } PassBands;
 
-// The first pass divides the image into bands, each with buffers of its own.
+// Renders the first pass, which divides the image into bands, each with separate buffers.
 static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Delivery *delivery)
 {
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);

@@ -1,5 +1,6 @@
-// The file: a FileHeader, the key, then for each band a RecordHeader and its layers. Numbers are in native
-// byte order: a checkpoint is resumed on the machine, or the kind of machine, that wrote it.
+// The file consists of a FileHeader, the key and, for each band, a RecordHeader and its layers. Numbers are
+// in native byte order, so a checkpoint can be resumed only on a machine with the byte order of the one that
+// wrote it.
 #include "host/render/checkpoint.h"
 
 #include "host/base/array.h"
@@ -19,7 +20,7 @@
 
 static const char file_magic[] = "glint checkpoint"; // stored without its null
 static const uint64_t file_format = 2;
-static const double SYNC_SECONDS = 1; // at least, between two syncs, which are slow
+static const double SYNC_SECONDS = 1; // the minimum between two syncs, which are slow
 
 enum { HASH_BYTES = 16, KEY_BYTES_MAX = 1 << 16, CHUNK_BYTES = 1 << 20 };
 
@@ -32,19 +33,19 @@ typedef struct {
 typedef struct {
     FilmHeader film;
     uint64_t size;                  // of the layers
-    unsigned char hash[HASH_BYTES]; // of all above and the layers
+    unsigned char hash[HASH_BYTES]; // of everything above and the layers
 } RecordHeader;
 
 typedef enum { RECORD_WHOLE, RECORD_TORN, RECORD_FAILED } RecordState;
 
 struct Checkpoint {
     char *path;
-    FilmHeader film; // of all rows
+    FilmHeader film; // describes all rows
     int descriptor;
     pthread_mutex_t mutex;
-    off_t end; // of the last record
+    off_t end; // the end of the last record
     double synced_seconds;
-    char *failure; // the first; NULL: none
+    char *failure; // the first failure, or NULL
     struct {
         BandRows *items;
         size_t count, capacity;
@@ -55,7 +56,7 @@ struct Checkpoint {
     } offsets;
 };
 
-// False at the end of the file, or where it cannot be read.
+// Reads bytes at an offset. Returns false at the end of the file, or if it cannot be read.
 static bool bytes_read(int descriptor, void *bytes, size_t size, off_t offset)
 {
     for (size_t done = 0; done < size;) {
@@ -107,14 +108,16 @@ static RecordHeader record_of(const Film *band)
     return record;
 }
 
-// Whether the record holds rows of the image and nothing else: its sizes decide what is read into memory.
+// Returns whether the record holds rows of the image and nothing else. Its sizes decide how much is read into
+// memory.
 static bool record_fits(const Checkpoint *checkpoint, const RecordHeader *record)
 {
     return film_header_fits(&record->film, &checkpoint->film) &&
            record->size == film_header_size(&record->film);
 }
 
-// Torn: no whole record of this image is at the offset. Failed: the file cannot be read.
+// Reads and checks the record at the offset. RECORD_TORN means that the offset does not hold a whole record
+// of this image, RECORD_FAILED that the file cannot be read.
 static RecordState record_check(const Checkpoint *checkpoint, off_t offset, off_t file_size,
                                 RecordHeader *record, unsigned char *chunk)
 {
@@ -143,7 +146,7 @@ static void record_note(Checkpoint *checkpoint, const RecordHeader *record)
     checkpoint->end += (off_t)(sizeof *record + record->size);
 }
 
-// Marks the rows of the record; false: an earlier one has some of them.
+// Marks the rows of the record as saved. Returns false if an earlier record has some of them.
 static bool rows_mark(bool *is_saved, const FilmHeader *film)
 {
     for (uint32_t i = 0; i < film->row_count; i++) {
@@ -153,7 +156,7 @@ static bool rows_mark(bool *is_saved, const FilmHeader *film)
     return true;
 }
 
-// Finds the records and cuts off what follows the last whole one; leaves a file that cannot be read.
+// Finds the records and cuts off what follows the last whole one. Does not change a file that cannot be read.
 static bool records_find(Checkpoint *checkpoint)
 {
     struct stat status;
@@ -171,7 +174,8 @@ static bool records_find(Checkpoint *checkpoint)
     return state != RECORD_FAILED && ftruncate(checkpoint->descriptor, checkpoint->end) == 0;
 }
 
-// The value in the line of the key whose name is at `line`; empty without one.
+// Returns the value in the line of the key whose name is at `line`, or an empty value if no line has that
+// name.
 static const char *key_value(const char *key, const char *line, size_t name_length, size_t *length)
 {
     for (const char *at = key; *at;) {
@@ -191,13 +195,13 @@ static void damage_report(const char *path, MessageList *messages)
     message_error(messages, "the checkpoint '%s' is damaged; remove it or name another file", path);
 }
 
-// A value of a key as messages have it.
+// Returns a key's value as messages print it.
 static char *value_text(const char *value, size_t length)
 {
     return length > 0 ? memory_copy_part(value, length) : memory_copy_text("none");
 }
 
-// Says which is the first line in which the keys differ.
+// Reports the first line in which the keys differ.
 static void difference_report(const char *path, const char *key, const char *found, MessageList *messages)
 {
     for (const char *line = key; *line; line += strcspn(line, "\n") + 1) {
@@ -208,13 +212,13 @@ static void difference_report(const char *path, const char *key, const char *fou
         char *own = value_text(value, length), *others = value_text(other, other_length);
         message_error(
             messages,
-            "the checkpoint '%s' is of another image (%.*s: %s, not %s); remove it or name another file",
+            "the checkpoint '%s' belongs to another image (%.*s: %s, not %s); remove it or name another file",
             path, (int)name_length, line, others, own);
         free(own);
         free(others);
         return;
     }
-    damage_report(path, messages); // it has further lines
+    damage_report(path, messages); // the key in the file has further lines
 }
 
 static bool open_failed(const char *path, const char *doing, MessageList *messages)
@@ -222,7 +226,7 @@ static bool open_failed(const char *path, const char *doing, MessageList *messag
     return message_error(messages, "cannot %s the checkpoint '%s': %s", doing, path, strerror(errno));
 }
 
-// A new file's header and key.
+// Writes the header and the key of a new file.
 static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const char *key,
                          MessageList *messages)
 {
@@ -233,7 +237,7 @@ static bool header_write(Checkpoint *checkpoint, const FileHeader *header, const
     return is_written || open_failed(checkpoint->path, "write", messages);
 }
 
-// Checks the key that is in the file.
+// Checks the key in the file.
 static bool key_check(const Checkpoint *checkpoint, const FileHeader *header, const char *key,
                       MessageList *messages)
 {
@@ -256,7 +260,8 @@ static bool key_check(const Checkpoint *checkpoint, const FileHeader *header, co
     return is_same;
 }
 
-// Checks the header of the file, or writes that of a new one, or of one whose process ended within it.
+// Checks the header of the file. Writes the header of a new file, or of a file whose process ended while
+// writing it.
 static bool header_check(Checkpoint *checkpoint, const char *key, MessageList *messages)
 {
     const FileHeader expected = file_header(key);
@@ -280,7 +285,8 @@ static bool header_check(Checkpoint *checkpoint, const char *key, MessageList *m
     return false;
 }
 
-// The name of the open file itself where the checkpoint's is that of a symbolic link; NULL: it has none.
+// Returns the name of the open file itself, which differs from the checkpoint's if that is a symbolic link.
+// Returns NULL if the file does not have a name.
 static char *file_name(const Checkpoint *checkpoint)
 {
     char *name = realpath(checkpoint->path, NULL);
@@ -289,7 +295,8 @@ static char *file_name(const Checkpoint *checkpoint)
     return NULL;
 }
 
-// So that a new file's name outlives a power failure; not every file system can sync a folder.
+// Syncs the folder, so that a new file's name outlives a power failure. Not every file system can sync a
+// folder.
 static void folder_sync(const Checkpoint *checkpoint)
 {
     char *name = file_name(checkpoint);
@@ -301,7 +308,7 @@ static void folder_sync(const Checkpoint *checkpoint)
     free(name);
 }
 
-// Opens and locks the file. A process that completed its image may remove it between the two.
+// Opens and locks the file. Between the two, another process that completed its image may remove the file.
 static bool file_open(Checkpoint *checkpoint, MessageList *messages)
 {
     enum { TRIES_MAX = 100 };
@@ -403,13 +410,13 @@ bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band)
     return is_read;
 }
 
-// Unless another file has the name now, such as the image itself.
+// Removes the file, unless its name now belongs to another file, such as the image itself.
 static void file_remove(const Checkpoint *checkpoint, MessageList *messages)
 {
     char *name = realpath(checkpoint->path, NULL);
     int error = name ? 0 : errno;
     if (name) {
-        errno = 0; // and stays so where another file has the name
+        errno = 0; // stays 0 if another file has the name
         if (!file_has_name(checkpoint->descriptor, AT_FDCWD, name) || unlink(name) != 0) error = errno;
     }
     free(name);

@@ -1,9 +1,9 @@
-// The finished bands of an image in a file, so that a render that ends early goes on where it was. Records
-// are appended, each with its hash, and synced; what a crash, a power failure or a full disk left of the last
-// ones is cut off when the file is opened again.
+// Keeps the finished bands of an image in a file, so that a render that ends early can be resumed. Records
+// are appended, each with its hash, and synced. When the file is opened after a crash, a power failure or a
+// full disk, incomplete records at its end are cut off.
 //
-// A checkpoint belongs to one image: its key is a text with a line "NAME: VALUE" for each thing that the bits
-// depend on, the scene last: a refusal names the first line that differs.
+// A checkpoint belongs to one image. Its key is a text with a line "NAME: VALUE" for each thing that the
+// image's bits depend on, the scene last, so that a refusal can name the first line that differs.
 #pragma once
 
 #include "host/base/message.h"
@@ -14,16 +14,18 @@
 
 typedef struct Checkpoint Checkpoint;
 
-// Opens the file or creates it. `film` describes all rows of the image: bands that do not fit it are
-// rejected. NULL with an error message: the file is another image's, not a checkpoint, damaged, in use by
-// another process, or cannot be read or written; it is then as it was.
+// Opens the file or creates it. `film` describes all rows of the image; bands that do not fit it are
+// rejected. Returns NULL with an error message, and leaves the file unchanged, if the file belongs to another
+// image, is not a checkpoint, is damaged, is used by another process, or cannot be read or written.
 Checkpoint *checkpoint_open(const char *path, const char *key, const FilmHeader *film, MessageList *messages);
-// The rows of each band that the file has, in no order.
+// Returns the rows of each band in the file, in no particular order.
 const BandRows *checkpoint_bands(const Checkpoint *checkpoint, size_t *count);
-// Adds a band; any thread may. False: it cannot be written; checkpoint_close says why.
+// Appends a band. Any thread may call this. Returns false if the band cannot be written; checkpoint_close
+// then adds the message.
 bool checkpoint_append(Checkpoint *checkpoint, const Film *band);
-// Reads the band that starts at a row; film_free frees it. False: it cannot be read, as there.
+// Reads the band that starts at a row; film_free frees it. Returns false if the band cannot be read;
+// checkpoint_close then adds the message.
 bool checkpoint_read(Checkpoint *checkpoint, uint32_t first_row, Film *band);
-// Adds an error message if a band could not be written or read. Removes the file where the image
-// `is_complete`, with a warning where it cannot.
+// Closes the file. Adds an error message if a band could not be written or read. If the image `is_complete`,
+// removes the file, or adds a warning if that fails.
 void checkpoint_close(Checkpoint *checkpoint, bool is_complete, MessageList *messages);

@@ -1,5 +1,5 @@
-// Films: the color of an image's pixels and their AOVs in host memory, one layer each. The layers are listed
-// in kernels/aovs.h.
+// A film holds the color and the AOVs of an image's pixels in host memory, one layer each. The layers are
+// listed in kernels/aovs.h.
 #pragma once
 
 #include "host/base/memory.h"
@@ -20,7 +20,7 @@ enum {
     AOVS_ALL = (1 << LAYER_COUNT) - 1
 };
 
-extern const char *const layer_names[LAYER_COUNT]; // "t", …, as in file names and --aov
+extern const char *const layer_names[LAYER_COUNT]; // "t" and so on, as in file names and in --aov
 
 typedef enum { LAYER_TYPE_REAL, LAYER_TYPE_LENGTH, LAYER_TYPE_INTEGER } LayerType;
 extern const LayerType layer_types[LAYER_COUNT];
@@ -30,8 +30,8 @@ extern const LayerType layer_types[LAYER_COUNT];
 #define FILM_INTEGER                      uint32_t
 #define FILM_LAYER(NAME, name, type, ...) FILM_##type *name;
 
-// At `certified`, of samples and of AOVs' rays: those of the pixels that were rendered in double, and of
-// these the ones that double left in doubt.
+// At `certified`, the number of samples and of AOVs' rays whose pixels were re-rendered in double precision,
+// and the number of these that remained uncertified.
 typedef struct {
     uint64_t repeated, undecided;
 } RepeatCounts;
@@ -41,21 +41,23 @@ static inline RepeatCounts repeat_counts_add(RepeatCounts a, RepeatCounts b)
     return (RepeatCounts){a.repeated + b.repeated, a.undecided + b.undecided};
 }
 
-enum { DOUBT_REPEATED = 1, DOUBT_UNDECIDED }; // what the AOV says of such a pixel
+// Values of the AOV `doubt`: the pixel was flagged and re-rendered in double precision; it remained
+// uncertified.
+enum { DOUBT_REPEATED = 1, DOUBT_UNDECIDED };
 
-// Every pixel of an image's region or of a band of its rows, row by row from the top left. Layers are NULL
-// where they were not requested.
+// Every pixel of an image's region, or of a band of the region's rows, row by row from the top left. Layers
+// that were not requested are NULL.
 //
-// Reals are doubles, except in a band that was computed in float: there they are floats, and are read through
-// layers[] and real_size alone, never by name.
+// Reals are doubles, except in a band that was computed in float. There they are floats, and must be read
+// through layers[] and real_size, never by name.
 //
-// Of a miss t is infinite, normal and position are 0, object is UINT32_MAX. Positions are relative to the
-// eye. A path is a signature of what the ray met (kernels/types.h).
+// Where a ray misses, t is infinite, normal and position are 0, and object is UINT32_MAX. Positions are
+// relative to the eye. A path is a signature of the surfaces that the ray tree hits (kernels/types.h).
 typedef struct {
     uint32_t width, height, light_count;
-    uint32_t first_row; // of a band in its region
-    bool is_double;     // computed in double
-    size_t real_size;   // sizeof(double); sizeof(float) in a band that was not
+    uint32_t first_row; // of the band, counted in the region
+    bool is_double;     // whether it was computed in double
+    size_t real_size;   // sizeof(float) in a band that was computed in float, else sizeof(double)
     RepeatCounts repeats;
     union {
         void *layers[LAYER_COUNT];
@@ -65,15 +67,15 @@ typedef struct {
     };
 } Film;
 
-// The rows of a band in its region; row_count 0: none.
+// The rows of a band, counted in the region. A row_count of 0 means none.
 typedef struct {
     uint32_t first_row, row_count;
 } BandRows;
 
-// A film as files and messages describe it; the bytes of its layers follow in their order.
+// Describes a film in files and messages. The bytes of its layers follow in the layers' order.
 typedef struct {
     uint32_t width, first_row, row_count, light_count, real_size, is_double;
-    uint64_t layers; // the set of those that are there
+    uint64_t layers; // the set of the film's layers
     RepeatCounts repeats;
 } FilmHeader;
 
@@ -82,29 +84,32 @@ static inline size_t film_pixel_count(const Film *film)
     return memory_product(film->width, film->height);
 }
 
-// Values per pixel.
+// Returns the number of values per pixel.
 uint32_t film_components(const Film *film, Layer layer);
-// Of the whole layer, in bytes, whether it is there or not.
+// Returns the size of a layer in bytes, whether the film has that layer or not.
 size_t film_layer_size(const Film *film, Layer layer);
 
-// Of all layers that are there, in bytes.
+// Returns the size of all layers that the film has, in bytes.
 size_t film_size(const Film *film);
 
 FilmHeader film_header(const Film *film);
-// Whether a header, which may come from anywhere, is that of a band of rows of the image.
+// Returns whether a header, which may come from an untrusted source, describes a band of the image's rows.
 bool film_header_fits(const FilmHeader *band, const FilmHeader *image);
-// Of the layers that a header describes, in bytes.
+// Returns the size of the layers that a header describes, in bytes.
 uint64_t film_header_size(const FilmHeader *header);
-// The film that a header describes, with layers whose values are undefined.
+// Returns the film that a header describes. The values in its layers are undefined.
 Film film_of_header(const FilmHeader *header);
 
-// A film of zeros in double with the color and the AOVs of the set.
+// Returns a film of zeros in double precision, with the color and the AOVs of the set.
 Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsigned aovs);
-Film film_copy(const Film *band); // with layers of its own
-void film_free(Film *film);       // and zeroes
+// Returns a copy that has separate layers.
+Film film_copy(const Film *band);
+// Frees the layers and sets the film to zeros.
+void film_free(Film *film);
 
-// Copies the rows of a band into the film, all layers that both have, and adds its counts; reals become
-// doubles.
+// Copies the rows of a band into the film and adds the band's counts. Copies every layer that both have, with
+// reals converted to double.
 void film_copy_band(Film *film, const Film *band);
 
-float *film_narrow_color(const Film *film); // caller frees
+// Returns the color rounded to float. The caller frees it.
+float *film_narrow_color(const Film *film);

@@ -1,7 +1,8 @@
-// The cost of a band's samples is known only from its own launches: a band of sky costs next to nothing, the
-// next, of glass, a hundred times as much. So its first pass has one sample per pixel, in launches that aim
-// at a part of the target by the time of the launch before. Its later passes follow the time of the pass
-// before, to which all of its pixels have contributed.
+// The cost of a band's samples is known only from the band's launches. A band of sky costs almost nothing,
+// and the next, of glass, may cost a hundred times as much. So a band's first pass has one sample per pixel,
+// in launches whose size follows the duration of the previous launch and which aim at a part of the target.
+// The size of a later pass follows the duration of the previous pass, to which all pixels of the band
+// contributed.
 #include "host/render/pace.h"
 
 #include <math.h>
@@ -14,7 +15,7 @@ enum {
     LAUNCH_GROWTH_MAX = 4,
 };
 
-static const double FIRST_PASS_SHARE = 0.25; // of the target
+static const double FIRST_PASS_SHARE = 0.25; // the part of the target at which a first pass's launches aim
 
 uint64_t pace_band_samples(const Pace *pace)
 {

@@ -1,4 +1,4 @@
-// A job: a scheduler, and a worker for each device or machine.
+// A job runs a scheduler and one worker per device or machine.
 #include "host/base/memory.h"
 #include "host/render/renderer_state.h"
 #include <pthread.h>
@@ -31,7 +31,7 @@ static bool worker_has_ended(void *context)
     return scheduler_has_ended(((const Worker *)context)->scheduler);
 }
 
-// A failed device is dropped.
+// Renders the queue's rows on a device. Drops a device that failed.
 static void *worker_run(void *argument)
 {
     Worker *worker = argument;
@@ -45,7 +45,7 @@ static void *worker_run(void *argument)
     return NULL;
 }
 
-// Without a thread the device counts as failed.
+// Starts the worker's thread. If that fails, the device counts as failed.
 static void thread_start(Worker *worker)
 {
     int error = pthread_create(&worker->thread, NULL, worker_run, worker);

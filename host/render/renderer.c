@@ -1,4 +1,4 @@
-// Opening renderers, and giving them scenes: one is compiled once for all renderers that read the same
+// Opens renderers and gives them scenes. A scene is compiled once for all renderers that read the same
 // arrays.
 #include "host/base/array.h"
 #include "host/base/clock.h"
@@ -67,12 +67,12 @@ static SceneLayout scene_layout(const CompiledScene *compiled, const Renderer *r
     return layout;
 }
 
-// The largest buffer that the host and the arena's offsets can address.
+// The size of the largest buffer that the host and the arena's offsets can address.
 static const uint64_t BUFFER_BYTES_MAX =
     SIZE_MAX / ARENA_UNIT < UINT32_MAX ? SIZE_MAX : (uint64_t)UINT32_MAX * ARENA_UNIT;
 
-// Returns false with a message where a buffer exceeds BUFFER_BYTES_MAX, or the buffers exceed the memory that
-// the device reports. Where it reports none, creating them may fail.
+// Returns false with a message if a buffer exceeds BUFFER_BYTES_MAX, or if the buffers exceed the memory that
+// the device reports. If the device reports none, creating the buffers may fail.
 static bool device_has_room(const CompiledScene *compiled, const Renderer *renderer, MessageList *messages)
 {
     const Device *device = renderer->compute->device;
@@ -100,7 +100,7 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
                          most_text.text);
 }
 
-// Whether scene_move leaves an array as it is, and does not read it.
+// Returns whether scene_move neither reads nor changes an array.
 static bool is_without_eye(size_t kind)
 {
     return kind == FLAT_TRIANGLE_NORMALS || kind == FLAT_TRIANGLE_UVS || kind == FLAT_TRIANGLE_NEIGHBORS ||
@@ -121,7 +121,7 @@ static void buffers_stage(Renderer *renderer, const CompiledScene *compiled)
     renderer->layout = layout;
 }
 
-// Writes an array to its staged buffer, or to its part of the one on the device.
+// Writes an array to its staged buffer, or to its place in the buffer on the device.
 static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array)
 {
     const SceneBuffer buffer = buffer_of(kind);
@@ -204,7 +204,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, SceneVar
     };
 }
 
-// Those of a pass of an image.
+// Returns the settings of one pass of an image.
 static RenderSettings pass_settings(const RenderSettings *settings, PixelPass pass)
 {
     RenderSettings of_pass = *settings;
@@ -253,7 +253,7 @@ Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, 
     return renderer;
 }
 
-// NULL: there is no such pass.
+// Returns the renderer of a pass, or NULL if there is no such pass.
 static Renderer *of_pass(Renderer *renderer, PixelPass pass)
 {
     while (renderer && renderer->pass != pass)
@@ -267,7 +267,7 @@ uint32_t renderer_lanes(Renderer *renderer, PixelPass pass)
     return renderer ? renderer->report.lanes : 0;
 }
 
-// What follows from another compiled scene.
+// Updates everything that depends on the compiled scene.
 static void scene_changed(Renderer *renderer)
 {
     const CompiledScene *compiled = &renderer->compiled;
@@ -284,8 +284,8 @@ static void scene_changed(Renderer *renderer)
     renderer_kernels_choose(renderer);
 }
 
-// Uploads the scene to renderers of the same variant, whose devices have room for it. Takes it; what moves
-// has one renderer, which keeps the arrays.
+// Uploads the scene to renderers of the same variant, on whose devices it fits, and takes ownership of it. A
+// renderer that moves is alone and keeps the arrays.
 static void scene_give(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
     arrays_upload(renderers, count, compiled);
@@ -305,7 +305,7 @@ bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, 
     return has_room && compute_check_reference(renderer->compute);
 }
 
-// The renderers of a variant. Closes those of them whose devices have no room for the scene.
+// Finds the renderers of a variant. Closes those on whose devices the scene does not fit.
 static size_t takers_find(Renderer **takers, Renderer **renderers, size_t count, SceneVariant variant,
                           const CompiledScene *compiled, MessageList *of_each)
 {
@@ -332,7 +332,8 @@ static bool variant_is_needed(SceneVariant variant, Renderer *const *renderers, 
     return is_needed;
 }
 
-// Compiles the scene for each variant that is needed. False with a message.
+// Compiles the scene for each variant that is needed. Returns false with a message if the scene cannot be
+// compiled.
 static bool variants_compile(Renderer **renderers, size_t count, const Scene *scene,
                              const RenderSettings *settings, const SceneReceivers *others,
                              MessageList *messages, MessageList *of_each)
@@ -360,7 +361,7 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
                     MessageList *of_each)
 {
     RenderSettings shared = *settings;
-    shared.moves = settings->moves && count == 1; // several share the arrays, and none keeps them
+    shared.moves = settings->moves && count == 1; // several renderers share the arrays, and none keeps them
     for (size_t i = 0; i < count; i++)
         renderers[i] = renderer_open_empty(computes[i], &shared, renderers[i], &of_each[i]);
     const bool compiles = variants_compile(renderers, count, scene, &shared, others, messages, of_each);
@@ -380,7 +381,8 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
                                                                                              : NULL;
 }
 
-// Compiles the scene anew, or moves it. False with a message, with nothing changed that kernels read.
+// Recompiles the scene or moves it. Returns false with a message, and with nothing changed that kernels read,
+// if the scene cannot be compiled or does not fit the device.
 static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                          MessageList *messages)
 {

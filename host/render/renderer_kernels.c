@@ -1,5 +1,5 @@
-// The kernels of a renderer: their variants, which differ in the definitions before their text and in
-// compiler options, and their launches.
+// Builds and launches the kernels of a renderer. Variants of a kernel differ in the definitions before their
+// text and in compiler options.
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
@@ -28,8 +28,8 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
     kernel_argument(compute, kernel, ARGUMENT_TEXELS, sizeof(cl_mem), &buffers[BUFFER_TEXELS]);
 }
 
-// At least `count`: few sizes, so that few kernels are built. Most scenes are served by `usual`, which is
-// doubled for the others.
+// Returns a capacity of at least `count`. There are few different capacities, so that few kernels are built:
+// most scenes get `usual`, which is doubled for the others.
 static uint32_t capacity_for(uint32_t count, uint32_t usual)
 {
     while (usual < count)
@@ -37,7 +37,7 @@ static uint32_t capacity_for(uint32_t count, uint32_t usual)
     return usual;
 }
 
-// Refracted rays that wait while reflected ones are traced, up to one per depth.
+// Returns how many refracted rays may wait while reflected ones are traced: up to one per depth.
 static uint32_t pending_max(const Renderer *renderer)
 {
     if (!(renderer->report.features & FEATURE_TRANSMISSION)) return 1;
@@ -73,9 +73,9 @@ void renderer_kernels_close(Renderer *renderer)
     variant_close(renderer, &renderer->other_variant);
 }
 
-// Whether kernels repair quotients and roots. Injected errors make the device count as not correctly rounded,
-// and so does a promise that the passport refutes. Where there is none, no measurement replaces it: pairs of
-// mantissas are too many to try.
+// Returns whether kernels repair quotients and roots. Injected errors make the device count as not correctly
+// rounded, and so does a promise that the passport refutes. If the device does not promise correct rounding,
+// no measurement replaces the promise, because there are too many pairs of mantissas to try.
 static bool repairs_divide(const Renderer *renderer)
 {
     return renderer->settings.precision == PRECISION_STRICT &&
@@ -193,7 +193,7 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
     const bool is_fixed = renderer->compute->device->work_group[0] > 0;
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)
         compute_fail(renderer->compute, "clEnqueueNDRangeKernel", CL_INVALID_WORK_GROUP_SIZE,
-                     "kernel %s: work-groups of %zu work-items were asked for, but at most %zu fit",
+                     "kernel %s: work-groups of %zu work-items were requested, but at most %zu fit",
                      kernel_sources[kind].name, group[0] * (dimensions > 1 ? group[1] : 1),
                      time.local[0] * (dimensions > 1 ? time.local[1] : 1));
     array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));

@@ -10,13 +10,13 @@ typedef struct {
     size_t count, capacity;
 } Numbers;
 
-// Pixels of a band.
+// A list of a band's pixels.
 typedef struct {
     Numbers pixels; // x and y in the image
     Numbers index;  // in the band
 } PixelList;
 
-// The pixels of a band that are in doubt, tile by tile, so that neighbors share packets.
+// Lists the flagged pixels of a band tile by tile, so that neighbors share packets.
 static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint32_t *doubts,
                              size_t tile_count)
 {
@@ -32,7 +32,7 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
         const uint32_t left = (item % items_of_row * columns + which % columns) * tile_width,
                        top =
                            (item / items_of_row * MACRO_TILE_ROWS_OF(lanes) + which / columns) * tile_height;
-        if (left >= width || top >= rows.row_count) continue; // not a tile of the band
+        if (left >= width || top >= rows.row_count) continue; // the tile is outside the band
         for (uint32_t bits = doubts[i], lane = 0; bits != 0; bits >>= 1, lane++) {
             if (!(bits & 1)) continue;
             const uint32_t x = left + lane % tile_width, y = top + lane / tile_width;
@@ -44,7 +44,7 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
     return list;
 }
 
-// Puts a layer of the list's pixels, of doubles, into the band's, of floats.
+// Copies a layer of the list's pixels, in double, to the band's layer, in float.
 static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_list,
                         const BandBuffers *of_band, const PixelList *list, const Film *film, const Film *band)
 {
@@ -81,7 +81,7 @@ static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
     of_repeat->launches.count = of_repeat->reads.count = 0;
 }
 
-// A band of which pixels are repeated: the kernel, the layers that it fills, and their buffers.
+// A band whose flagged pixels are re-rendered: the kernel, the layers that it fills, and their buffers.
 typedef struct {
     KernelKind kind;
     unsigned layers, aovs;
@@ -100,7 +100,7 @@ void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows 
     renderer_unmap(renderer, buffers->film, values);
 }
 
-// Raises the doubt of the list's pixels.
+// Raises the value of the layer `doubt` of the list's pixels to at least `doubt`.
 static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const PixelList *list, uint32_t doubt)
 {
     const BandBuffers *buffers = band->buffers;
@@ -114,7 +114,7 @@ static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const Pix
     renderer_unmap(renderer, buffers->film, values);
 }
 
-// Renders all samples of a list. Returns false as band_render does.
+// Renders all samples of a list. Returns false if the device failed or settings.stop ended the render.
 static bool list_render(Renderer *renderer, const BandBuffers *buffers, const Place *place)
 {
     const uint32_t end = renderer->settings.sample_count;
@@ -127,8 +127,9 @@ static bool list_render(Renderer *renderer, const BandBuffers *buffers, const Pl
     return true;
 }
 
-// Renders a list of the band's pixels by `repeat`, and puts them into the band's layers. `undecided`: of each
-// pixel, how many of its samples `repeat` leaves in doubt; NULL: not asked for. Returns false as band_repeat.
+// Renders a list of the band's pixels by `repeat` and copies them to the band's layers. Unless it is NULL,
+// `undecided` receives the number of uncertain samples that each pixel still has. Returns false if a device
+// failed or settings.stop ended the render.
 static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
                         uint32_t *undecided)
 {
@@ -156,7 +157,7 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
     return compute_check_reference(renderer->compute) && whole;
 }
 
-// Leaves those of the list's pixels that are undecided; returns the number of their undecided samples.
+// Keeps the pixels of the list that are uncertified. Returns the number of their uncertified samples.
 static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
 {
     uint64_t samples = 0;
@@ -185,22 +186,22 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
     if (!values) return false;
     PixelList list = doubts_list(renderer, rows, values, tile_count);
     renderer_unmap(renderer, doubts, values);
-    bool go_on = true;
+    bool is_whole = true;
     if (list.index.count > 0) {
         RepeatCounts *counts = &buffers->repeats;
         uint32_t *undecided = memory_allocate(list.index.count, sizeof *undecided);
         counts->repeated +=
             (uint64_t)list.index.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
         doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
-        go_on = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
-        if (go_on) counts->undecided += list_keep_undecided(&list, undecided);
-        if (go_on && list.index.count > 0) {
+        is_whole = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
+        if (is_whole) counts->undecided += list_keep_undecided(&list, undecided);
+        if (is_whole && list.index.count > 0) {
             doubts_raise(renderer, &band, &list, DOUBT_UNDECIDED);
-            go_on = list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
+            is_whole = list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
         }
         free(undecided);
     }
     free(list.pixels.items);
     free(list.index.items);
-    return go_on;
+    return is_whole;
 }

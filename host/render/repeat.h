@@ -1,13 +1,13 @@
-// At `certified`: the pixels of a band that are in doubt, rendered anew in double.
+// Re-renders the flagged pixels of a band in double precision at `certified`.
 #pragma once
 
 #include "host/render/band.h"
 
-// Begins a band, without a pixel in doubt.
+// Clears the flags of a band's pixels.
 void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows rows);
 
-// Renders again in double what a kernel has left in doubt, and as at `double` what that leaves undecided.
-// Counts both in the buffers, and notes them in AOV_DOUBT if that is there. Returns false if the device
-// failed or settings.stop ended it.
+// Re-renders in double precision, with bounds, the pixels that a kernel flagged. Re-renders those that remain
+// uncertified as at `double`. Adds the number of both to the buffers' counts and records them in the layer
+// `doubt` if the buffers have it. Returns false if the device failed or settings.stop ended the render.
 bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
                  BandRows rows);

@@ -5,10 +5,10 @@
 #include <stddef.h>
 #include <stdlib.h>
 
-// The R2 sequence, whose steps are powers of the inverse of the plastic number (Roberts, The unreasonable
-// effectiveness of quasirandom sequences, 2018), shifted so that the mean is the pixel's center and the
-// number of samples does not shift the image. Samples that the shift moves out of the pixel are clamped to
-// its edge.
+// Uses the R2 sequence, whose steps are powers of the inverse of the plastic number (Roberts, The
+// unreasonable effectiveness of quasirandom sequences, 2018). The sequence is shifted so that its mean is the
+// pixel's center and the number of samples does not shift the image. Samples that the shift moves out of the
+// pixel are clamped to its edge.
 void *sample_pattern(uint32_t count, bool is_double)
 {
     const double steps[2] = {0.7548776662466927, 0.5698402909980532};

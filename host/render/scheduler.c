@@ -1,7 +1,7 @@
-// Guided self-scheduling (Polychronopoulos and Kuck, 1987, "Guided Self-Scheduling", with shares by pace): a
-// worker gets at most half of its share of the rows that are left, so that the last bands are short. One
-// whose pace is unknown gets a step, since it may be a thousand times slower than the others; one that would
-// end after another had rendered all that is left gets nothing more.
+// Guided self-scheduling (Polychronopoulos and Kuck, 1987, "Guided Self-Scheduling") with shares by pace: a
+// worker gets at most half of its share of the remaining rows, so that the last bands are short. A worker
+// whose pace is unknown gets one step, since it may be a thousand times slower than the others. A worker that
+// would end after another could have rendered all remaining rows gets nothing more.
 #include "host/render/scheduler.h"
 
 #include "host/base/array.h"
@@ -13,13 +13,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The most bytes of waiting bands by default: usually a band of each worker (docs/performance.md).
+// The default limit for bytes of waiting bands, which usually holds one band per worker
+// (docs/performance.md).
 static const size_t WAITING_BYTES_MIN = 64 << 20, WAITING_BYTES_OF_WORKER = 16 << 20;
 
 typedef struct {
-    BandRows rows; // taken and not given yet
+    BandRows rows; // taken and not yet delivered
     double taken_seconds;
-    double rows_per_second; // of the last band; 0: unknown
+    double rows_per_second; // in the last band; 0 if unknown
     bool is_dropped;
     WorkerShare share;
 } Worker;
@@ -37,10 +38,10 @@ struct Scheduler {
         size_t count, capacity;
     } free_rows;
     struct {
-        Film *items; // copies; without layers where the checkpoint has them
+        Film *items; // copies, which have no layers if the checkpoint has them
         size_t count, capacity;
     } waiting;
-    size_t row_bytes; // of a waiting band in memory; 0: none or unknown
+    size_t row_bytes; // memory per row of a waiting band; 0 if none or unknown
 };
 
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
@@ -62,8 +63,8 @@ bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)
     return is_whole;
 }
 
-// The part of the rest that the worker, whose pace is known, would render if all ended together. Unknown
-// paces count as the mean of the known ones.
+// Returns the part of the remaining rows that the worker, whose pace is known, would render if all workers
+// ended at the same time. Unknown paces count as the mean of the known ones.
 static double share_of(const Scheduler *scheduler, size_t worker)
 {
     double sum = 0;
@@ -87,7 +88,7 @@ static uint32_t rows_free(const Scheduler *scheduler)
     return rows;
 }
 
-// Whether all other workers are dropped or were never there.
+// Returns whether all other workers are dropped or never existed.
 static bool is_alone(const Scheduler *scheduler, size_t worker)
 {
     for (size_t i = 0; i < scheduler->settings.worker_count; i++)
@@ -95,8 +96,8 @@ static bool is_alone(const Scheduler *scheduler, size_t worker)
     return true;
 }
 
-// The row where bands must end for now, so that those that wait fit into memory. The uppermost band is never
-// too far down, which is why the render always gets on.
+// Returns the row where bands must end for now, so that the waiting ones fit into memory. The uppermost
+// missing band always fits, so that the render never blocks.
 static uint32_t row_limit(const Scheduler *scheduler)
 {
     if (scheduler->row_bytes == 0) return UINT32_MAX;
@@ -104,7 +105,8 @@ static uint32_t row_limit(const Scheduler *scheduler)
            (uint32_t)(scheduler->settings.waiting_bytes_max / scheduler->row_bytes);
 }
 
-// Seconds until the first of the others would end with all that is left; infinite while no pace is known.
+// Returns the seconds until the first of the other workers could have rendered all remaining rows; infinite
+// while no pace is known.
 static double others_seconds(const Scheduler *scheduler, size_t worker)
 {
     double least = INFINITY;
@@ -117,7 +119,7 @@ static double others_seconds(const Scheduler *scheduler, size_t worker)
     return least;
 }
 
-// At most how many rows a worker beside others gets. The fastest always gets some.
+// Returns the most rows that a worker which has others next to it gets. The fastest worker always gets some.
 static uint32_t rows_fair(const Scheduler *scheduler, size_t worker, uint32_t step)
 {
     const double pace = scheduler->workers[worker].rows_per_second, left = rows_free(scheduler);
@@ -126,8 +128,8 @@ static uint32_t rows_fair(const Scheduler *scheduler, size_t worker, uint32_t st
     return (uint32_t)fmax(1, 0.5 * share_of(scheduler, worker) * left / step) * step;
 }
 
-// The rows for the worker from the first that are free; none while they are too far down, or where another
-// worker ends sooner.
+// Returns the rows for the worker, beginning at the first free row. Returns none while they are too far down,
+// or if another worker would end sooner.
 static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
 {
     const BandRows *first = &scheduler->free_rows.items[0];
@@ -141,7 +143,7 @@ static BandRows rows_choose(const Scheduler *scheduler, size_t worker, uint32_t 
     return (BandRows){first->first_row, rows};
 }
 
-// Inserts rows among those that are free.
+// Inserts rows into the free rows.
 static void rows_insert(Scheduler *scheduler, BandRows rows)
 {
     array_push(scheduler->free_rows, rows);
@@ -151,7 +153,7 @@ static void rows_insert(Scheduler *scheduler, BandRows rows)
     scheduler->free_rows.items[at] = rows;
 }
 
-// Takes the rows out of those that are free, if they are.
+// Removes the rows from the free rows, if they are among them.
 static void rows_remove(Scheduler *scheduler, BandRows rows)
 {
     for (size_t i = 0; i < scheduler->free_rows.count; i++) {
@@ -176,7 +178,7 @@ static bool rows_are_out(const Scheduler *scheduler)
     return false;
 }
 
-// Takes rows, if there are any for the worker now; else *waits says whether there may be later.
+// Takes rows if there are any for the worker now. Otherwise *waits tells whether there may be rows later.
 static BandRows rows_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits)
 {
     const bool is_free = scheduler->free_rows.count > 0;
@@ -209,7 +211,7 @@ BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, u
     return rows;
 }
 
-// Passes the band, which is the next one, to the sink; the mutex is not held meanwhile.
+// Passes the next band to the sink. The mutex is not held meanwhile.
 static void band_pass(Scheduler *scheduler, const Film *band)
 {
     const uint32_t end = band->first_row + band->height;
@@ -225,7 +227,7 @@ static void band_pass(Scheduler *scheduler, const Film *band)
         scheduler->has_ended = true;
 }
 
-// Takes the next band from those that wait; false: it is not among them.
+// Takes the next band from the waiting ones. Returns false if it is not among them.
 static bool waiting_take(Scheduler *scheduler, Film *band)
 {
     for (size_t i = 0; i < scheduler->waiting.count; i++) {
@@ -237,7 +239,7 @@ static bool waiting_take(Scheduler *scheduler, Film *band)
     return false;
 }
 
-// Passes the bands that wait, as far as none is missing above them, unless another thread does.
+// Passes the waiting bands up to the first missing row to the sink, unless another thread is doing so.
 static void waiting_pass(Scheduler *scheduler)
 {
     Film band;
@@ -251,7 +253,7 @@ static void waiting_pass(Scheduler *scheduler)
     }
 }
 
-// The checkpoint's bands wait like those that were rendered.
+// Adds the checkpoint's bands to the waiting ones, as if they had been rendered.
 static void checkpoint_resume(Scheduler *scheduler)
 {
     size_t count;
@@ -289,7 +291,7 @@ static bool is_next(const Scheduler *scheduler, const Film *band)
     return !scheduler->is_delivering && band->first_row == scheduler->delivered_rows;
 }
 
-// Keeps a copy of the band until those above it are there.
+// Keeps a copy of the band until those above it are complete.
 static void band_keep(Scheduler *scheduler, const Film *band)
 {
     Film copy = {.first_row = band->first_row, .height = band->height};

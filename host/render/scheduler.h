@@ -1,9 +1,9 @@
-// The rows of an image, handed out in bands to workers that render them, such as devices, each in a thread of
-// its own. The bands reach the sink in order from the top, whoever renders them. A worker that fails is
-// dropped, and its rows go to the others.
+// Hands out the rows of an image in bands to workers that render them, such as devices, each in a separate
+// thread. The bands reach the sink in order from the top, no matter which worker renders them. A worker that
+// fails is dropped, and its rows are handed to others.
 //
-// Bands are sized by each worker's measured pace, and shrink towards the end so that all workers end
-// together. A worker's first band is a step.
+// The size of a band follows its worker's measured pace. Bands shrink towards the end so that all workers end
+// at the same time. A worker's first band has one step of rows.
 #pragma once
 
 #include "host/render/checkpoint.h"
@@ -12,45 +12,49 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Called for each band from the top, whose layers are valid until it returns; returns false to stop.
+// Called for each band in order from the top. The band's layers are valid until the sink returns. A sink that
+// returns false stops the render.
 typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
-// Called when a worker was dropped while others go on.
+// Called when a worker was dropped and others continue.
 typedef void (*WorkerDropped)(void *context, size_t worker);
 
 typedef struct {
     uint32_t row_count;
     size_t worker_count;
-    BandSink sink;            // called by the workers' threads, one at a time
-    WorkerDropped dropped;    // likewise, never while the sink runs; NULL: not called
-    void *context;            // of both
-    Checkpoint *checkpoint;   // has the bands that are done, and gets all others; NULL: none
-    size_t waiting_bytes_max; // of bands that wait for one above them, about; 0: 16 MiB per worker, at least
-                              // 64 MiB
+    BandSink sink;          // called by the workers' threads, one at a time
+    WorkerDropped dropped;  // called by the workers' threads, never while the sink runs; may be NULL
+    void *context;          // passed to both
+    Checkpoint *checkpoint; // provides finished bands and receives all others; may be NULL
+    // The approximate limit for bands that wait for one above them. 0 means 16 MiB per worker, at least 64
+    // MiB.
+    size_t waiting_bytes_max;
 } SchedulerSettings;
 
-// What a worker did.
+// The work that one worker did.
 typedef struct {
     uint32_t rows, bands;
-    double busy_seconds; // rendering bands
+    double busy_seconds; // spent rendering bands
     double idle_seconds; // the rest of the time from scheduler_open to the end of the last worker
 } WorkerShare;
 
 typedef struct Scheduler Scheduler;
 
-// Passes the checkpoint's bands to the sink, as far as none is missing above them.
+// Opens a scheduler. Passes the checkpoint's bands to the sink up to the first missing row.
 Scheduler *scheduler_open(const SchedulerSettings *settings);
-// Frees; true: all rows reached the sink. `shares`, of each worker, may be NULL.
+// Frees the scheduler. Returns true if all rows reached the sink. Unless it is NULL, `shares` receives each
+// worker's share.
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares);
 
-// The next rows for the worker: at most `rows_max`, and a multiple of `step` where possible. Waits where all
-// are handed out or left to a faster worker, since that may yet fail, or while too many bands wait for one
-// above them. No rows: the image is complete, or the render has ended.
+// Returns the next rows for the worker: at most `rows_max`, and a multiple of `step` where possible. Waits
+// while all rows are handed out or left to a faster worker, since that worker may yet fail, and while too
+// many bands wait for one above them. Returns no rows if the image is complete or the render has ended.
 BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step);
-// The band of the rows that the worker took. False: the render has ended.
+// Delivers the band of the rows that the worker took. Returns false if the render has ended.
 bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band);
-// As scheduler_take, but does not wait: *waits says that there may be rows later.
+// Returns the next rows for the worker as scheduler_take does, but does not wait. If there are none now,
+// *waits tells whether there may be rows later.
 BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits);
-// Returns the worker's rows; it takes no more.
+// Hands the worker's rows to others. The worker takes no more rows.
 void scheduler_drop(Scheduler *scheduler, size_t worker);
 // Ends the render before all rows are done.
 void scheduler_end(Scheduler *scheduler);

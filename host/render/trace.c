@@ -1,4 +1,4 @@
-// Explicit rays.
+// Traces explicit rays.
 #include "host/base/memory.h"
 #include "host/render/renderer_state.h"
 #include <float.h>
@@ -66,7 +66,7 @@ static TraceHit hit_at(const Renderer *renderer, KernelKind kind, const void *sc
     return hit;
 }
 
-// The rays' scalars as the kernel reads them; caller frees.
+// Returns the rays' scalars as the kernel reads them; the caller frees them.
 static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t count)
 {
     bool is_double = renderer->report.is_double;
@@ -74,7 +74,7 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
     void *scalars = memory_allocate((size_t)count * RAY_SCALARS, renderer_scalar_size(renderer));
     for (uint32_t i = 0; i < count; i++) {
         const double *origin = rays[i].origin, *direction = rays[i].direction;
-        // bounds are those of rays without an end: ends_apply
+        // the kernel bounds the hits of rays that have no end; ends_apply applies tmax
         const double tmax = renderer_certifies(renderer) ? INFINITY : rays[i].tmax;
         const double ray[RAY_SCALARS] = {
             origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
@@ -85,7 +85,7 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
     return scalars;
 }
 
-// Returns the launch's seconds.
+// Launches the kernel and returns the launch's seconds.
 static double trace_launch(Renderer *renderer, KernelKind kind, uint32_t count, cl_mem rays, cl_mem results,
                            cl_mem objects)
 {
@@ -139,7 +139,7 @@ static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays
                        TraceHit *hits)
 {
     const Compute *compute = renderer->compute;
-    // the report is of images: a view asks about pixel after pixel
+    // the report describes images, and a view queries one pixel after another
     RenderReport *report = &renderer->report;
     const size_t launch_count = report->launches.count, read_count = report->reads.count;
     Pace *pace = renderer_pace(renderer, kind);
@@ -157,7 +157,7 @@ static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays
 static bool rays_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
                        TraceHit *hits);
 
-// Traces the rays again whose hits are uncertain.
+// Re-traces the rays whose hits are uncertain.
 static bool uncertain_trace(Renderer *repeat, KernelKind kind, const TraceRay *rays, size_t ray_count,
                             TraceHit *hits)
 {
@@ -177,7 +177,7 @@ static bool uncertain_trace(Renderer *repeat, KernelKind kind, const TraceRay *r
     return is_done;
 }
 
-// Makes certain hits beyond their rays' ends misses.
+// Turns certain hits beyond their rays' ends into misses.
 static void ends_apply(const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
     for (size_t i = 0; i < ray_count; i++) {
