@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-// A map of what each pixel has `stride` values of.
+// A map with `stride` values per pixel.
 typedef struct {
     const uint32_t *values;
     uint32_t width, height, stride, offset;
@@ -26,7 +26,7 @@ static bool differs_from_neighbor(const ValueMap *map, size_t x, size_t y)
            (y + 1 < map->height && map_at(map, x, y + 1) != value);
 }
 
-// Marks the map's edges in `edges`, laid out as the map is; returns how many pixels they have.
+// Marks the map's edges in `edges`, which has the map's layout. Returns the number of pixels at edges.
 static size_t edges_mark(const ValueMap *map, bool *edges)
 {
     size_t count = 0;
@@ -91,8 +91,8 @@ typedef struct {
     const Film *reference, *variant;
     const AccuracyEdges *edges;
     AccuracyErrors *errors;
-    // pixels that are compared further
-    double *expected, *found; // colors of shaded ones
+    // Values of the pixels that are compared further:
+    double *expected, *found; // the colors of the shaded ones
     float *t_relative, *t_ulps, *normal;
 } FilmComparison;
 
@@ -102,7 +102,7 @@ static double value_error(double reference, double variant)
     return isfinite(reference) || isfinite(variant) ? INFINITY : 0;
 }
 
-// The channel in which a pixel's colors differ most.
+// Returns the channel in which a pixel's colors differ most.
 static size_t worst_channel(const FilmComparison *comparison, size_t pixel)
 {
     const double *reference = comparison->reference->color + 3 * pixel;
@@ -119,7 +119,7 @@ static double color_error(const FilmComparison *comparison, size_t pixel)
     return value_error(comparison->reference->color[value], comparison->variant->color[value]);
 }
 
-// Keeps the error if it is the worst of its kind so far; one away from edges is worse than any at them.
+// Keeps the error if it is the worst of its kind so far. An error away from edges is worse than any at edges.
 static void worst_offer(const FilmComparison *comparison, AccuracyKind kind, size_t pixel,
                         const AccuracyWorst *offered)
 {
@@ -152,8 +152,8 @@ static void count_wrong(const FilmComparison *comparison, AccuracyKind kind, Edg
                                  .variant = values[1]});
 }
 
-// Returns whether every light's bit is the reference's. Where two surfaces meet, a point of the one is a
-// rounding away from lying in the other's shadow: silhouettes are edges of every shadow.
+// Returns whether every light's bit equals the reference's. Where two surfaces touch, a rounding decides
+// whether a point of the one lies in the other's shadow, so silhouettes are edges of every shadow.
 static bool shadows_compare(const FilmComparison *comparison, size_t pixel)
 {
     const uint32_t lights = comparison->reference->light_count;
@@ -178,7 +178,7 @@ static bool path_compare(const FilmComparison *comparison, size_t pixel)
     return false;
 }
 
-// The gap between the numbers of a precision around a positive value.
+// Returns the gap between neighboring numbers of a precision around a positive value.
 static double unit_in_last_place(double value, bool is_double)
 {
     int exponent;
@@ -186,7 +186,7 @@ static double unit_in_last_place(double value, bool is_double)
     return ldexp(1, exponent - (is_double ? DBL_MANT_DIG : FLT_MANT_DIG));
 }
 
-// The angle between two vectors of about unit length, also where it is small or near pi.
+// Returns the angle between two vectors of about unit length, accurately even if it is small or near pi.
 static double vector_angle(const double a[3], const double b[3])
 {
     double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};

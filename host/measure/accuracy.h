@@ -1,5 +1,5 @@
-// How far an image is from a reference, split by what went wrong: another object, another shadow, another
-// path, or the same of all three and other numbers. Works on plain arrays; docs/accuracy.md defines every
+// Measures how far an image is from a reference, split by cause: another object, another shadow, another
+// path, or different numbers where these three agree. Works on plain arrays; docs/accuracy.md defines every
 // figure.
 #pragma once
 
@@ -11,23 +11,24 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Where a rounding decides what a pixel shows: the pixels whose value differs from one of their 4 neighbors',
-// and those around them. NULL where the film lacks the AOV.
+// The edges, where a rounding decides what a pixel shows: the pixels whose value differs from that of one of
+// their 4 neighbors, and the pixels around them. Maps of AOVs that the film lacks are NULL.
 typedef struct {
-    bool *silhouette, *shadow, *path;                           // shadow: for each light, as in the film
-    size_t silhouette_pixels, *shadow_edge_pixels, path_pixels; // shadow: for each light
+    bool *silhouette, *shadow, *path; // the shadow map is laid out as in the film, with values per light
+    size_t silhouette_pixels, *shadow_edge_pixels, path_pixels; // shadow_edge_pixels has a count per light
 } AccuracyEdges;
 
 // The AOVs that are compared.
 enum { ACCURACY_AOVS = AOV_T | AOV_NORMAL | AOV_OBJECT | AOV_SHADOW | AOV_PATH };
 
 void accuracy_edges_find(AccuracyEdges *edges, const Film *reference);
-void accuracy_edges_free(AccuracyEdges *edges); // and zeroes
+// Frees the maps and sets the edges to zeros.
+void accuracy_edges_free(AccuracyEdges *edges);
 
-// The kinds of error, each with one figure that is plotted.
+// The kinds of error. One figure of each is plotted.
 typedef enum {
     ACCURACY_OBJECT,  // pixels that show another object
-    ACCURACY_SHADOW,  // shadow bits that differ, of all lights
+    ACCURACY_SHADOW,  // shadow bits that differ, over all lights
     ACCURACY_PATH,    // pixels whose rays took another path
     ACCURACY_SHADING, // RMSE
     ACCURACY_T,       // 99.9th percentile, relative
@@ -36,9 +37,9 @@ typedef enum {
     ACCURACY_FLIP,    // mean
     ACCURACY_KIND_COUNT
 } AccuracyKind;
-extern const char *const accuracy_kind_names[ACCURACY_KIND_COUNT]; // "object", …, as in the JSON
+extern const char *const accuracy_kind_names[ACCURACY_KIND_COUNT]; // "object" and so on, as in the JSON
 
-// What differs at the reference's edges, and away from them.
+// The number of differences at the reference's edges and away from them.
 typedef struct {
     size_t edge, away;
 } EdgeCount;
@@ -47,47 +48,49 @@ typedef struct {
     double largest, percentile_999;
 } ErrorExtremes;
 
-// Where an error of a kind is largest. Of the kinds that are counted: among the wrong ones away from edges,
-// or else those at edges, the one with the largest difference of color.
+// The place where an error of a kind is largest. For kinds that are counted, it is the wrong pixel away from
+// edges, or else at edges, whose color differs most.
 typedef struct {
-    bool found; // false: there is no error of the kind, or it is unavailable
-    bool away;  // of counted kinds: away from the reference's edges
+    bool found; // false if there is no error of the kind or it is unavailable
+    bool away;  // for counted kinds, whether the place is away from the reference's edges
     uint32_t x, y;
-    uint32_t light; // shadow: the first that is wrong there
-    // shading, image: of a channel; t: relative; normal: radians; counted kinds: of the color
+    uint32_t light; // for shadows, the first light that is wrong there
+    // For shading and image, the error of a channel; for t, relative; for normals, in radians; for counted
+    // kinds, the error of the color.
     double error;
-    // object: ids, shadow: bits, path: signatures, t: distances, shading, image: that channel; normal: none
+    // For objects, ids; for shadows, bits; for paths, signatures; for t, distances; for shading and image,
+    // the values of that channel. Unset for normals.
     double reference, variant;
     double reference_color[3], variant_color[3];
 } AccuracyWorst;
 
 typedef struct {
-    const char
-        *why_colors_only; // why there is nothing but nonfinite, negative, image and display; NULL: there is
+    // Why only nonfinite, negative, image and display are set; NULL if all members are.
+    const char *why_colors_only;
     size_t nonfinite, negative;     // pixels
-    EdgeCount object, shadow, path; // shadow, path: where the object is the reference's
-    // where object, shadows and path are the reference's, and a surface was hit
+    EdgeCount object, shadow, path; // shadows and paths are compared where the object equals the reference's
+    // Where object, shadows and path equal the reference's and a surface was hit.
     size_t shading_pixels;
     ErrorSummary shading;
-    // where the object is the reference's, and is one
+    // Where the object equals the reference's and the ray hit one.
     size_t surface_pixels;
     ErrorExtremes t_relative, t_ulps, normal;
-    ErrorSummary image;                       // of every pixel
-    ImageMetrics display;                     // as 8 bits and eyes see it: srgb_psnr, off_by_…, flip_…
-    AccuracyWorst worst[ACCURACY_KIND_COUNT]; // none of FLIP
+    ErrorSummary image;                       // over all pixels
+    ImageMetrics display;                     // only srgb_psnr, off_by_… and flip_… are set
+    AccuracyWorst worst[ACCURACY_KIND_COUNT]; // unset for FLIP
 } AccuracyErrors;
 
-// `variant` and `reference` are of one size, and of one number of lights. `display_values`: colors are for a
-// screen as they are, without the sRGB curve.
+// Compares a variant with the reference, which must have the same size and number of lights. With
+// `display_values`, colors are shown on a screen without the sRGB curve.
 void accuracy_compare(AccuracyErrors *errors, const Film *reference, const AccuracyEdges *edges,
                       const Film *variant, bool display_values);
-// Pixels with a channel that is not finite, and with one below 0.
+// Counts the pixels with a channel that is not finite, and those with a channel below 0.
 void accuracy_count_unsound(const Film *film, size_t *nonfinite, size_t *negative);
 
 typedef enum {
     ACCURACY_MEASURED,
-    ACCURACY_REFERENCE,   // the reference: times but no errors
-    ACCURACY_UNAVAILABLE, // row->failure says why
+    ACCURACY_REFERENCE,   // the reference itself, which has times but no errors
+    ACCURACY_UNAVAILABLE, // row->failure has the reason
     ACCURACY_STATUS_COUNT
 } AccuracyStatus;
 extern const char *const accuracy_status_names[ACCURACY_STATUS_COUNT];
@@ -104,18 +107,18 @@ typedef struct {
     uint32_t samples;
     AccuracyStatus status;
     AccuracyErrors errors;
-    float *image;          // linear, 3 per pixel; NULL where unavailable
-    unsigned disqualified; // set of DISQUALIFIED_…: why its speed does not count
-    unsigned pareto;       // set of 1 << AccuracyKind: no other is as good in less time, by medians
+    float *image;          // linear, 3 values per pixel; NULL if unavailable
+    unsigned disqualified; // the set of DISQUALIFIED_… for which its speed does not count
+    unsigned pareto;       // the set of 1 << AccuracyKind in which no other is as good in less median time
 } AccuracyVariant;
 
-// An error that a user allows, and the fastest that keeps within it.
+// An error that a user allows, and the fastest variant that stays within it.
 typedef struct {
     double budget;
-    AccuracyKind measure; // shading, or image where there are colors only
-    size_t variant;       // with the least median time of a frame; SIZE_MAX: none
-    // for each variant, its time over the picked one's; a ratio of 0: it is the picked one, or is not within
-    // the budget
+    AccuracyKind measure; // shading, or image if there are only colors
+    size_t variant;       // the one with the least median time of a frame, or SIZE_MAX
+    // The time of each variant divided by that of the picked one. The ratio is 0 for the picked variant and
+    // for those beyond the budget.
     Comparison *times;
 } AccuracyRecommendation;
 
@@ -130,9 +133,9 @@ typedef struct {
     uint32_t width, height, light_count, bounce_count;
     bool display_values;
     struct {
-        const char *file; // NULL: it was rendered as the next say
+        const char *file; // NULL if the reference was rendered with the settings that follow
         const char *precision, *bvh;
-        const char *device; // NULL: that of the variants
+        const char *device; // NULL if it is the variants' device
         uint32_t lanes, samples;
         uint64_t kernel_hash;
         size_t nonfinite, negative; // pixels
@@ -145,14 +148,15 @@ typedef struct {
     size_t recommendation_count;
 } AccuracyScene;
 
-void accuracy_scene_free(AccuracyScene *scene); // with its images; and zeroes
+// Frees the scene with its images and sets it to zeros.
+void accuracy_scene_free(AccuracyScene *scene);
 
 // Returns whether a variant is within the pick's budget and not certainly slower than the picked one.
 bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant);
-// The plotted figure of a kind, or why there is none.
+// Returns the plotted figure of a kind, or the reason why it is unavailable.
 Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);
-// From its errors, what disqualifies a variant.
+// Returns the set of DISQUALIFIED_… that follows from a variant's errors.
 unsigned accuracy_faults(const AccuracyErrors *errors);
-// From errors and times: sets each variant's disqualified and pareto, and a recommendation for each budget.
+// Sets, from errors and times, each variant's disqualified and pareto, and a recommendation for each budget.
 // The runs of the variants must have been interleaved.
 void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets);

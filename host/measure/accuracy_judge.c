@@ -1,4 +1,4 @@
-// What follows from the variants' errors and times together.
+// Ranks the variants by their errors and times together.
 #include "host/measure/accuracy.h"
 
 #include "host/base/memory.h"
@@ -75,8 +75,8 @@ static double frame_median(const AccuracyVariant *variant)
     return series_summarize(&variant->row->times.frame).median;
 }
 
-// Whether a is at least as good as b and better in something. The reference has no error to compare: none is
-// better.
+// Returns whether a is at least as good as b and better in error or time. The reference has no error, so its
+// time alone decides.
 static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, AccuracyKind kind)
 {
     Figure error_a = accuracy_figure(a, kind), error_b = accuracy_figure(b, kind);
@@ -105,7 +105,8 @@ static bool is_within(const AccuracyVariant *variant, double budget, AccuracyKin
     return !error.why_not && error.value <= budget;
 }
 
-// The intervals of all pairs of the scene's variants hold together, and so whichever is picked by its times.
+// Finds the recommendation for a budget. The intervals of all pairs of the scene's variants hold together, so
+// they hold whichever variant is picked by its times.
 static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, double budget,
                                                   AccuracyKind measure)
 {

@@ -21,25 +21,25 @@ enum { HASH_DIGITS = 16 };
 struct Baseline {
     BaselineRow *items;
     size_t count, capacity;
-    json_t *report; // owns the rows' texts
+    json_t *report; // owns the texts of the rows
     Calibration calibration;
 };
 
-// Returns "" where there is no text.
+// Returns a text, or "" if the value is not a text.
 static const char *text_of(const json_t *value)
 {
     const char *text = json_string_value(value);
     return text ? text : "";
 }
 
-// Returns 0 where there is no count.
+// Returns a count, or 0 if the value is not a count.
 static uint32_t count_of(const json_t *value)
 {
     double number = json_number_value(value);
     return number >= 0 && number <= UINT32_MAX ? (uint32_t)number : 0;
 }
 
-// Milliseconds become seconds. Empty where an element is no time.
+// Returns times in milliseconds as seconds, or an empty series if an element is not a time.
 static Series times_of(const json_t *values)
 {
     Series times = {0};
@@ -107,7 +107,7 @@ Baseline *baseline_open(const char *path, MessageList *messages)
     const json_t *calibration = json_object_get(report, "calibration");
     const double rounds = json_number_value(json_object_get(calibration, "rounds"));
     if (rounds != CALIBRATION_ROUNDS) {
-        message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d: measure it again", path,
+        message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d; re-measure it", path,
                       rounds, CALIBRATION_ROUNDS);
         json_decref(report);
         return NULL;

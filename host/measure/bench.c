@@ -6,14 +6,14 @@
 const char *const bench_ray_names[RAYS_COUNT] = {"camera", "camera_hits", "reflected", "refracted", "shadow"};
 
 static const double converged_spread = 0.02, largest_drift = 0.01;
-// What a double loses of the nanoseconds since 1970 that a timestamp may count.
+// The error in seconds of a double that holds the nanoseconds since 1970, which a timestamp may count.
 static const double timestamp_error = 1e-6;
 
 // Returns whether the device's clock runs faster or slower than the host's by more than largest_drift. Both
-// ends of a command lie within the host's wait for it, however long the host is stalled. So from the start of
-// a command to the end of a later one at most the time from the start of the first wait to the end of the
-// second passes, and from the end of a command to the start of a later one at least the time between the
-// waits.
+// ends of a command lie within the host's wait for it, however long the host is stalled. So the time from the
+// start of a command to the end of a later one is at most the time from the start of the first wait to the
+// end of the second, and the time from the end of a command to the start of a later one is at least the time
+// between the waits.
 static bool clock_drifts(BenchTimes *times, const LaunchTime *launch)
 {
     const double fast = 1 + largest_drift, slow = 1 - largest_drift;

@@ -1,4 +1,5 @@
-// How fast one variant renders one scene: times of repeated runs, and what follows from them.
+// Measures how fast one variant renders one scene: the times of repeated runs, and the figures that follow
+// from them.
 #pragma once
 
 #include "host/measure/series.h"
@@ -6,38 +7,40 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-// A number, or why it is unavailable.
+// A number, or the reason why it is unavailable.
 typedef struct {
     double value;
-    const char *why_not; // NULL: there is a value
+    const char *why_not; // NULL if there is a value
 } Figure;
 
-// Times of the runs of one variant; zeroed: none yet.
+// Times of the runs of one variant. All zeros means no runs.
 typedef struct {
-    Series frame;       // seconds from a run's first enqueue until the host has read its last band
-    Series processor;   // seconds of all processors that this process used meanwhile
-    Series event, host; // seconds of a run's launches, by their events and by the host's clock
-    const char *doubt;  // why the events are not to be believed, as seen in some launch; NULL: they are
-    double run_event, run_host; // sums of the run at work
-    // over the launches so far, of the device's clock less the host's, were the device's 1 % faster or slower
+    Series frame;               // seconds from a run's first enqueue until the host has read its last band
+    Series processor;           // seconds of all processors that this process used during the run
+    Series event, host;         // seconds of a run's launches, by their events and by the host's clock
+    const char *doubt;          // why the events' times cannot be trusted, as some launch showed, or NULL
+    double run_event, run_host; // sums over the current run
+    // Extremes over the launches so far of the device's clock minus the host's, if the device's ran 1 %
+    // faster or slower.
     double least_fast_start, greatest_slow_end;
 } BenchTimes;
 
-// For each launch of a run, then once for the run.
+// Adds a launch to the current run. bench_end_run is then called once per run.
 void bench_add_launch(BenchTimes *times, const LaunchTime *launch);
 void bench_end_run(BenchTimes *times, double frame_seconds, double processor_seconds);
 void bench_times_free(BenchTimes *times);
 
-// Why the host's clock is used for the launches, or NULL where their events' times are: every event agreed
-// with the host's clock, and the device's clock did not drift from it over all the runs.
+// Returns why the host's clock times the launches, or NULL if their events do: every event agreed with the
+// host's clock, and the device's clock did not drift from it over all runs.
 const char *bench_doubt(const BenchTimes *times);
-// Of the runs' launches, by events or by the host's clock as bench_doubt says.
+// Returns the summary of the runs' launch times, by events or by the host's clock as bench_doubt decides.
 Summary bench_kernel(const BenchTimes *times);
-// Whether the times have converged: at least `enough` runs, and a small interquartile range.
+// Returns whether the times have converged: there are at least `enough` runs, and the interquartile range is
+// small.
 bool bench_converged(const BenchTimes *times, size_t enough);
 
-// Identifies a row. The scene is its path, and the hash of all files it was read from, by which rows of
-// reports match.
+// Identifies a row. The scene is known by its path and by the hash of all files it was read from; rows of
+// different reports match by the hash.
 typedef struct {
     const char *scene, *precision, *bvh;
     uint32_t lanes, width, height, samples, bounces;
@@ -48,7 +51,7 @@ extern const char *const bench_ray_names[RAYS_COUNT];
 
 typedef struct {
     BenchKey key;
-    char *failure; // why there is nothing but the key; NULL: there is
+    char *failure; // why only the key is set, or NULL
     BenchTimes times;
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
@@ -58,5 +61,5 @@ typedef struct {
 
 void bench_row_free(BenchRow *row);
 
-// Rays of every kind for each second of the launches.
+// Returns the number of rays of all types per second of the launches.
 double bench_rays_per_second(const BenchRow *row);

@@ -5,7 +5,7 @@
 
 enum { CHAINS = 8, PARTS = 64 };
 
-// Runs the chains of the parts begin to end - 1. Each converges to 1, so it neither overflows nor becomes
+// Runs the chains of parts begin to end - 1. Each chain converges to 1, so it neither overflows nor becomes
 // subnormal.
 static void part_run(void *context, size_t begin, size_t end)
 {

@@ -1,5 +1,5 @@
-// A fixed workload on the host, whose time follows the speed of the host's processors. No device or driver
-// takes part in it. Builds by other compilers or with other CFLAGS may take another time.
+// Times a fixed workload on the host, which follows the speed of the host's processors. It uses neither
+// devices nor drivers. Builds by other compilers or with other CFLAGS may take a different time.
 #pragma once
 
 #include "host/measure/series.h"
@@ -7,12 +7,13 @@
 // Rounds of eight chains of a product and a sum in double, shared by all processors.
 enum { CALIBRATION_ROUNDS = 1 << 20 };
 
-// Seconds of each calibration; zeroed: none yet.
+// Seconds of each calibration. All zeros means none.
 typedef struct {
     Series wall;
-    Series processor; // of all processors together
+    Series processor; // summed over all processors
 } Calibration;
 
-// Takes some 3 ms of processor time, and adds to each series.
+// Runs the workload, which takes about 3 ms of processor time, and adds to each series.
 void calibration_run(Calibration *calibration);
-void calibration_free(Calibration *calibration); // and zeroes
+// Frees the series and sets them to zeros.
+void calibration_free(Calibration *calibration);

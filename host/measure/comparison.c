@@ -11,31 +11,34 @@ const char *const verdict_names[] = {
 
 const double comparison_confidence = 0.99;
 
-// How much the times of two processes of one build may differ, as a ratio.
+// The ratio by which the times of two processes of one build may differ.
 static const double process_allowance = 1.03;
 
-// Other work may slow a frame by the square of what it slows the calibration, or not at all.
+// The exponent by which a slower calibration slows a frame. Other work may slow a frame by the square of the
+// calibration's slowdown, or not at all.
 static const double exponent_max = 2;
 
-// Consecutive runs are alike; the medians of this many parts of a report are less so.
+// The number of parts of a report whose medians are compared. Consecutive runs are correlated, and these
+// medians are less so.
 enum { REPORT_BLOCKS = 20 };
 
 typedef struct {
     double low, high;
 } Interval;
 
-// The probability that `heads` of `count` fair coins show heads: by logarithms, since 2^-count may underflow.
+// Returns the probability that `heads` of `count` fair coins show heads. Uses logarithms, since 2^-count may
+// underflow.
 static double heads_probability(size_t count, size_t heads)
 {
     const double n = (double)count, k = (double)heads;
     return exp(lgamma(n + 1) - lgamma(k + 1) - lgamma(n - k + 1) - n * log(2));
 }
 
-// Misses the median with a probability of at most `error`.
+// Returns an interval that misses the median with a probability of at most `error`.
 static Interval median_interval(const Series *values, double error)
 {
     const size_t count = values->count;
-    size_t end = 0; // how many values from either end of the sorted ones the median may lie beyond
+    size_t end = 0; // the number of values at either end of the sorted ones beyond which the median may lie
     for (double missed = 0; 2 * end < count; end++) {
         missed += 2 * heads_probability(count, end);
         if (missed > error) break;
@@ -95,7 +98,7 @@ double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds
     return median;
 }
 
-// Logarithms of seconds / divisor^exponent: medians of `block_count` blocks in order.
+// Returns the logarithms of seconds / divisor^exponent, as medians of `block_count` consecutive blocks.
 static Series ratio_blocks(const Series *seconds, const Series *divisors, double exponent, size_t block_count)
 {
     const size_t count = seconds->count < divisors->count ? seconds->count : divisors->count;

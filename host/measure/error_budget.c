@@ -9,16 +9,17 @@
 
 const char *const error_metric_names[ERROR_METRIC_COUNT] = {"rmse", "max", "flip"};
 
-// FLIP blurs: one wrong pixel adds to its neighbors' values, together at most this many times what it would
-// have in an image of one color (21 times in 2000 trials on uniform, halved and random surroundings).
+// FLIP blurs, so one wrong pixel adds to its neighbors' values. The sum is at most this many times the value
+// that the pixel would have in an image of one color (21 times in 2000 trials on uniform, halved and random
+// surroundings).
 static const double flip_spread = 24;
 
-// Were the mean m or more, the product of 1 + m - x over the values would be expected to be at most 1: that
-// of the factors' means is, by the means of its factors (arithmetic and geometric). So it reaches 1 / risk
-// with a probability of at most `risk` (Markov), and an m for which it does is a bound (Waudby-Smith, Ramdas:
-// Estimating means of bounded random variables by betting, JRSS B 86(1), 2024; here with one fixed bet, the
-// best one where the values are small). Of n zeros it is about -ln(risk) / n. The logarithm of the product is
-// concave in m, so that Newton's method, started below its zero, stays there.
+// If the mean were m or more, the expected product of 1 + m - x over the values would be at most 1, because
+// the product of the factors' means is, by the inequality of arithmetic and geometric means. So the product
+// reaches 1 / risk with a probability of at most `risk` (Markov), and an m for which it does is a bound
+// (Waudby-Smith, Ramdas: Estimating means of bounded random variables by betting, JRSS B 86(1), 2024; here
+// with one fixed bet, the best one if the values are small). For n zeros the bound is about -ln(risk) / n.
+// The logarithm of the product is concave in m, so Newton's method, started below its zero, stays below it.
 double mean_upper_bound(const double *values, size_t count, double risk)
 {
     enum { STEPS_MAX = 60 };
@@ -48,7 +49,7 @@ static void display_color(float display[3], const double color[3], bool display_
     }
 }
 
-// The mean over the channels of the squared error.
+// Returns the mean over the channels of the squared error.
 static double square_error(const double reference[3], const double test[3])
 {
     double sum = 0;
@@ -63,7 +64,7 @@ static double largest_error(const double reference[3], const double test[3])
                 fmax(fabs(test[1] - reference[1]), fabs(test[2] - reference[2])));
 }
 
-// Returns infinity if a color is not finite.
+// Returns the largest channel of the film, or infinity if a color is not finite.
 static double largest_channel(const Film *film)
 {
     double largest = 0;
@@ -72,7 +73,7 @@ static double largest_channel(const Film *film)
     return largest;
 }
 
-// Of one pixel, within 0..1: what the bound is computed of.
+// Returns the error of one pixel within 0..1, of whose values the bound is computed.
 static double pixel_share(const ErrorBudget *budget, const double reference[3], const double test[3],
                           double range, bool display_values)
 {

@@ -1,4 +1,4 @@
-// An error that a user allows an image, and what a sample of its pixels says about it.
+// Decides from a sample of an image's pixels whether the image keeps an error that a user allows.
 #pragma once
 
 #include "host/render/film.h"
@@ -6,8 +6,8 @@
 #include <stddef.h>
 
 typedef enum {
-    ERROR_RMSE, // of all channels, linear light
-    ERROR_MAX,  // of a channel, linear light
+    ERROR_RMSE, // over all channels, linear light
+    ERROR_MAX,  // the largest of any channel, linear light
     ERROR_FLIP, // mean (flip.h)
     ERROR_METRIC_COUNT
 } ErrorMetric;
@@ -18,31 +18,32 @@ typedef struct {
     ErrorMetric metric;
 } ErrorBudget;
 
-// Upper confidence bound of the mean of values within 0..1: it is below the true mean with a probability of
-// at most `risk`, whatever their distribution. They must be independent; those of a stratified sample, one
-// from each stratum, need not be distributed alike.
+// Returns an upper confidence bound on the mean of values within 0..1. It is below the true mean with a
+// probability of at most `risk`, whatever their distribution. The values must be independent. Those of a
+// stratified sample, one from each stratum, need not have the same distribution.
 double mean_upper_bound(const double *values, size_t count, double risk);
 
 typedef struct {
-    double error; // the sample's own
-    // The whole image's is at most this, but for the risk; of ERROR_MAX instead: the share of pixels beyond
-    // the limit. Infinite where a pixel is not finite.
+    double error; // the sample's error
+    // The bound on the whole image's error, except for the risk. For ERROR_MAX, the bound on the share of
+    // pixels beyond the limit. Infinite if a pixel is not finite.
     double bound;
-    bool keeps; // the bound is within the limit; of ERROR_MAX: no pixel of the sample is beyond it
+    bool keeps; // the bound is within the limit; for ERROR_MAX, no pixel of the sample is beyond it
 } SampleVerdict;
 
-// How an image was sampled.
+// Describes how an image was sampled.
 typedef struct {
-    size_t drawn;        // the first pixels of the sample: one each from equal parts of the image, at random
-    double drawn_share;  // of the image that these parts cover; the other pixels of the sample are the rest
-    double color_max;    // no channel of the image is larger, or below 0
-    double risk;         // of a bound that does not hold
-    bool display_values; // see accuracy_compare
+    size_t drawn; // the sample's first pixels, drawn at random, one from each of equal parts of the image
+    double drawn_share;  // the share of the image that these parts cover; the sample has all other pixels
+    double color_max;    // the upper bound of the image's channels, whose lower bound is 0
+    double risk;         // the probability that a bound does not hold
+    bool display_values; // colors are shown on a screen without the sRGB curve
 } Sampling;
 
-// Returns the bound of an image's RMSE if all pixels of the sample are alike: no sample shows a lower one.
+// Returns the bound on an image's RMSE if all pixels of the sample equal the reference's. No sample shows a
+// lower bound.
 double sample_rmse_floor(const Sampling *sampling);
 
-// `reference` and `sample` are of the same pixels.
+// Judges a sample. `reference` and `sample` must have the same pixels.
 SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample,
                            const Sampling *sampling);

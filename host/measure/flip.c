@@ -14,8 +14,8 @@ static const double color_exponent = 0.7, feature_exponent = 0.5; // q_c, q_f
 static const double compressed_from = 0.4, compressed_to = 0.95;  // p_c, p_t
 static const double feature_width_degrees = 0.082;                // w
 
-// Sensitivity of the eye to contrast, as sums of Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), x in degrees
-// (table 1): luminance, red-green, blue-yellow.
+// The eye's sensitivity to contrast as sums of Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), with x in degrees
+// (table 1), for luminance, red-green and blue-yellow.
 static const struct {
     double a[2], b[2];
 } sensitivity[3] = {
@@ -25,7 +25,8 @@ static const struct {
 };
 static const double widest_sensitivity = 0.04;
 
-// sRGB's primaries (IEC 61966-2-1:1999) and the white x 0.31271, y 0.32902 (D65, CIE 15:2004), and back.
+// Converts between linear RGB with sRGB's primaries (IEC 61966-2-1:1999) and XYZ with the white x 0.31271, y
+// 0.32902 (D65, CIE 15:2004).
 static const double xyz_from_rgb[3][3] = {{0.41238656, 0.35759149, 0.18045049},
                                           {0.21263682, 0.71518298, 0.0721802},
                                           {0.01933062, 0.11919716, 0.95037259}};
@@ -41,7 +42,7 @@ static Vector3 transform(const double matrix[3][3], Vector3 v)
                      matrix[2][0] * v.x + matrix[2][1] * v.y + matrix[2][2] * v.z};
 }
 
-// Linear RGB to YCxCz, a linear relative of L*a*b* (section 4.1.1), and back.
+// Converts between linear RGB and YCxCz, a linear relative of L*a*b* (section 4.1.1).
 static Vector3 ycc_from_rgb(Vector3 rgb)
 {
     Vector3 xyz = transform(xyz_from_rgb, rgb);
@@ -62,7 +63,7 @@ static double lab_root(double ratio)
     return ratio > delta * delta * delta ? cbrt(ratio) : ratio / (3 * delta * delta) + 4.0 / 29;
 }
 
-// Linear RGB to L*a*b* (CIE 15:2004), with colors fading in the dark (Hunt; section 4.1.3).
+// Converts linear RGB to L*a*b* (CIE 15:2004), with colors fading in the dark (Hunt; section 4.1.3).
 static Vector3 hunt_lab(Vector3 rgb)
 {
     Vector3 xyz = transform(xyz_from_rgb, rgb);
@@ -71,13 +72,13 @@ static Vector3 hunt_lab(Vector3 rgb)
     return (Vector3){lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
 }
 
-// The distance HyAB (Abasi, Tehran, Fairchild 2020; section 4.1.3).
+// Returns the distance HyAB (Abasi, Tehran, Fairchild 2020; section 4.1.3).
 static double color_distance(Vector3 p, Vector3 q)
 {
     return pow(fabs(p.x - q.x) + hypot(p.y - q.y, p.z - q.z), color_exponent);
 }
 
-// One number per pixel.
+// An image with one number per pixel.
 typedef struct {
     uint32_t width, height;
     float *values;
@@ -98,14 +99,14 @@ static float *channel_row(const Channel *channel, uint32_t y)
     return channel->values + (size_t)y * channel->width;
 }
 
-// Weights of the neighbors -radius..radius, the same across and down.
+// Weights of the neighbors -radius..radius, the same horizontally and vertically.
 enum { RADIUS_MAX = 15 };
 typedef struct {
     int radius;
     float weights[2 * RADIUS_MAX + 1];
 } Filter;
 
-// Outside the image its border goes on.
+// Filters across. Outside the image its border pixels are repeated.
 static void filter_across(const Filter *filter, const Channel *in, Channel *out)
 {
     size_t width = in->width, radius = (size_t)filter->radius;
@@ -150,8 +151,8 @@ static Channel channel_filter(const Channel *in, const Filter *across, const Fil
     return out;
 }
 
-// Weights shape(x, deviation) for the pixels x around, scaled so that the positive ones sum to 1 and so do
-// the negative ones.
+// Returns a filter with weights shape(x, deviation) for the pixels x around, scaled so that the positive
+// weights sum to 1 and the negative ones to -1.
 static Filter filter_make(double (*shape)(double x, double deviation), double deviation, int radius)
 {
     if (radius > RADIUS_MAX) fault("a filter of FLIP is too wide: %d", radius);
@@ -182,14 +183,14 @@ static double gaussian_second_derivative(double x, double deviation)
     return (x * x / (deviation * deviation) - 1) * gaussian(x, deviation);
 }
 
-// In pixels, of exp(-pi^2 x^2 / b).
+// Returns the standard deviation of exp(-pi^2 x^2 / b) in pixels.
 static double sensitivity_deviation(double b)
 {
     return sqrt(b / (2 * M_PI * M_PI)) * FLIP_PIXELS_PER_DEGREE;
 }
 
-// What the eye resolves of one of YCxCz (section 4.1.2). Each Gaussian is a product of one across and one
-// down; the weights of a sum of them go by their volumes.
+// Blurs one channel of YCxCz to what the eye resolves (section 4.1.2). Each Gaussian is a product of a
+// horizontal and a vertical one. The weights of a sum of Gaussians are proportional to their volumes.
 static void channel_blur(Channel *channel, int component)
 {
     int radius = (int)ceil(3 * sensitivity_deviation(widest_sensitivity));
@@ -215,8 +216,8 @@ static void channel_blur(Channel *channel, int component)
     channel_close(&parts[1]);
 }
 
-// How strong an edge (`shape` the derivative of a Gaussian) or a point (its second derivative) is at each
-// pixel of the luminance (section 4.2).
+// Returns how strong an edge (if `shape` is the derivative of a Gaussian) or a point (if it is the second
+// derivative) is at each pixel of the luminance (section 4.2).
 static Channel feature_strength(const Channel *gray, double (*shape)(double x, double deviation))
 {
     double deviation = 0.5 * feature_width_degrees * FLIP_PIXELS_PER_DEGREE;
@@ -237,7 +238,7 @@ static Vector3 ycc_from_display(const float color[3])
                                   srgb_decode((double)color[2])});
 }
 
-// An image as the eye has it.
+// An image as the eye perceives it.
 typedef struct {
     Channel ycc[3]; // blurred
     Channel edges, points;
@@ -289,7 +290,8 @@ static Vector3 seen_color_at(const Seen *seen, size_t i)
                                 (double)seen->ycc[2].values[i]});
 }
 
-// The part of 0..1 up to compressed_to is for the smaller distances, the rest for those up to the largest.
+// Compresses a distance to 0..1. The part up to compressed_to holds the smaller distances, and the remainder
+// those up to the largest.
 static double compressed(double distance, double largest)
 {
     double knee = compressed_from * largest;
@@ -297,7 +299,7 @@ static double compressed(double distance, double largest)
     return compressed_to + (distance - knee) / (largest - knee) * (1 - compressed_to);
 }
 
-// Of the colors as seen (section 4.1.3).
+// Returns the difference of two perceived colors (section 4.1.3).
 static double color_difference(Vector3 reference, Vector3 test)
 {
     double largest = color_distance(hunt_lab((Vector3){0, 1, 0}), hunt_lab((Vector3){0, 0, 1}));

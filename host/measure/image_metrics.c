@@ -65,7 +65,7 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
     return true;
 }
 
-// What the screen or the file says is there as light. Caller frees.
+// Returns the image's values as linear light. The caller frees them.
 static double *linear_values(const Image *image)
 {
     size_t count = value_count(image);
@@ -120,7 +120,7 @@ static void steps_compare(ImageMetrics *metrics, const Image *reference, const I
     metrics->srgb_psnr = -10 * log10(square_sum / (double)value_count(reference) / (255 * 255));
 }
 
-// Three sRGB values a pixel within 0..1; what is no number is black. Caller frees.
+// Returns three sRGB values per pixel within 0..1; NaN becomes black. The caller frees them.
 static float *display_values(const Image *image)
 {
     float *values = memory_allocate(pixel_count(image), 3 * sizeof *values);

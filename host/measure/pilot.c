@@ -4,10 +4,11 @@
 #include <math.h>
 #include <string.h>
 
-// Enough pixels that a wrong one in 25,000 would be seen; few enough to cost a small part of the image.
+// There are enough pixels that a wrong one in 25,000 would be noticed, and few enough to cost a small part of
+// the image.
 enum { PIXELS_WANTED = 100000, CELL_MIN = 3, CELL_MAX = 4096 };
 static const double pilot_confidence = 0.95;
-// Times differ by as much from run to run: no reason for less precision.
+// Times differ by this ratio from run to run, which does not justify less precision.
 static const double time_tolerance = 1.1;
 
 static uint32_t cell_for(const RenderSettings *settings, double pixels_wanted)
@@ -29,7 +30,7 @@ static RenderSettings squares_of(const RenderSettings *settings, uint32_t cell)
 
 enum { REST_COUNT = 2 };
 
-// Sets `rest` to what the squares leave: columns at the right, and rows at the bottom.
+// Sets `rest` to the part of the image outside the squares: columns at the right, and rows at the bottom.
 static void rest_of(const RenderSettings *settings, uint32_t cell, RenderSettings rest[REST_COUNT])
 {
     const uint32_t columns = settings->region_width % cell, rows = settings->region_height % cell;
@@ -53,8 +54,8 @@ static Sampling sampling_of(const Pilot *pilot, const RenderSettings *settings, 
                       .risk = (1 - pilot->confidence) / (ARITHMETIC_COUNT - 1)};
 }
 
-// Returns the side of the squares. Where more pixels than usual can show that an RMSE is kept, there are as
-// many as show it even if some of them err.
+// Returns the side of the squares. If showing that an RMSE is kept needs more pixels than usual, there are
+// enough to show it even if some of them are wrong.
 static uint32_t cell_choose(const Pilot *pilot, const RenderSettings *settings)
 {
     static const double margin = 0.7;
@@ -69,7 +70,7 @@ static uint32_t cell_choose(const Pilot *pilot, const RenderSettings *settings)
     return cell;
 }
 
-// The sample as it comes, and when.
+// The sample as its bands arrive, with their times.
 typedef struct {
     Film film;
     size_t first_pixels, pixels;
@@ -90,13 +91,14 @@ static bool sample_take(void *context, const Film *band, double fraction_done)
     return true;
 }
 
-// The first band is left out: drivers finish their build then. If it was the only one, it is rendered again.
+// Returns the seconds per pixel. Excludes the first band, during which drivers finish their build. If a
+// sample has one band, sample_render renders it twice.
 static double pixel_seconds(const SampleFilm *sample)
 {
     return (sample->last_seconds - sample->first_seconds) / (double)(sample->pixels - sample->first_pixels);
 }
 
-// Renders what the squares leave, behind the pixels drawn from them.
+// Renders the pixels outside the squares and stores them behind those drawn from the squares.
 static bool rest_render(Renderer *renderer, Film *film, size_t drawn, const Scene *scene,
                         const RenderSettings *settings, uint32_t cell, MessageList *messages)
 {
@@ -116,7 +118,8 @@ static bool rest_render(Renderer *renderer, Film *film, size_t drawn, const Scen
     return true;
 }
 
-// Renders the sample into a film of one row. False as pilot_run; there is nothing to free then.
+// Renders the sample into a film of one row. Returns false with nothing to free if the precision does not
+// suit the device or the scene, if settings->stop ended the pilot or if the device failed.
 static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute *compute, const Scene *scene,
                           RenderSettings settings, MessageList *messages)
 {
@@ -158,7 +161,8 @@ static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute
     return whole;
 }
 
-// The fastest within the budget.
+// Returns the most precise of the precisions that keep the budget and are about as fast as the fastest of
+// these.
 static Precision fastest_choose(const Pilot *pilot)
 {
     double least = INFINITY;
@@ -183,7 +187,7 @@ static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *com
     bool is_kept = false;
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         if (i == PRECISION_DOUBLE) continue;
-        // those beyond single do more work than it, and build another kernel
+        // precisions beyond single do more work than single, and build another kernel
         if (i > PRECISION_SINGLE && is_kept) break;
         Film sample;
         MessageList unfit = {0};
@@ -229,7 +233,7 @@ void pilot_describe(Text *text, const Pilot *pilot)
     const double percent = 100 * pilot->confidence;
     text_appendf(text, "%s: ", precision_names[pilot->chosen]);
     if (pilot->chosen == PRECISION_DOUBLE) {
-        bool is_kept = false; // by another, which was no faster here
+        bool is_kept = false; // by another precision, which is not faster
         for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
             is_kept = is_kept || (i != PRECISION_DOUBLE && pilot->candidates[i].verdict.keeps);
         text_appendf(text,

@@ -16,7 +16,8 @@ static int number_compare(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-// Linear between neighbors (Hyndman, Fan: "Sample Quantiles in Statistical Packages", 1996, definition 7).
+// Returns a quantile, interpolated linearly between neighbors (Hyndman, Fan: "Sample Quantiles in Statistical
+// Packages", 1996, definition 7).
 static double sorted_quantile(const double *sorted, size_t count, double fraction)
 {
     double place = fraction * (double)(count - 1);

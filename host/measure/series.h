@@ -1,4 +1,4 @@
-// Repeated measurements of one thing, and what can be said of them without supposing a distribution.
+// Summarizes repeated measurements of one quantity without supposing a distribution.
 #pragma once
 
 #include <stddef.h>
@@ -11,10 +11,11 @@ typedef struct {
 typedef struct {
     double min, median, max;
     double quartile_range; // upper quartile - lower quartile
-    size_t count;          // 0: the others are 0, too
+    size_t count;          // if 0, the other members are 0
 } Summary;
 
 void series_add(Series *series, double value);
-Series series_sorted(const Series *series); // a copy, ascending
+Series series_sorted(const Series *series); // returns an ascending copy
 Summary series_summarize(const Series *series);
-void series_free(Series *series); // and zeroes
+// Frees the values and sets the series to zeros.
+void series_free(Series *series);
