@@ -236,10 +236,14 @@ static FlatArray array_fill(size_t kind, const FlatLayout *layout)
     memset(array.items, 0, 2 * layout->size);
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
         if (members[i].kind != kind) continue;
-        char *place = (char *)array.items + layout->size + members[i].host_offset;
+        // reals that the host keeps as floats: those of blocks
+        const bool is_narrow = !members[i].integers && layout->scalar4_count == 0;
+        char *place = (char *)array.items + layout->size + members[i].host_offset / (is_narrow ? 2 : 1);
         for (size_t k = 0; k < 4; k++) {
             if (members[i].integers)
                 ((uint32_t *)(void *)place)[k] = integer_at(i, k);
+            else if (is_narrow)
+                ((float *)(void *)place)[k] = (float)real_at(i, k);
             else
                 ((double *)(void *)place)[k] = real_at(i, k);
         }

@@ -101,16 +101,18 @@ static size_t check_block(const CompiledScene *compiled, size_t index, size_t co
 {
     const size_t width = single.lanes;
     const size_t first = ((const uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items)[index];
-    const double *rows = flat_array_at(&compiled->arrays[FLAT_TRIANGLE_BLOCKS], index);
+    const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS];
+    const bool is_double = blocks->layout.scalar4_count > 0;
+    const void *rows = flat_array_at(blocks, index);
     for (size_t lane = 0; lane < width; lane++) {
         const Triangle *triangle = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES],
                                                  first + (lane < count ? lane : 0));
-        const scalar4 vertices[] = {triangle->a, triangle->b, triangle->c};
-        for (size_t i = 0; i < 3; i++) {
-            assert_true(rows[(3 * i + 0) * width + lane] == vertices[i].x);
-            assert_true(rows[(3 * i + 1) * width + lane] == vertices[i].y);
-            assert_true(rows[(3 * i + 2) * width + lane] == vertices[i].z);
-        }
+        const double vertices[BLOCK_ROWS] = {triangle->a.x, triangle->a.y, triangle->a.z,
+                                             triangle->b.x, triangle->b.y, triangle->b.z,
+                                             triangle->c.x, triangle->c.y, triangle->c.z};
+        for (size_t row = 0; row < BLOCK_ROWS; row++)
+            assert_true(is_double ? ((const double *)rows)[row * width + lane] == vertices[row]
+                                  : ((const float *)rows)[row * width + lane] == (float)vertices[row]);
     }
     return first;
 }

@@ -234,7 +234,7 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
-    flat_wide_array_renew(compiled, FLAT_NODES, wide.node_count, width);
+    flat_wide_array_renew(compiled, FLAT_NODES, wide.node_count, width, false);
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     // a visit replaces a node by at most `width` children: a ray from far away also enters the empty slots
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
@@ -254,14 +254,14 @@ static bool is_triangle_leaf(uint32_t child_kind)
 }
 
 // Makes a block of each leaf of triangles, still without vertices.
-static void blocks_place(CompiledScene *compiled, unsigned width)
+static void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
 {
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     size_t count = 0;
     for (size_t i = 0; i < nodes->count; i++)
         for (unsigned k = 0; k < width; k++)
             count += is_triangle_leaf(flat_node_at(nodes, i).child_kind[k]);
-    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, count, width);
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, count, width, !is_double);
     flat_array_renew(compiled, FLAT_BLOCK_PLACES, (count + 3) / 4);
     uint32_t block = 0;
     for (size_t i = 0; i < nodes->count; i++) {
@@ -278,8 +278,10 @@ static void block_fill(const CompiledScene *compiled, size_t block, unsigned cou
 {
     const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS],
                     *triangles = &compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
-    const size_t width = 4 * blocks->layout.scalar4_count / BLOCK_ROWS;
-    double *rows = flat_array_at(blocks, block);
+    // floats are narrowed here: a million triangles' blocks take 130 MB as doubles
+    const bool is_double = blocks->layout.scalar4_count > 0;
+    const size_t width = 4 * (blocks->layout.scalar4_count + blocks->layout.uint4_count) / BLOCK_ROWS;
+    void *rows = flat_array_at(blocks, block);
     for (size_t lane = 0; lane < width; lane++) {
         const Triangle *triangle =
             flat_array_at(triangles, *block_place(compiled, block) + (lane < count ? lane : 0));
@@ -287,7 +289,10 @@ static void block_fill(const CompiledScene *compiled, size_t block, unsigned cou
                                              triangle->b.x, triangle->b.y, triangle->b.z,
                                              triangle->c.x, triangle->c.y, triangle->c.z};
         for (size_t row = 0; row < BLOCK_ROWS; row++)
-            rows[row * width + lane] = vertices[row];
+            if (is_double)
+                ((double *)rows)[row * width + lane] = vertices[row];
+            else
+                ((float *)rows)[row * width + lane] = (float)vertices[row];
     }
 }
 
@@ -324,7 +329,7 @@ static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
 {
     flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
-    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN);
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN, false);
     flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
     if (settings->bvh == BVH_OFF) return;
     Bounded bounded;
@@ -343,7 +348,7 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     bounded.boxes = NULL;
     stage_begin(settings->stage, "widening the BVH", NULL, 0);
     nodes_write(compiled, &bvh, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
-    if (settings->lanes > 1) blocks_place(compiled, settings->lanes);
+    if (settings->lanes > 1) blocks_place(compiled, settings->lanes, settings->precision == PRECISION_DOUBLE);
     compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
     free(bvh.nodes);
     bvh.nodes = NULL;

@@ -54,12 +54,18 @@ void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count)
     array_renew(compiled, kind, layouts[kind], count);
 }
 
-void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width)
+static size_t narrow_size(const FlatLayout *layout)
+{
+    return 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
+}
+
+void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width, bool is_narrow)
 {
     const FlatLayout widest = layouts[kind];
     const unsigned parts = BVH_WIDTH_MAX / width;
     const FlatLayout layout = {widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts};
-    array_renew(compiled, kind, layout, count);
+    const size_t size = narrow_size(&layout);
+    array_renew(compiled, kind, is_narrow ? (FlatLayout){size, 0, size / sizeof(uint4)} : layout, count);
 }
 
 void *flat_array_at(const FlatArray *array, size_t index)
@@ -94,11 +100,6 @@ void compiled_scene_free(CompiledScene *compiled)
         free(compiled->arrays[kind].items);
     free(compiled->textures);
     *compiled = (CompiledScene){0};
-}
-
-static size_t narrow_size(const FlatLayout *layout)
-{
-    return 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
 }
 
 size_t flat_array_size(const FlatArray *array, bool is_double)

@@ -66,9 +66,10 @@ static inline scalar4 scalar4_of(Vector3 v, double w)
 }
 
 // Replaces an array by one of `count` zeroed structs; nodes and blocks of triangles have `width` children or
-// triangles: a power of two, 4 to 16.
+// triangles: a power of two, 4 to 16. A narrow array has its reals as floats.
 void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count);
-void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width);
+void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width,
+                           bool is_narrow);
 void *flat_array_at(const FlatArray *array, size_t index);
 // Whether the order of an array, or all of it, follows from the BVH, and so from the kernel's lanes.
 bool is_ordered_by_bvh(size_t kind);
