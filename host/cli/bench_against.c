@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <math.h>
+#include <signal.h>
 #include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -110,12 +111,23 @@ static bool worker_spawn(Worker *worker, const AgainstOptions *options, const in
     return !error;
 }
 
+// Returns whether the user interrupted. Every process receives the signal: the worker may have ended by it
+// before this one has noticed.
+static bool is_interrupted(const Worker *worker)
+{
+    siginfo_t ended = {0};
+    if (progress_interrupted()) return true;
+    if (!feof(worker->replies) || waitid(P_PID, (id_t)worker->process, &ended, WEXITED | WNOWAIT) != 0)
+        return false;
+    return ended.si_code == CLD_EXITED ? ended.si_status == EXIT_INTERRUPTED : ended.si_status == SIGINT;
+}
+
 static bool worker_greets(Worker *worker, size_t row_count)
 {
     char line[80], expected[80];
     snprintf(expected, sizeof expected, greeting, row_count);
     if (fgets(line, sizeof line, worker->replies) && strcmp(line, expected) == 0) return true;
-    if (!progress_interrupted())
+    if (!is_interrupted(worker))
         fprintf(stderr, "glint bench: '%s' does not answer as a glint with bench --against does\n",
                 worker->program);
     return false;
@@ -159,8 +171,8 @@ static bool worker_run(Worker *worker, double *seconds, size_t row_count)
     fputc('\n', worker->requests);
     fflush(worker->requests);
     bool whole = reply_read(worker->replies, seconds, row_count);
-    if (!whole && !progress_interrupted())
-        fprintf(stderr, "glint bench: '%s' ended before its time\n", worker->program);
+    if (!whole && !is_interrupted(worker))
+        fprintf(stderr, "glint bench: '%s' exited early\n", worker->program);
     return whole;
 }
 
