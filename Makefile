@@ -273,7 +273,7 @@ lint-man:
 
 # What is free of the wording that tools/lint-words finds.
 worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
-          $(foreach room,base compile image import measure mpi opencl render scene verify view,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
+          $(foreach room,base cli compile image import measure mpi opencl render scene verify view,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
           $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/numerics/* tools/peers/* tools/peers/embree/*))
 
 lint-words:

@@ -345,7 +345,7 @@ class Accuracy(TestCase):
             (f"{GLASS} --samples 1,0", "--samples"),
             (f"{GLASS} --reference none.npy", "none.npy"),
             (f"{GLASS} --size 64x48 --reference {self.reference}.color.npy", "96x64"),
-            (f"{GLASS} --size 96x32 --reference {self.reference}.color.npy", "no multiple"),
+            (f"{GLASS} --size 96x32 --reference {self.reference}.color.npy", "not a multiple"),
             (f"{GLASS} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
             (f"{GLASS} --reference {ROOT}/docs/demo.png", r"demo\.png"),
             (f"{GLASS} {self.spheres} --reference {self.reference}.color.npy", "one scene"),

@@ -76,7 +76,7 @@ class Checkpoints(TestCase):
         self.assertTrue(0 < self.go_on("--device all", TWO) < 1)
 
     def test_counts_of_certified(self):
-        """The pixels of saved bands that were repeated in double count as in an undisturbed render."""
+        """The pixels of saved bands that were re-rendered in double count as in an undisturbed render."""
         write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # the nearer of two equal ones is in doubt
         command = f"{RENDER} --precision certified --timing=json"
         self.end_early("--precision certified --device all", TWO)
@@ -87,7 +87,7 @@ class Checkpoints(TestCase):
         self.assertGreater(whole["undecided_samples"], 0)
         for key in "repeated_samples", "undecided_samples":
             self.assertEqual(resumed[key], whole[key])
-        self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['repeated_samples']} samples repeated in double, ")
+        self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['repeated_samples']} samples re-rendered in double, ")
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_devices(self):

@@ -98,7 +98,7 @@ static void test_several_devices(void **state)
     if (access(pocl, R_OK) != 0) skip();
     char one[] = "/tmp/glint-test-XXXXXX.npy", other[] = "/tmp/glint-test-XXXXXX.npy";
     assert_true(close(mkstemps(one, 4)) == 0 && close(mkstemps(other, 4)) == 0);
-    static const char dropped[] = "glint: warning: the other devices go on without one: ";
+    static const char dropped[] = "glint: warning: the other devices continue without it: ";
     const struct {
         const char *call;
         size_t index;

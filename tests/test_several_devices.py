@@ -116,7 +116,7 @@ class SeveralDevices(TestCase):
                 if process.returncode == 0:
                     self.assertSameBytes("one.npy", "all.npy")
                     images += 1
-                    dropped += "glint: warning: the other devices go on without one: " in process.stderr
+                    dropped += "glint: warning: the other devices continue without it: " in process.stderr
                 else:
                     self.assertIn("glint: ", process.stderr)
                     self.assertFalse(os.path.exists("all.npy"))

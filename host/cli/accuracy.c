@@ -1,4 +1,4 @@
-// glint accuracy: speed against error, per precision, lanes, BVH choice and samples.
+// glint accuracy measures speed against error by precision, lanes, BVH choice and samples.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
@@ -58,9 +58,9 @@ typedef struct {
     AccuracyOptions options;
     OpenDevice open;
     VariantSet set;
-    Film reference; // of the current scene; of the only one if it is from a file
+    Film reference; // that of the current scene, or of the only scene if it is read from a file
     AccuracyScene *scenes;
-    OutputFile page; // opened before measuring, so that it fails early
+    OutputFile page; // opened before measuring, so that a failure shows early
     MessageList messages;
 } Accuracy;
 
@@ -109,14 +109,14 @@ static int options_read(AccuracyOptions *options, int argument_count, char **arg
     }
     if (optind == argument_count) return option_usage_fault("accuracy", "no scene given");
     if (options->page_path && strcmp(options->page_path, "-") == 0)
-        return option_usage_fault("accuracy", "--html takes a file's name");
+        return option_usage_fault("accuracy", "--html needs the name of a file");
     if (options->reference_path && optind + 1 != argument_count)
-        return option_usage_fault("accuracy", "a reference is for one scene");
+        return option_usage_fault("accuracy", "--reference takes one scene, but several are given");
     if (!report_options_check(&options->report, &accuracy_table)) return EXIT_USER;
     return OPTIONS_READ;
 }
 
-// The image's colors, with each square of factor x factor pixels averaged into one.
+// Returns the image's colors, with each square of factor x factor pixels averaged into one pixel.
 static double *colors_shrunk(const Image *image, uint32_t factor)
 {
     const size_t width = image->width / factor, height = image->height / factor;
@@ -132,8 +132,8 @@ static double *colors_shrunk(const Image *image, uint32_t factor)
     return colors;
 }
 
-// Reads --reference, which may be a whole number of times as wide and as high as the images. On failure adds
-// a message and returns false.
+// Reads --reference, whose width and height may be a whole multiple of the images'. On failure adds a message
+// and returns false.
 static bool reference_read(Accuracy *accuracy)
 {
     const char *path = accuracy->options.reference_path;
@@ -149,8 +149,8 @@ static bool reference_read(Accuracy *accuracy)
                       image.height / factor == settings->height && image.height % factor == 0;
     if (!fault && !fits)
         message_error(&accuracy->messages,
-                      "the reference '%s' has %ux%u pixels, which is no multiple of the images' %ux%u", path,
-                      image.width, image.height, settings->width, settings->height);
+                      "the reference '%s' has %ux%u pixels, which is not a multiple of the images' %ux%u",
+                      path, image.width, image.height, settings->width, settings->height);
     if (!fault && fits)
         accuracy->reference = (Film){.width = settings->width,
                                      .height = settings->height,
@@ -161,7 +161,8 @@ static bool reference_read(Accuracy *accuracy)
     return !fault && fits;
 }
 
-// Renders the scene in double with the most samples of any variant, unperturbed. EXIT_DONE, or why not.
+// Renders the scene in double, unperturbed, with the most samples of any variant. Returns EXIT_DONE or the
+// exit status of the failure.
 static int reference_render(Accuracy *accuracy, AccuracyScene *scene, const Variant *variants)
 {
     Compute *compute = &accuracy->open.compute;
@@ -269,8 +270,8 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, const VariantSe
     return status;
 }
 
-// Measures and compares the variants of one scene, from `first` on. So a slow scene takes no runs from
-// others.
+// Measures and compares the variants of one scene, which begin at `first`. Scenes are measured one at a time,
+// so that a slow scene takes no runs from others.
 static int scene_run(Accuracy *accuracy, size_t scene_index, size_t first, Progress *progress)
 {
     VariantSet part = variant_set_part(&accuracy->set, first, accuracy->scenes[scene_index].variant_count);
@@ -310,7 +311,7 @@ static bool folder_make(Accuracy *accuracy)
 {
     const char *folder = accuracy->options.folder;
     if (!folder || mkdir(folder, 0777) == 0 || errno == EEXIST) return true;
-    return message_error(&accuracy->messages, "cannot make the folder '%s': %s", folder, strerror(errno));
+    return message_error(&accuracy->messages, "cannot create the folder '%s': %s", folder, strerror(errno));
 }
 
 static bool has_reference(Accuracy *accuracy)
@@ -321,7 +322,7 @@ static bool has_reference(Accuracy *accuracy)
     if (options->reference_path && !is_certified) return true;
     if (reference_open(&accuracy->open.compute, &accuracy->open.devices, selector)) return true;
     if (selector) return false;
-    if (options->reference_path) return true; // the rows at certified are unavailable
+    if (options->reference_path) return true; // only the rows at certified are unavailable
     return message_error(
         &accuracy->messages,
         "neither the device \"%s\" nor another one has 64-bit floating point for a reference: "

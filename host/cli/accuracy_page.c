@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Differences are shown in steps of half a power of ten, the same in every report, so that images can be
-// compared with one another.
+// Differences are shown in steps of half a power of ten, the same in every report, so that reports can be
+// compared.
 enum { DECADES = 7, STEPS = 2 * DECADES, STEP_NOT_FINITE, STEP_COUNT };
 
 typedef uint8_t Rgb8[3];
@@ -22,8 +22,8 @@ static uint8_t difference_step(float difference)
     return (uint8_t)fmax(0, fmin(ceil(2 * (log10((double)difference) + DECADES)), STEPS));
 }
 
-// Black, then the heatmap from a color that differs visibly from black; red, which the heatmap lacks, for not
-// finite.
+// Black, then the heatmap from a color that differs visibly from black. Red, which the heatmap lacks, means
+// not finite.
 static void step_colors(Rgb8 colors[STEP_COUNT])
 {
     for (int step = 0; step <= STEPS; step++) {
@@ -87,7 +87,7 @@ static void image_json(Json *json, const AccuracyScene *scene, float *values)
     json_end(json);
 }
 
-// Whether the image is that of the reference or of an earlier variant.
+// Returns whether the image equals the reference's or that of an earlier variant.
 static bool is_repeated(const AccuracyScene *scene, size_t variant)
 {
     const float *values = scene->variants[variant].image;

@@ -59,7 +59,7 @@ void accuracy_variant_name(Text *text, const AccuracyScene *scene, const Accurac
     bool lanes = false, bvh = false, samples = false;
     for (size_t i = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *other = &scene->variants[i];
-        // precisions may differ in the lanes that are the device's own
+        // the device's default lanes may differ between precisions
         lanes |=
             strcmp(other->row->key.precision, key->precision) == 0 && other->row->key.lanes != key->lanes;
         bvh |= strcmp(other->row->key.bvh, key->bvh) != 0;
@@ -72,7 +72,8 @@ void accuracy_variant_name(Text *text, const AccuracyScene *scene, const Accurac
         text_appendf(text, " with %u %s", variant->samples, variant->samples == 1 ? "sample" : "samples");
 }
 
-// A reason why it is crossed out: `index` counts from 0; NULL after the last.
+// Returns the reason with this index, counted from 0, for which the variant is crossed out, or NULL after the
+// last.
 static const char *crossed_words(const AccuracyVariant *variant, size_t index)
 {
     static const struct {
@@ -94,7 +95,8 @@ static double frame_ms(const AccuracyVariant *variant)
     return 1e3 * series_summarize(&variant->row->times.frame).median;
 }
 
-// What is certain of the picked one's time: which others tie with it, or how much longer the next one takes.
+// Appends what is certain about the picked variant's time: which others tie with it, or how much longer the
+// next one takes.
 static void pick_certainty(Text *text, const AccuracyScene *scene, const AccuracyRecommendation *picked)
 {
     Text ties = {0}, unknown = {0};
@@ -122,7 +124,8 @@ static void pick_certainty(Text *text, const AccuracyScene *scene, const Accurac
     text_free(&unknown);
 }
 
-// "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06; double takes 1.8 to 2.1 times as long".
+// Appends a sentence such as "for an error of at most 0.0001: single, 20.6 ms, 3.1e-06; double takes 1.8 to
+// 2.1 times as long".
 static void pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
 {
     const AccuracyRecommendation *picked = &scene->recommendations[pick];

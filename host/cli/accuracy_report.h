@@ -1,4 +1,4 @@
-// What glint accuracy reports: text or JSON.
+// Prints the report of glint accuracy as text or JSON.
 #pragma once
 
 #include "host/base/text.h"
@@ -8,20 +8,22 @@
 
 typedef struct {
     const Device *device;
-    uint32_t perturb_seed, perturb_scale; // 0: no injected errors
+    uint32_t perturb_seed, perturb_scale; // a seed of 0 means no injected errors
     const AccuracyScene *scenes;
     size_t scene_count;
-    const char *folder; // where the arrays were saved, or NULL
+    const char *folder; // the folder of the saved arrays, or NULL
 } AccuracyReport;
 
 void accuracy_print_text(const AccuracyReport *report, FILE *stream);
-extern const ResultTable accuracy_table;           // of accuracy_json
-Json *accuracy_json(const AccuracyReport *report); // docs/glint-json.5; to be printed
+// Describes the members of accuracy_json.
+extern const ResultTable accuracy_table;
+// Returns the report as docs/glint-json.5 describes it. The caller prints it.
+Json *accuracy_json(const AccuracyReport *report);
 
-// Path prefix of the saved arrays of a scene's variant, or of its reference if `variant` is NULL:
-// FOLDER/0-scene-single-16-auto-1, for example.
+// Appends the path prefix of the saved arrays of a scene's variant, or of its reference if `variant` is NULL,
+// such as FOLDER/0-scene-single-16-auto-1.
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
                            const AccuracyVariant *variant);
-// The variant's precision, and those of lanes, BVH choice and samples that distinguish it from others of its
-// scene.
+// Appends the variant's precision, and its lanes, BVH choice and samples where they distinguish it from other
+// variants of its scene.
 void accuracy_variant_name(Text *text, const AccuracyScene *scene, const AccuracyVariant *variant);

@@ -1,4 +1,4 @@
-// glint bench: interleaved timings of scenes in every requested configuration.
+// glint bench times scenes in every requested configuration, interleaved.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/bench_against.h"
@@ -38,7 +38,7 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint bench SCENE... [OPTIONS]\n\n"
     "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 same or "
-    "faster,\n3 slower, 4 too noisy to say.\n\n"
+    "faster,\n3 slower, 4 too noisy to decide.\n\n"
     "      --against GLINT   compare with another build, run alternately; default of --seconds: 30 per row\n"
     "      --compare FILE    compare with an earlier report (--json); claims less than --against\n"
     "      --tolerance R     ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 "
@@ -51,7 +51,7 @@ static const char help_text[] =
 
 typedef struct {
     VariantOptions variants;
-    double tolerance; // 0: not given
+    double tolerance; // 0 if not given
     const char *baseline, *against;
     ReportOptions report;
     bool launches, is_worker;
@@ -93,7 +93,7 @@ static bool option_take(BenchOptions *options, int option, const char *value)
 
 static const double against_tolerance = 1.02, baseline_tolerance = 1.1, against_seconds = 30;
 
-// Of every row with the baseline's. Caller frees.
+// Compares every row with the baseline's. The caller frees the result.
 static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
 {
     const VariantSet *set = &bench->set;
@@ -197,7 +197,7 @@ static int against_run(Bench *bench, int argument_count, char **arguments)
     return status;
 }
 
-// With the scenes read.
+// Runs the command once the scenes are read.
 static int scenes_bench(Bench *bench, int argument_count, char **arguments)
 {
     const BenchOptions *options = &bench->options;
@@ -230,10 +230,11 @@ int command_bench(int argument_count, char **arguments)
     }
     if (optind == argument_count) return option_usage_fault("bench", "no scene given");
     if (options->against && options->baseline)
-        return option_usage_fault("bench", "--against and --compare exclude each other");
+        return option_usage_fault("bench", "--against cannot be combined with --compare");
     for (int i = optind; options->against && i < argument_count; i++)
         if (strcmp(arguments[i], "-") == 0)
-            return option_usage_fault("bench", "--against reads each scene again and again: not from '-'");
+            return option_usage_fault("bench",
+                                      "--against reads each scene several times, so it cannot be '-'");
     if (!report_options_check(&bench.options.report, &bench_table)) return EXIT_USER;
 
     int status = EXIT_USER;

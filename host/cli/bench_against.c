@@ -19,8 +19,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-// A worker first prints this line with its number of rows; then, for each line it reads, a line with the
-// seconds of a frame of every row, or 0 of one that the device cannot do.
+// A worker first prints this line with its number of rows. For each line that it reads, it then prints a line
+// with the seconds of a frame of every row, or 0 for a row that the device cannot render.
 static const char greeting[] = "glint bench worker 1: %zu rows\n";
 
 int bench_work(VariantSet *set, Compute *compute)
@@ -50,16 +50,16 @@ typedef struct {
 typedef struct {
     const AgainstOptions *options;
     VariantSet *set;
-    const char *programs[2]; // this one, the other
-    Series *ratios;          // of each row: logarithms, one for each pair
-    Series *frames[2];       // of each row: seconds of all runs, this program's and the other's
+    const char *programs[2]; // this program and the other
+    Series *ratios;          // per row, the logarithms of the ratios, one per pair
+    Series *frames[2];       // per row, the seconds of all runs of this program and of the other
     RowComparison *comparisons;
 } Against;
 
 static const char not_available[] = "not available on this device";
 
-// Ends the worker. Returns its exit status; where that is not 0, its messages are printed, unless the user
-// interrupted, which every process received.
+// Ends the worker. Returns its exit status. If that is not 0, prints the worker's messages, unless the user
+// interrupted, since every process received the interrupt.
 static int worker_close(Worker *worker)
 {
     if (worker->requests) fclose(worker->requests);
@@ -85,7 +85,7 @@ static int worker_close(Worker *worker)
 
 static bool worker_spawn(Worker *worker, const AgainstOptions *options, const int *to, const int *from)
 {
-    // --worker stands first, since an argument "--" ends the options
+    // --worker comes first, since an argument "--" ends the options
     char **arguments = memory_allocate_zeroed((size_t)options->argument_count + 3, sizeof *arguments);
     char bench[] = "bench", work[] = "--worker";
     arguments[0] = memory_copy_text(worker->program);
@@ -176,16 +176,17 @@ static bool worker_run(Worker *worker, double *seconds, size_t row_count)
     return whole;
 }
 
-// Whether the other program comes first at the n-th turn: the Thue-Morse sequence, which cancels drifts.
+// Returns whether the other program goes first at the n-th turn. The order is the Thue-Morse sequence, which
+// cancels drifts.
 static bool other_is_first(size_t n)
 {
     return __builtin_popcountll(n) % 2 == 1;
 }
 
 enum { PAIR_ROUNDS_MIN = 5 };
-static const double pair_seconds = 0.25; // of each row
+static const double pair_seconds = 0.25; // the time per row
 
-// Alternates rounds of the two warm workers; adds each row's ratio.
+// Alternates rounds of the two warm workers and adds each row's ratio.
 static bool pair_measure(Against *against, Worker *workers, size_t pair)
 {
     const size_t row_count = against->set->count;
@@ -216,7 +217,7 @@ static bool pair_measure(Against *against, Worker *workers, size_t pair)
     return whole;
 }
 
-// Two fresh processes. Returns the exit status.
+// Measures with a new pair of processes. Returns the exit status.
 static int pair_run(Against *against, size_t pair)
 {
     Worker workers[2] = {{0}};
@@ -249,7 +250,7 @@ static bool rows_judge(Against *against, size_t look)
     return decided;
 }
 
-// Adds pairs until every row is decided or the time is over, which is a look, too.
+// Adds pairs until every row is decided or the time is over. The end of the time is also a look.
 static int pairs_run(Against *against, Progress *progress)
 {
     const size_t row_count = against->set->count;

@@ -1,4 +1,4 @@
-// glint bench --against: two builds, measured interleaved by pairs of processes.
+// glint bench --against compares two builds, measured interleaved by pairs of processes.
 #pragma once
 
 #include "host/cli/format.h"
@@ -9,14 +9,14 @@ typedef struct {
     const char *other; // the program to compare with
     double tolerance, seconds;
     ReportOptions report;
-    int argument_count; // of glint bench, for the workers
+    int argument_count; // the arguments of glint bench, for the workers
     char **arguments;
 } AgainstOptions;
 
-// Compares each variant's frame time with the other program's, and prints the report. Returns the exit
-// status. `device` is what both will choose.
+// Compares each variant's frame time with the other program's, and prints the report. `device` must be the
+// one that both programs choose. Returns the exit status.
 int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device);
 
-// What a worker does: for each line of standard input runs every variant once and prints the seconds of its
+// Runs a worker: for each line of standard input, runs every variant once and prints the seconds of its
 // frames. Returns the exit status.
 int bench_work(VariantSet *set, Compute *compute);

@@ -19,7 +19,7 @@ static void ratio_print(const char *of_what, const Comparison *result, FILE *str
     if (isfinite(result->high)) fprintf(stream, " (%.3f to %.3f)", result->low, result->high);
     switch (result->verdict) {
     case VERDICT_UNDECIDED:
-        fputs(": too noisy to say\n", stream);
+        fputs(": too noisy to decide\n", stream);
         break;
     case VERDICT_SAME:
         fprintf(stream, ": same within %.1f %%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
@@ -145,7 +145,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     if (report->lists_launches && report->reports[i]) launches_print(stream, report->reports[i]);
 }
 
-// Reasons for missing figures, each once.
+// Prints the reasons for missing figures, each once.
 static void reasons_print(const BenchReport *report, FILE *stream)
 {
     const char *printed[2] = {NULL};

@@ -1,4 +1,4 @@
-// The report of glint bench: a table, or JSON, of which other formats are made.
+// Composes the report of glint bench as a table, or as JSON, from which other formats are made.
 #pragma once
 
 #include "host/cli/format.h"
@@ -8,36 +8,36 @@
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
-// A row's comparison, or why there is none.
+// The comparison of a row, or the reason why there is none.
 typedef struct {
-    Comparison frame;     // of frame times
-    Comparison processor; // of the process's processor times
-    bool has_processor;   // with a CPU device, of two reports
-    Verdict verdict;      // of both
-    const char *why_not;  // NULL: there are comparisons
+    Comparison frame;     // compares frame times
+    Comparison processor; // compares the processes' processor times
+    bool has_processor;   // true for two reports with a CPU device
+    Verdict verdict;      // follows from both
+    const char *why_not;  // NULL if there are comparisons
 } RowComparison;
 
 typedef struct {
     const Device *device;
     const BenchRow *rows;
-    const RenderReport *const *reports; // of each row's last run; NULL where it was not measured
+    const RenderReport *const *reports; // those of each row's last run; NULL for rows that were not measured
     size_t count;
     bool lists_launches;
     const Calibration *calibration;
-    const RowComparison *comparisons; // of each row with the baseline; or NULL
+    const RowComparison *comparisons; // of the rows with the baseline, or NULL
 } BenchReport;
 
 void bench_print_text(const BenchReport *report, FILE *stream);
 Json *bench_json(const BenchReport *report); // the caller closes it
-extern const ResultTable bench_table;        // of this and of --against
+extern const ResultTable bench_table;        // describes this report and that of --against
 
-// Parts of a report, shared with glint bench --against.
+// The functions below print parts of a report and are shared with glint bench --against.
 void report_start_json(Json *json); // schema, version, date, host and build
 void key_json(Json *json, const BenchKey *key);
 void samples_json(Json *json, const char *key, const Series *seconds); // in milliseconds
 void comparison_json(Json *json, const RowComparison *comparison);
 void comparison_print(const RowComparison *comparison, FILE *stream);
 
-// The exit status that the comparisons give, with a message unless nothing is slower; `other` is what was
-// compared with.
+// Returns the exit status that follows from the comparisons, with a message unless nothing is slower. `other`
+// names what the rows were compared with.
 int comparisons_status(const RowComparison *comparisons, size_t count, const char *other);

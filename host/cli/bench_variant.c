@@ -12,7 +12,8 @@ static bool band_skip(void *context, const Film *band, double fraction_done)
     return true;
 }
 
-// From the start of the build to the end of the first launch: drivers may finish the build there.
+// Returns the seconds from the start of the build to the end of the first launch, in which drivers may finish
+// the build.
 static double build_seconds_with_launch(const RenderReport *report)
 {
     double seconds = report->build_seconds;
@@ -23,8 +24,8 @@ static double build_seconds_with_launch(const RenderReport *report)
     return seconds;
 }
 
-// Renders a corner of the image with a newly built program; *from_cache receives whether the program came
-// from the cache. False if the settings do not fit the device.
+// Renders a corner of the image with a newly built program. Sets *from_cache if the program came from the
+// cache. Returns false if the settings do not fit the device.
 static bool build_try(Compute *compute, const Variant *variant, bool no_cache, double *seconds,
                       bool *from_cache, MessageList *messages)
 {
@@ -49,7 +50,7 @@ static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *r
     for (int attempt = 0; attempt < 2 && !from_cache; attempt++)
         if (!build_try(compute, variant, false, &row->build_cached.value, &from_cache, messages))
             return false;
-    if (!from_cache) row->build_cached.why_not = "there is no cache, or the driver gives no binary for it";
+    if (!from_cache) row->build_cached.why_not = "there is no cache, or the driver provides no binary for it";
     return true;
 }
 
@@ -86,7 +87,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
 
 enum { PAGE_BYTES = 4096 };
 
-// Reads one value per memory page: a driver may leave a mapped page on the device until then.
+// Reads one value per memory page, since a driver may leave a mapped page on the device until it is read.
 static bool band_read(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;

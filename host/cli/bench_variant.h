@@ -1,4 +1,4 @@
-// One configuration of one scene, opened once and run repeatedly.
+// Opens one configuration of one scene and runs it repeatedly.
 #pragma once
 
 #include "host/measure/bench.h"
@@ -7,12 +7,14 @@
 typedef struct {
     const Scene *scene;
     RenderSettings settings;
-    Renderer *renderer; // NULL: not open, or not available on the device
+    Renderer *renderer; // NULL if it is not open or not available on the device
 } Variant;
 
-// Prepares the runs: counts the rays and, if asked, times the builds. What the device cannot do becomes the
-// row's failure.
+// Prepares the runs: counts the rays and, if requested, times the builds. If the device does not support the
+// variant, sets the row's failure.
 void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing_builds);
-// One run; `times` NULL: warm-up. False if the user interrupted.
+// Runs the variant once and adds its times to `times`, which is NULL for a warm-up. Returns false if the user
+// interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
-void variant_close(Variant *variant); // and zeroes; accepts a zeroed one
+// Closes the variant and sets it to zeros. Accepts a variant of zeros.
+void variant_close(Variant *variant);

@@ -1,4 +1,4 @@
-// glint cache: the kernel cache, listed and checked, or emptied.
+// glint cache lists and checks the kernel cache, or empties it.
 #include "host/opencl/cache.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"

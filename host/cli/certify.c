@@ -1,4 +1,4 @@
-// glint certify: a scene's image at each precision against the reference, on a sample of its pixels.
+// glint certify compares a scene's image at each precision with the reference, on a sample of its pixels.
 #include "host/verify/certify.h"
 #include "host/api/version.h"
 #include "host/base/clock.h"
@@ -68,9 +68,9 @@ static const ResultTable certify_table = {
 typedef struct {
     CommonOptions common;
     const char *scene;
-    uint32_t width, height; // 0: not given
+    uint32_t width, height; // 0 if not given
     uint32_t pixels, bounce_count;
-    unsigned precisions; // a set; empty: not given
+    unsigned precisions; // a set, empty if not given
     ReportOptions report;
 } CertifyOptions;
 
@@ -113,9 +113,9 @@ typedef struct {
     double reference_seconds;
     struct {
         bool measured;
-        char *failure; // why it is not measured where it was to be
+        char *failure; // why a requested precision is not measured, or NULL
         CertifyErrors errors;
-        CertifyDoubts doubts; // at `certified`
+        CertifyDoubts doubts; // only at `certified`
     } rows[PRECISION_COUNT];
 } Certification;
 
@@ -238,8 +238,9 @@ static Json *certify_json(const Certification *certification)
     return json;
 }
 
-// Renders at one precision and compares. EXIT_DONE, or why not. What does not fit the device or scene is the
-// user's mistake, with a message, if the user named the precision; else its row says so.
+// Renders at one precision and compares. Returns EXIT_DONE or the exit status of the failure. If the
+// precision does not fit the device or the scene and the user named it, that is the user's mistake, with a
+// message. Otherwise its row has the reason.
 static int precision_compare(Certification *certification, RenderSettings settings, Precision precision)
 {
     settings.precision = precision;
@@ -271,7 +272,7 @@ static int precision_compare(Certification *certification, RenderSettings settin
                                     : EXIT_MACHINE;
 }
 
-// EXIT_CHECK, with a message, where `certified` is wrong in what it says it decides.
+// Returns EXIT_CHECK with a message if `certified` is wrong at a pixel that it decided.
 static int decided_check(const CertifyErrors *certified)
 {
     if (certified->wrong_decided == 0) return EXIT_DONE;
@@ -328,7 +329,7 @@ int command_certify(int argument_count, char **arguments)
     status = EXIT_USER;
     if (scene_open(&scene, options.scene, &options.common) && device_open(&open, &options.common)) {
         Progress progress;
-        progress_open(&progress, true); // for the interrupts
+        progress_open(&progress, true); // so that signals only set the flag
         status = device_close(&open, scene_certify(&options, &scene, &open));
         progress_close(&progress);
     }

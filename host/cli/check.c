@@ -1,4 +1,4 @@
-// glint check: reads a scene and reports its contents; needs no device.
+// glint check reads a scene and reports its contents. It needs no device.
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/json.h"
@@ -51,7 +51,7 @@ static SceneFacts facts_of(const Scene *scene)
     return facts;
 }
 
-// SPOT_LIGHTS -> "spot lights"
+// Returns a feature's name as text: SPOT_LIGHTS becomes "spot lights".
 static void feature_name_write(char *target, size_t size, const char *name)
 {
     size_t i = 0;
@@ -163,7 +163,7 @@ static bool images_are_there(const Scene *scene, MessageList *messages)
     return report_close(&report);
 }
 
-// Whether the scene fits the precision that glint render takes by default.
+// Returns whether the scene fits the default precision of glint render.
 static bool scene_renders(const Scene *scene, MessageList *messages)
 {
     const CompileSettings settings = {.width = 1,
@@ -198,7 +198,7 @@ int command_check(int argument_count, char **arguments)
 {
     SceneOptions scene_options = {0};
     bool as_json = false;
-    uint32_t object = UINT32_MAX; // UINT32_MAX: not asked for
+    uint32_t object = UINT32_MAX; // UINT32_MAX if not given
     int option;
     while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
         switch (option) {
@@ -218,7 +218,8 @@ int command_check(int argument_count, char **arguments)
         }
     }
     if (!option_only_scene("check", argument_count, arguments)) return EXIT_USER;
-    if (as_json && object != UINT32_MAX) return option_usage_fault("check", "--object excludes --json");
+    if (as_json && object != UINT32_MAX)
+        return option_usage_fault("check", "--object cannot be combined with --json");
     const char *path = arguments[optind];
     Scene scene = {0};
     MessageList messages = {0};

@@ -14,7 +14,7 @@ static unsigned long long kernels_hash(void)
     return hash;
 }
 
-// Each model once.
+// Appends each device's model once.
 static void model_append(Text *key, const Rank *rank, uint32_t lanes)
 {
     char *model = text_format("device: %s, %s, %u lanes\n", rank->device, rank->driver, lanes);
@@ -34,7 +34,7 @@ static void devices_append(Text *key, Renderer *const *renderers, size_t count, 
         model_append(key, &own, device_lanes(reference, true));
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
-        if (ranks->items[i].lanes[PASS_ALL] > 0) // else it cannot render
+        if (ranks->items[i].lanes[PASS_ALL] > 0) // otherwise it cannot render
             model_append(key, &ranks->items[i], ranks->items[i].lanes[PASS_ALL]);
 }
 

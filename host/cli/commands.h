@@ -1,4 +1,4 @@
-// The subcommands: each gets its own name as the first argument, and returns the exit status.
+// The subcommands. Each receives its name as the first argument and returns the exit status.
 #pragma once
 
 int command_render(int argument_count, char **arguments);

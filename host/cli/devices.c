@@ -1,5 +1,5 @@
-// glint devices: every device of every platform, with the properties that matter for tracing and the
-// passports of its arithmetic.
+// glint devices lists every device of every platform with the properties that matter for tracing, and the
+// passports of their arithmetic.
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
@@ -158,7 +158,8 @@ static void devices_print_table(const DeviceList *list, const Device *chosen)
         printf("%u of %u platforms: no device\n", list->empty_platform_count, list->platform_count);
 }
 
-// Measures the passports of the usable devices, or loads those in the cache. False: a device failed.
+// Measures the passports of the usable devices, or loads them from the cache. Returns false if a device
+// failed.
 static bool passports_find(const DeviceList *list, bool probes)
 {
     bool is_done = true;

@@ -1,4 +1,4 @@
-// glint diff: compares two images.
+// glint diff compares two images.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
@@ -17,7 +17,7 @@
 typedef enum { LIMIT_RMSE, LIMIT_FLIP, LIMIT_OFF, LIMIT_ULP, LIMIT_COUNT } LimitType;
 
 static const struct {
-    const char *name, *quantity, *needed; // the option is --max-NAME; NULL: no kind of values is needed
+    const char *name, *quantity, *needed; // the option is --max-NAME; `needed` is NULL if any values suit
 } limit_types[LIMIT_COUNT] = {
     [LIMIT_RMSE] = {"rmse", "RMSE", NULL},
     [LIMIT_FLIP] = {"flip", "mean FLIP", "colors"},
@@ -64,7 +64,7 @@ typedef struct {
     ImageMetrics metrics;
 } Comparison;
 
-// Of the worst pixel.
+// Returns a channel's value at the worst pixel.
 static double worst_value(const Comparison *comparison, const Image *image, uint32_t channel)
 {
     const ImageMetrics *metrics = &comparison->metrics;
@@ -80,7 +80,7 @@ static void worst_json(Json *json, const char *key, const Comparison *comparison
     json_end(json);
 }
 
-// Returns what the limit bounds; requires limit_applies.
+// Returns the figure that the limit bounds. limit_applies must be true.
 static double limited_value(const ImageMetrics *metrics, LimitType type)
 {
     switch (type) {
@@ -100,7 +100,7 @@ static bool limit_applies(const ImageMetrics *metrics, LimitType type)
     return type == LIMIT_RMSE || (type == LIMIT_ULP ? metrics->has_ulp : metrics->has_color);
 }
 
-// The figures leave out values that are finite in one image alone, so these exceed every limit.
+// The figures exclude values that are finite in only one of the images, so such values exceed every limit.
 static bool limit_is_met(const DiffOptions *options, const ImageMetrics *metrics, LimitType type)
 {
     return metrics->unmatched_count == 0 && limited_value(metrics, type) <= options->limits[type];
@@ -224,7 +224,7 @@ static Json *diff_json(const DiffOptions *options, const Comparison *comparison)
     return json;
 }
 
-// With the digits that distinguish any two values of the file.
+// Prints the worst pixel with the digits that distinguish any two values of the file.
 static void worst_print(const Comparison *comparison, const Image *image)
 {
     for (uint32_t i = 0; i < image->channels; i++)
@@ -287,7 +287,7 @@ static bool heatmap_make(const DiffOptions *options, const Comparison *compariso
     return written;
 }
 
-// --layer is that of EXR files; the other file may be a NPY.
+// Reads an image. --layer applies to EXR files; the other file may be an NPY.
 static bool side_read(Image *image, const DiffOptions *options, const char *path, MessageList *messages)
 {
     const bool has_layers = image_format_of(path) == IMAGE_EXR;

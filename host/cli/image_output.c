@@ -26,24 +26,24 @@ struct ImageOutput {
     const RenderSettings *settings;
     Renderer *const *renderers;
     size_t renderer_count;
-    const Ranks *ranks; // or NULL
+    const Ranks *ranks; // may be NULL
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted[LAYER_COUNT]; // a band's values in other types
     Scratch positions, alpha;
-    double bytes; // of all files, before compression
+    double bytes; // the size of all files before compression
 
-    // A band is written by a thread of its own while the next is rendered; until it has ended, all from here
-    // on is that thread's, and so are the writers and messages.
+    // A separate thread writes a band while the next is rendered. Until that thread has ended, all members
+    // from here on belong to it, and so do the writers and messages.
     pthread_t thread;
     bool writing, failed;
     MessageList *messages;
     Film band;
-    Scratch layers[LAYER_COUNT]; // that it points to
+    Scratch layers[LAYER_COUNT]; // the memory of the band's layers
     double seconds;
 
-    RepeatCounts repeats; // of all bands so far
-    // All bands, where their counts are noted before their pixels.
+    RepeatCounts repeats; // the sum over all bands so far
+    // All bands, if the file records their counts before their pixels.
     struct {
         Film *items;
         size_t count, capacity;
@@ -97,7 +97,8 @@ static void notes_add(Notes *notes, const char *key, const char *value)
     text_append(&notes->text, value, strlen(value) + 1);
 }
 
-// Whether the devices may round differently: neither strict nor all of one make.
+// Returns whether the devices may round differently: the precision is not strict and the devices are not all
+// of one make.
 static bool is_mixed(const ImageOutput *output)
 {
     const Device *first = renderer_report(output->renderers[0])->device;
@@ -120,7 +121,7 @@ static const char certified_key[] = "Certified";
 
 static void certified_describe(Text *text, const ImageOutput *output)
 {
-    text_appendf(text, "%llu sample%s repeated in double, %llu undecided",
+    text_appendf(text, "%llu sample%s re-rendered in double, %llu undecided",
                  (unsigned long long)output->repeats.repeated, text_plural(output->repeats.repeated),
                  (unsigned long long)output->repeats.undecided);
 }
@@ -137,13 +138,13 @@ static bool holds_floats(const char *path)
     return format == IMAGE_EXR || format == IMAGE_NPY;
 }
 
-// At `certified` EXR's notes, which stand before its pixels, report all of them.
+// At `certified`, EXR's notes, which precede its pixels, report all of them.
 static bool keeps_bands(const ImageOutput *output)
 {
     return output->settings->precision == PRECISION_CERTIFIED && is_exr(output);
 }
 
-// The settings that made the image: enough to make it again.
+// Adds notes with the settings that made the image, which suffice to re-render it.
 static void notes_write(Notes *notes, const ImageOutput *output)
 {
     const RenderSettings *settings = output->settings;
@@ -151,7 +152,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     Text value = {0};
 #define NOTE(key, ...)                                                                                       \
     (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
-// of each device
+// Adds the note with the devices' values.
 #define NOTE_EACH(key, ...)                                                                                  \
     do {                                                                                                     \
         text_free(&value);                                                                                   \
@@ -213,7 +214,7 @@ static ImageHeader layer_header(const Film *film, Layer layer)
     };
 }
 
-// image.png -> image.NAME.npy
+// Returns the name of an AOV's file: image.png becomes image.NAME.npy.
 static char *aov_path(const ImageOutputOptions *options, const char *name)
 {
     const char *dot = strrchr(options->path, '.');
@@ -252,7 +253,7 @@ static bool has_alpha(const ImageOutput *output)
     return is_exr(output) && (output->options->aovs & (AOV_T | AOV_OBJECT));
 }
 
-// Appends the names of a layer's channels: depth.Z, X, Y and Z of a vector, a number for each light.
+// Appends the names of a layer's channels: depth.Z; X, Y and Z for a vector; a number for each light.
 static void channel_names_append(Text *names, const Film *film, Layer layer)
 {
     const char *name = layer_names[layer];
@@ -335,7 +336,7 @@ static void *scratch_reserve(Scratch *scratch, size_t size)
     return scratch->items;
 }
 
-// Positions come relative to the eye; the file has them in the world, in double so that no bit is lost.
+// Converts positions from relative to the eye to the world, in double so that no bit is lost.
 static const double *positions_in_world(ImageOutput *output, const Film *band)
 {
     size_t count = 3 * film_pixel_count(band);
@@ -406,7 +407,7 @@ static void *band_thread(void *argument)
     return NULL;
 }
 
-// False: a band could not be written.
+// Waits for the thread. Returns false if a band could not be written.
 static bool band_written(ImageOutput *output)
 {
     if (output->writing) pthread_join(output->thread, NULL);
@@ -414,7 +415,7 @@ static bool band_written(ImageOutput *output)
     return !output->failed;
 }
 
-// The renderer's own memory is for its next band.
+// Copies the band, because the renderer reuses its memory for the next band.
 static void band_keep(ImageOutput *output, const Film *band)
 {
     output->band = *band;
@@ -440,7 +441,7 @@ static bool band_output(ImageOutput *output, const Film *band, MessageList *mess
     band_keep(output, band);
     output->writing =
         !output->options->synchronous && pthread_create(&output->thread, NULL, band_thread, output) == 0;
-    if (output->writing) return true; // or reported with the next band
+    if (output->writing) return true; // a failure is reported with the next band
     band_thread(output);
     return !output->failed;
 }
@@ -461,7 +462,7 @@ static bool kept_write(ImageOutput *output, MessageList *messages)
     return written;
 }
 
-// The notes that stand behind the pixels.
+// Adds the notes that follow the pixels.
 static bool late_notes_write(ImageOutput *output, MessageList *messages)
 {
     if (output->settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;

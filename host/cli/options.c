@@ -16,7 +16,7 @@
 const char *const lanes_choice_names[LANES_CHOICE_COUNT] = {"1", "4", "8", "16"};
 const uint32_t lanes_choice_values[LANES_CHOICE_COUNT] = {1, 4, 8, 16};
 
-// Decimal digits only; *end receives the position after them.
+// Reads decimal digits only. *end receives the position after them.
 static bool digits_read(const char *value, const char **end, uint64_t *result)
 {
     *result = 0;
@@ -141,7 +141,7 @@ bool option_list(const char *option, const char *value, OptionItem read, void *i
         char *word = memory_copy_text(at);
         word[length] = '\0';
         const bool has_room = *count < most;
-        if (!has_room) fprintf(stderr, "glint: --%s: at most %zu values\n", option, most);
+        if (!has_room) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option, most);
         const bool is_read = has_room && read(option, word, (char *)items + *count * item_size);
         free(word);
         if (!is_read) return false;
@@ -342,13 +342,14 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
     return true;
 }
 
-// What the end of the process releases, here where LeakSanitizer sees that nothing else was forgotten.
+// Computes that only the process's end releases, listed so that LeakSanitizer can see that nothing else was
+// leaked.
 static struct {
     Compute *items;
     size_t count, capacity;
 } left;
 
-// Returns the exit status, see device_close.
+// Closes a Compute. Returns EXIT_MACHINE with a message if the device failed, else `status`.
 static int compute_end(Compute *compute, int status)
 {
     char *unmap_failure = compute_unmap_failure_text(compute);
@@ -374,7 +375,7 @@ int device_close(OpenDevice *open, int status)
     return status;
 }
 
-// Closes it, too, unless that was done.
+// Closes the Compute, unless compute_end has done so, and frees it.
 static void compute_free(Compute *compute)
 {
     compute_close(compute);
@@ -442,7 +443,7 @@ void devices_abandon(OpenDevices *open)
 void devices_drop(OpenDevices *open, size_t index)
 {
     char *failure = compute_failure_text(open->items[index].compute);
-    fprintf(stderr, "glint: warning: the other devices go on without one: %s\n", failure);
+    fprintf(stderr, "glint: warning: the other devices continue without it: %s\n", failure);
     free(failure);
     open->items[index].is_dropped = true;
 }

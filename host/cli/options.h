@@ -1,4 +1,4 @@
-// Shared by the commands: reading option values, opening the device, loading the scene.
+// Reads option values, opens devices and loads scenes for all commands.
 #pragma once
 
 #include "host/measure/error_budget.h"
@@ -9,20 +9,20 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Options of every command that uses a device.
+// The options of every command that uses a device.
 typedef struct {
     const char *device, *reference_device;
     Precision precision;
-    bool has_precision; // given
-    uint32_t lanes;     // 0: the device's default
+    bool has_precision; // whether --precision is given
+    uint32_t lanes;     // 0 for the device's default
     BvhChoice bvh;
     bool no_cache, lenient;
-    uint32_t perturb_seed, perturb_scale; // 0: not given
-    const char *build_options;            // NULL: not given
-    uint32_t work_group[2];               // 0: not given
+    uint32_t perturb_seed, perturb_scale; // 0 if not given
+    const char *build_options;            // NULL if not given
+    uint32_t work_group[2];               // 0 if not given
 } CommonOptions;
 
-// getopt_long values of long options; a command's own start at OPTION_OWN.
+// getopt_long values of long options. A command's other options start at OPTION_OWN.
 enum {
     OPTION_DEVICE = 256,
     OPTION_PRECISION,
@@ -48,20 +48,20 @@ enum {
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
 
-// For commands that render or trace.
+// The option of commands that render or trace.
 #define PERTURB_LONG_OPTION                                                                                  \
     {                                                                                                        \
         "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
     }
 
-// Options of the commands that measure drivers.
+// The options of commands that measure drivers.
 #define DRIVER_LONG_OPTIONS                                                                                  \
     {"work-group", required_argument, NULL, OPTION_WORK_GROUP},                                              \
     {                                                                                                        \
         "build-options", required_argument, NULL, OPTION_BUILD_OPTIONS                                       \
     }
 
-// For commands that render at `certified`.
+// The option of commands that render at `certified`.
 #define REFERENCE_LONG_OPTION                                                                                \
     {                                                                                                        \
         "reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE                                 \
@@ -109,46 +109,49 @@ enum { LANES_CHOICE_COUNT = 4 };
 extern const char *const lanes_choice_names[LANES_CHOICE_COUNT];
 extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 
-// True, with a message, if writing `path` would overwrite a file that the scene was read from.
+// Returns true with a message if writing `path` would overwrite a file that the scene was read from.
 bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path);
 
-// Result of reading a command line if the command is to run; otherwise it is the exit status.
+// The result of reading a command line if the command is to run. Any other result is the exit status.
 enum { OPTIONS_READ = -1 };
 
-// Each reads one value; on a mistake prints what `option` expects and returns false.
+// The functions below read one value. On a mistake they print what `option` expects and return false.
 bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
                   uint32_t *result);
-bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // WxH
+bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // reads WxH
 bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
                    unsigned *result);
-// E or E:METRIC; without a metric the RMSE.
+// Reads E or E:METRIC. The default metric is the RMSE.
 bool option_error_budget(const char *option, const char *value, ErrorBudget *budget);
-bool option_max_pixels(const char *value); // and sets the limit
+// Reads the limit of the pixels of an image that is read, and sets it.
+bool option_max_pixels(const char *value);
 // Reads one value of a list into `item`; on a mistake prints what `option` expects and returns false.
 typedef bool (*OptionItem)(const char *option, const char *value, void *item);
-// Values separated by commas, at most `most` of them, each into the next `item_size` bytes of `items`.
+// Reads values separated by commas, at most `most` of them, each into the next `item_size` bytes of `items`.
 bool option_list(const char *option, const char *value, OptionItem read, void *items, size_t item_size,
                  size_t most, size_t *count);
-// Comma-separated names; the result has one bit per name.
+// Reads comma-separated names into a set with one bit per name.
 bool option_set(const char *option, const char *value, const char *const *names, size_t count,
                 unsigned *result);
-// Handles a common option; *valid receives whether its value is valid. False if `option` is not a common one.
+// Handles a common option and sets *valid if its value is valid. Returns false if `option` is not a common
+// one.
 bool option_common(CommonOptions *common, int option, const char *value, bool *valid);
 
-// Prints the help text; returns EXIT_DONE.
+// Prints the help text and returns EXIT_DONE.
 int option_help(const char *text);
-// Prints a usage error that points to --help; returns EXIT_USER.
+// Prints a usage error that points to --help and returns EXIT_USER.
 int option_usage_fault(const char *command, const char *what);
 
-// Whether one argument is left, from getopt's `optind`; else prints what is missing or too much.
+// Returns whether exactly one argument is left, from getopt's `optind` on. Otherwise prints what is missing
+// or superfluous.
 bool option_only_scene(const char *command, int argument_count, char **arguments);
 
-// Loads the scene and prints its messages. False if it cannot be read; nothing to free then.
+// Loads the scene and prints its messages. Returns false, with nothing to free, if it cannot be read.
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
-// Prints and frees messages; errors in an .rt file follow the line `Error` that miniRT's testers expect.
+// Prints and frees messages. Errors in an .rt file follow the line `Error` that miniRT's testers expect.
 void messages_print(MessageList *messages, const char *path);
 
-// Settings for a full image with the common options: one sample, no bounces, the scene not shifted.
+// Returns settings for a full image with the common options: one sample, no bounces, the scene not shifted.
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height);
 
 typedef struct {
@@ -162,24 +165,24 @@ const Device *device_find(DeviceList *devices, const char *selector);
 // device matches or it does not allow the work-group; there is nothing to close then. device_close reports a
 // device that fails, now or later.
 bool device_open(OpenDevice *open, const CommonOptions *common);
-// Opens the device that works in double for the Compute, if the user chose one or its own device has no
-// 64-bit floating point, and prints which it is. False if there is none, with a message if the user chose
-// one.
+// Opens the device that works in double for the Compute, if the user chose one or if the Compute's device has
+// no 64-bit floating point, and prints its name. Returns false if there is none, with a message if the user
+// chose one.
 bool reference_open(Compute *compute, const DeviceList *devices, const char *selector);
-// At the end of a command. Returns the exit status: EXIT_MACHINE, with a message, if the device failed, else
-// `status`. Unless failed or interrupted, the context is left to the process's end: PoCL takes 80 ms to free
-// its compiler.
+// Closes the device at the end of a command. Returns EXIT_MACHINE with a message if the device failed, else
+// `status`. Unless the command failed or was interrupted, the context is left to the process's end, since
+// PoCL takes 80 ms to free its compiler.
 int device_close(OpenDevice *open, int status);
 
-// Several devices, for one image.
+// The devices that render one image.
 typedef struct {
     DeviceList devices;
     struct {
         Compute *compute;
-        bool is_dropped; // it failed, and the others did its work
+        bool is_dropped; // it failed, and the other devices did its work
     } * items;
     size_t count;
-    bool are_all; // chosen by "all": those that do not suit a render can be left out
+    bool are_all; // chosen by "all", so that those that do not suit a render can be left out
 } OpenDevices;
 
 // Opens every device that the selector lists, or all devices for "all". Returns false with a message if there
@@ -188,14 +191,16 @@ bool devices_open(OpenDevices *open, const char *selector);
 // Applies --work-group and --build-options to the devices. Returns false with a message if one does not allow
 // the work-group.
 bool devices_apply_options(OpenDevices *open, const CommonOptions *common);
-// One of the devices that `selector` lists, or without one of those of the default's type: the number modulo
-// their count, for the processes of one machine. False with a message; nothing to close then.
+// Opens one of the devices that `selector` lists or, if it is NULL, of the devices of the default's type. It
+// is the one at `number` modulo their count, so that the processes of one machine use different devices.
+// Returns false with a message, and nothing to close, if there is none.
 bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages);
-// Closes all without a word about failures.
+// Closes all devices without reporting failures.
 void devices_abandon(OpenDevices *open);
 // Warns that the device failed and that the others do its work.
 void devices_drop(OpenDevices *open, size_t index);
-// Closes a device that no renderer uses; those after it move up.
+// Closes a device that no renderer uses. Later devices move up.
 void devices_remove(OpenDevices *open, size_t index);
-// As device_close, for all that were not dropped.
+// Closes all devices. Returns EXIT_MACHINE with a message if a device failed that was not dropped, else
+// `status`.
 int devices_close(OpenDevices *open, int status);

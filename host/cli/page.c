@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-extern const EmbeddedFile page_files[]; // of host/cli/page/; ended by a NULL name
+extern const EmbeddedFile page_files[]; // the files of host/cli/page/, ended by a NULL name
 
 static const char *page_file(const char *name, size_t length)
 {
@@ -14,7 +14,7 @@ static const char *page_file(const char *name, size_t length)
     fault("no file of the page is called %.*s", (int)length, name);
 }
 
-// In JSON `<` occurs only within strings. Written as \u003c it can neither end a script element nor start a
+// In JSON, `<` occurs only within strings. Written as \u003c it can neither end a script element nor start a
 // comment.
 static void json_embed(Text *page, Json *json)
 {

@@ -67,7 +67,7 @@ void passports_refusals_json(Json *json, const Device *device)
     json_end(json);
 }
 
-// What was found at all precisions is printed once; what differs, once for each.
+// Prints a property. A finding that all precisions share is printed once, any other once per precision.
 static void property_print(const Device *device, Property property)
 {
     const size_t count = passport_count(device);

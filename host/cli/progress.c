@@ -11,7 +11,8 @@
 
 static volatile sig_atomic_t interrupted, is_flag_read, is_held;
 
-// Two often arrive together, for the process and its group; a third means the user insists.
+// Two signals often arrive together, one for the process and one for its group. A third means that the user
+// insists.
 static void interrupt_note(int signal_number)
 {
     if (!is_flag_read && !is_held) {
@@ -60,7 +61,7 @@ void progress_end_at_once(void)
 
 double progress_seconds_left(Progress *progress, double fraction_done)
 {
-    static const double SECONDS_MIN = 1; // before and of the time that is extrapolated
+    static const double SECONDS_MIN = 1; // both before the extrapolated time and of it
     double now = clock_seconds();
     if (progress->start_fraction == 0 || now - progress->opened_seconds < SECONDS_MIN) {
         progress->start_seconds = now;

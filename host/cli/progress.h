@@ -1,4 +1,4 @@
-// Progress of a long command, on a terminal only, and the user's interrupts.
+// Displays the progress of a long command, on a terminal only, and handles the user's interrupts.
 #pragma once
 
 #include <stdbool.h>
@@ -6,30 +6,32 @@
 typedef struct {
     bool visible;
     double opened_seconds, shown_seconds;
-    double start_seconds, start_fraction; // from where on the time is extrapolated
+    double start_seconds, start_fraction; // the point from which the time is extrapolated
     char step[96];
 } Progress;
 
-// Lets SIGINT, SIGTERM and SIGHUP end the process with EXIT_INTERRUPTED, but for those that its parent
-// ignores, as nohup and a shell's background jobs do. Called first.
+// Makes SIGINT, SIGTERM and SIGHUP end the process with EXIT_INTERRUPTED, except for signals that the parent
+// ignores, as nohup and a shell's background jobs do. Must be called first.
 void progress_catch_signals(void);
-// From here on the signals set a flag; the third ends the process.
+// Opens the progress. From here on the signals set a flag, and the third signal ends the process.
 void progress_open(Progress *progress, bool quiet);
-// The remaining time, extrapolated from the fraction that is done, above 0 and at most 1; negative: not known
-// yet. What is done in the first second does not count: a kernel's build, or a checkpoint's bands.
+// Returns the remaining time, extrapolated from the fraction that is done (above 0, at most 1), or a negative
+// number if it is not known yet. The first second does not count, since it may contain a kernel's build or a
+// checkpoint's bands.
 double progress_seconds_left(Progress *progress, double fraction_done);
 void progress_show(Progress *progress, double fraction_done);
-// Shows the progress with what happens from now on, such as "building row 2 of 8".
+// Shows the progress with the name of the next step, such as "building row 2 of 8".
 void progress_step(Progress *progress, double fraction_done, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// From here on the signals set a flag, even where progress_end_at_once is called, until they are released.
+// From here on the signals set a flag until they are released, even if progress_end_at_once is called.
 void progress_hold_signals(void);
 void progress_release_signals(void);
-// Signals end the process at once again, until progress_open.
+// From here on signals end the process at once, until progress_open.
 void progress_end_at_once(void);
-void progress_close(Progress *progress); // erases the line; signals still only set the flag
+// Erases the line. Signals still only set the flag.
+void progress_close(Progress *progress);
 bool progress_interrupted(void);
-// Returns progress_interrupted(); a renderer's `stop`, whose context it ignores.
+// Returns progress_interrupted(). It is a renderer's `stop`, whose context it ignores.
 bool progress_stops(void *context);
-// From now on progress_interrupted is also true where `ask` is, which it calls.
+// From here on progress_interrupted also calls `ask` and returns true if that does.
 void progress_ask(bool (*ask)(void));

@@ -1,4 +1,4 @@
-// Other machines that render bands of the same image, as processes of one MPI job; implemented by host/mpi.
+// Other machines that render bands of the same image, as processes of one MPI job. Implemented by host/mpi.
 #pragma once
 
 #include "host/render/renderer.h"
@@ -6,12 +6,12 @@
 
 // One process, and the device that it renders on.
 typedef struct {
-    uint32_t lanes[PASS_COUNT]; // of each pass; 0: there is none
+    uint32_t lanes[PASS_COUNT]; // the lanes of each pass, 0 if the rank does not have it
     char device[128], driver[128], host[64];
-    char failure[256]; // why it has no device; empty: it has one
+    char failure[256]; // why it has no device; empty if it has one
 } Rank;
 
-// Names its device. Texts too long for it are cut.
+// Sets the names of the rank's device, cut to fit.
 static inline void rank_set_device(Rank *rank, const Device *device)
 {
     const char *board = device->board;
@@ -19,17 +19,19 @@ static inline void rank_set_device(Rank *rank, const Device *device)
     snprintf(rank->driver, sizeof rank->driver, "%s, %s", device->platform_name, device->driver);
 }
 
-// They are called in this order.
+// The ranks. The functions are called in this order.
 typedef struct Ranks {
-    size_t count; // without the first, which is this process
+    size_t count; // excludes the first rank, which is this process
     Rank *items;
     WorkerShare *shares;
-    FilmHeader film; // of the image, once it is rendered
-    // Asks all of them for their devices. False with a message: one of them has none, and all go no further.
+    FilmHeader film; // describes the image once it is rendered
+    // Asks all ranks for their devices. Returns false with a message if one of them has none; all ranks then
+    // stop.
     bool (*begin)(struct Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);
     SceneReceivers receivers; // send them the compiled scene
-    // After that they are to be served; or, unless they `can_start`, this ends their job.
+    // Starts serving the ranks or, unless they `can_start`, ends their job.
     void (*start)(bool can_start);
-    void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker); // see RemoteWorkers
+    // Hands out rows until the image is complete or the render has ended; the `serve` of RemoteWorkers.
+    void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker);
 } Ranks;

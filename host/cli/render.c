@@ -1,4 +1,4 @@
-// glint render: a scene file becomes an image.
+// glint render renders a scene file to an image.
 #include "host/cli/render.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
@@ -51,10 +51,10 @@ static bool band_take(void *context, const Film *band, double fraction_done)
 static void device_drop(void *context, size_t index)
 {
     OpenDevices *devices = ((BandContext *)context)->devices;
-    if (index < devices->count) devices_drop(devices, index); // else a rank, which said why
+    if (index < devices->count) devices_drop(devices, index); // otherwise a rank, which printed the reason
 }
 
-// False with messages. No checkpoint is requested: true.
+// Opens the checkpoint. Returns true if none is requested, and false with messages if it cannot be opened.
 static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *options,
                              const RenderSettings *settings, Renderer *const *renderers, size_t count,
                              const Ranks *ranks, MessageList *messages)
@@ -69,7 +69,7 @@ static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *optio
     return *checkpoint != NULL;
 }
 
-// What is left of a render that ended early.
+// Prints what is left of a render that ended early.
 static void rest_print(const RenderOptions *options)
 {
     if (progress_interrupted())
@@ -80,7 +80,7 @@ static void rest_print(const RenderOptions *options)
                 options->checkpoint);
 }
 
-// Renders, writes the files and reports the times.
+// Renders one image, writes its files and reports the times.
 static int image_render(RenderOptions *options, const Scene *scene, OpenDevices *devices,
                         Renderer *const *renderers, Ranks *ranks, const RenderSettings *settings,
                         Checkpoint *checkpoint, HostTimes *times, MessageList *messages)
@@ -126,7 +126,7 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
         if (renderer_report(renderers[i])->is_out_of_line)
             message_warning(
                 messages,
-                "the compiler of the device \"%s\" failed at a kernel with its functions inlined; it is "
+                "the compiler of the device \"%s\" failed on a kernel with inlined functions; the kernel is "
                 "built with functions out of line, which is slower",
                 renderer_report(renderers[i])->device->name);
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
@@ -141,13 +141,13 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     return status;
 }
 
-// The precision that --max-error asks for, into the settings.
+// Stores the precision that --max-error chooses in the settings.
 static int precision_choose(Pilot *pilot, const RenderOptions *options, RenderSettings *settings,
                             const Scene *scene, Compute *compute)
 {
     MessageList messages = {0};
     Progress progress;
-    progress_open(&progress, true); // for the interrupts
+    progress_open(&progress, true); // so that signals only set the flag
     const bool chosen = pilot_run(pilot, &options->budget, compute, scene, settings, &messages);
     progress_close(&progress);
     const bool is_unfit = messages.count > 0;
@@ -216,7 +216,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     return status;
 }
 
-// Where a scene's image goes, to be freed.
+// Returns the path of a scene's image. The caller frees it.
 static char *path_make(const RenderOptions *options, const char *scene)
 {
     const char *output = options->output.path;
@@ -243,7 +243,7 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
 
 struct RenderCommand {
     RenderOptions options;
-    char **paths; // of each scene's image
+    char **paths; // one path of an image per scene
     RenderDevices open;
     int status;
 };
@@ -327,7 +327,7 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     RenderDevices *open = &command->open;
     command->options.scene = command->options.scenes[index];
     render_devices_rest(open);
-    progress_end_at_once(); // while a scene is read none asks for them
+    progress_end_at_once(); // nothing checks the flag while a scene is read
     if (progress_interrupted()) return EXIT_INTERRUPTED;
     const int status = file_render(command->options, command->paths[index], open, ranks);
     return render_devices_work(open) ? status : EXIT_MACHINE;
@@ -343,19 +343,19 @@ void render_command_note(RenderCommand *command, int status)
     if (status != EXIT_DONE) command->status = status;
 }
 
-// Whether another scene can be rendered: a mistake in one does not concern others.
-static bool goes_on_after(int status)
+// Returns whether another scene can be rendered. A mistake in one scene does not affect others.
+static bool continues_after(int status)
 {
     return status == EXIT_DONE || status == EXIT_USER;
 }
 
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
 {
-    bool goes_on = goes_on_after(command->status);
-    for (size_t i = first; i < command->options.scene_count && goes_on; i++) {
+    bool continues = continues_after(command->status);
+    for (size_t i = first; i < command->options.scene_count && continues; i++) {
         const int status = render_command_run(command, i, ranks);
         render_command_note(command, status);
-        goes_on = goes_on_after(status);
+        continues = continues_after(status);
     }
     if (command->status == EXIT_DONE) fault_output_is_complete(EXIT_DONE);
 }

@@ -1,35 +1,38 @@
-// glint render, scene by scene: with other ranks' devices, or as one of several processes.
+// Runs glint render scene by scene, with other ranks' devices or as one of several processes.
 #pragma once
 
 #include "host/cli/ranks.h"
 
 typedef struct RenderCommand RenderCommand;
 
-// NULL: help was asked for, or a mistake is printed, and *status is the exit status.
+// Reads the command line. Returns NULL if help was requested or a mistake was printed; *status is then the
+// exit status.
 RenderCommand *render_command_open(int argument_count, char **arguments, int *status);
-// Of the devices only one is used: the number modulo their count, see devices_open_one.
+// Restricts the command to one device, the one at `number` modulo the number of devices.
 void render_command_choose_device(RenderCommand *command, size_t number);
 
-// False with a message, before anything is rendered: an image would overwrite a file that one of several
-// scenes is read from. Reads them where an image exists already.
+// Returns false with a message, before anything is rendered, if an image would overwrite a file that one of
+// several scenes is read from. Reads those scenes whose image exists.
 bool render_command_spares_scenes(RenderCommand *command);
-// Opens the devices before the first scene is read. False with a message.
+// Opens the devices before the first scene is read. Returns false with a message if there is none.
 bool render_command_open_devices(RenderCommand *command);
 
-size_t render_command_count(const RenderCommand *command); // of scenes
+size_t render_command_count(const RenderCommand *command); // the number of scenes
 const char *render_command_scene(const RenderCommand *command, size_t index);
-const char *render_command_path(const RenderCommand *command, size_t index); // of its image
+const char *render_command_path(const RenderCommand *command, size_t index); // the scene's image
 
-// Renders one scene; `ranks` or NULL. Returns its exit status.
+// Renders one scene and returns its exit status. `ranks` may be NULL.
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);
-// Whether the last scene or the settings did not fit a device, which is a mistake where all are alike.
+// Returns whether the last scene or the settings did not fit a device. That is the user's mistake if all
+// devices are alike.
 bool render_command_is_unfit(const RenderCommand *command);
-// Adds a scene's status to the command's.
+// Merges a scene's status into the command's.
 void render_command_note(RenderCommand *command, int status);
-// Renders the scenes from `first` on, as far as the command goes on, and notes their statuses: its last work.
+// Renders the scenes from `first` on until the command ends, and merges their statuses. This must be the
+// command's last call before the ones below.
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks);
 
-// Warns of each device that failed, whose work the others do: the command has not failed.
+// Warns of each device that failed and whose work the others did, which is not a failure of the command.
 void render_command_drop_devices(RenderCommand *command);
 // Returns the command's exit status.
 int render_command_close(RenderCommand *command);

@@ -21,12 +21,12 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
     return open->is_open;
 }
 
-// Says why devices do not suit the render, and that the others do their work.
+// Prints why devices do not suit the render, and that the others do their work.
 static void unfit_print(MessageList *unfit)
 {
     for (size_t i = 0; i < unfit->count; i++)
         if (unfit->items[i].severity == MESSAGE_ERROR)
-            fprintf(stderr, "glint: warning: the other devices go on without one: %s\n",
+            fprintf(stderr, "glint: warning: the other devices continue without it: %s\n",
                     unfit->items[i].text);
     message_list_free(unfit);
 }

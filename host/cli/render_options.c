@@ -136,14 +136,14 @@ static bool is_folder(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-// What suits one scene alone. False with a message.
+// Rejects options that suit one scene alone. Returns false with a message.
 static bool several_fit(const RenderOptions *options)
 {
     const char *const folder = options->output.path;
     if (options->checkpoint)
-        option_usage_fault("render", "--checkpoint is for one scene");
+        option_usage_fault("render", "--checkpoint takes one scene, but several are given");
     else if (options->timing == TIMING_JSON)
-        option_usage_fault("render", "--timing=json is for one scene");
+        option_usage_fault("render", "--timing=json takes one scene, but several are given");
     else if (folder && !is_folder(folder))
         option_usage_fault("render", "--output of several scenes must be a folder");
     else
@@ -164,10 +164,11 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
     }
     if (optind == argument_count) return option_usage_fault("render", "no scene given");
     if (options->budget.limit > 0 && options->common.has_precision)
-        return option_usage_fault("render", "--max-error chooses the precision: leave out --precision");
+        return option_usage_fault(
+            "render", "--max-error chooses the precision; it cannot be combined with --precision");
     if (options->budget.limit > 0 && options->checkpoint)
         return option_usage_fault("render",
-                                  "--max-error may choose otherwise when a checkpoint is continued: "
+                                  "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);

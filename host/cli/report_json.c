@@ -38,8 +38,8 @@ static const char *null_if_empty(const char *text)
     return text[0] != '\0' ? text : NULL;
 }
 
-// Returns when the device's first command of a list was queued, by its clock, or `first` if that is earlier;
-// infinity: no time is known.
+// Returns when the device's first command of a list was queued, by the device's clock, or `first` if that is
+// earlier. Returns infinity if no time is known.
 static double first_queued(double first, const NamedLaunch *commands, size_t count, const Device *device)
 {
     for (size_t i = 0; i < count; i++) {
@@ -49,7 +49,7 @@ static double first_queued(double first, const NamedLaunch *commands, size_t cou
     return first;
 }
 
-// The origin of a device's times in a report.
+// Returns the origin of a device's times in a report.
 static double report_origin(const RenderReport *report, const Device *device)
 {
     return first_queued(first_queued(INFINITY, report->launches.items, report->launches.count, device),

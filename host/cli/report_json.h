@@ -1,4 +1,4 @@
-// JSON members shared by several reports.
+// Adds JSON members that several reports share.
 #pragma once
 
 #include "host/base/json.h"
@@ -7,18 +7,19 @@
 #include "host/render/renderer.h"
 
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
-// The reason in place of a missing figure, in the open object.
+// Adds the reason for a missing figure to the open object.
 void unavailable_json(Json *json, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
-// Board, place on the PCI bus and UUID, each null where unknown.
+// Adds board, place on the PCI bus and UUID, each null if unknown.
 void device_identity_json(Json *json, const Device *device);
 void device_json(Json *json, const Device *device); // the device's members, in the open object
 void size_json(Json *json, uint32_t width, uint32_t height);
 void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0
-// All options that the kernels of a report were compiled with.
+// Adds all options that the kernels of a report were compiled with.
 void build_options_json(Json *json, const RenderReport *report);
-// When a command of the report was queued, submitted, started and ended, and a kernel's sizes.
+// Adds the times at which a command of the report was queued, submitted, started and ended, and a kernel's
+// sizes.
 void command_json(Json *json, const RenderReport *report, const LaunchTime *time);
 void times_json(Json *json, const BenchRow *row); // frame_ms, kernel_ms and the clock of the latter
 void rays_json(Json *json, const BenchRow *row);  // rays, mrays_per_s

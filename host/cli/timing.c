@@ -15,7 +15,7 @@ bool timing_style_read(const char *value, TimingStyle *style)
     return true;
 }
 
-// Sums over launches: by events where they are trusted, and by the host's clock.
+// Sums over launches, by events where they are trusted, and by the host's clock.
 typedef struct {
     double event_seconds, host_seconds;
     size_t count, untrusted_count;
@@ -34,7 +34,7 @@ static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
     return sum;
 }
 
-// A longer wait before a command runs means that the driver did something else, such as compiling.
+// A longer wait before a command means that the driver did something else, such as compiling.
 static double launch_delay(const LaunchTime *time)
 {
     double delay = time->trusted ? time->host_seconds - time->event_seconds : 0;
@@ -80,7 +80,7 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
             sum.untrusted_count, count);
 }
 
-// Of the rows and of the time, where several devices render.
+// Prints a device's share of the rows and of the time if several devices render.
 static void share_print(const WorkerShare *share, const RenderSettings *settings)
 {
     fprintf(stderr, "  %.1f %% of the rows in %u %s; busy %.3f ms, idle %.3f ms\n",
@@ -114,16 +114,16 @@ static void pilot_print(const Pilot *pilot)
         if (i != PRECISION_DOUBLE)
             fprintf(stderr, ", %s %.2g in the sample; bound %.2g: %s",
                     error_metric_names[pilot->budget.metric], candidate->verdict.error,
-                    candidate->verdict.bound, candidate->verdict.keeps ? "kept" : "not known to be kept");
+                    candidate->verdict.bound, candidate->verdict.keeps ? "kept" : "not guaranteed");
         fputc('\n', stderr);
     }
 }
 
-// How much of the image `certified` rendered in double, and what that left in doubt.
+// Prints how much of the image `certified` re-rendered in double, and how much remained undecided.
 static void repeats_print(RepeatCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    fprintf(stderr, "certified: %llu sample%s repeated in double, %llu undecided\n",
+    fprintf(stderr, "certified: %llu sample%s re-rendered in double, %llu undecided\n",
             (unsigned long long)counts.repeated, text_plural(counts.repeated),
             (unsigned long long)counts.undecided);
 }

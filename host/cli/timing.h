@@ -1,4 +1,4 @@
-// The time of every stage and launch of a render, as text or JSON.
+// Reports the time of every stage and launch of a render, as text or JSON.
 #pragma once
 
 #include "host/cli/ranks.h"
@@ -6,16 +6,16 @@
 
 typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON } TimingStyle;
 
-bool timing_style_read(const char *value, TimingStyle *style); // value NULL: text
+bool timing_style_read(const char *value, TimingStyle *style); // a value of NULL means text
 
 typedef struct {
     double parse_seconds, encode_seconds;
-    const Pilot *pilot;    // that chose the precision, or NULL
+    const Pilot *pilot;    // chose the precision, or NULL
     double render_seconds; // from the first band to the last, builds included
-    RepeatCounts repeats;  // at `certified`
+    RepeatCounts repeats;  // only at `certified`
 } HostTimes;
 
-// Of all renderers of the image; `ranks`, which rendered as well, may be NULL. Text goes to stderr, JSON to
-// stdout.
+// Prints the times of all renderers of the image. `ranks`, which rendered parts of it, may be NULL. Text goes
+// to stderr, JSON to stdout.
 void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,
                   const RenderSettings *settings, const HostTimes *host);

@@ -1,4 +1,4 @@
-// glint trace: explicit rays in, hits as CSV out.
+// glint trace reads explicit rays and writes their hits as CSV.
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -82,7 +82,7 @@ static double farthest_of(Precision precision)
     return precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
 }
 
-// Whether the numbers of a line are a ray at the precision; reports an error if not.
+// Returns whether the numbers of a line are a ray at the precision, and reports an error if not.
 static bool ray_check(Report *report, size_t line, const double numbers[8], int count, Precision precision)
 {
     bool beyond = numbers[7] == -INFINITY, has_direction = false;
@@ -124,7 +124,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
     return report_close(&report);
 }
 
-// NumPy's format description, version 1.0: a file starts with this.
+// Returns whether the text starts as files of NumPy's format, version 1.0, do.
 static bool is_npy(const Text *text)
 {
     return text->count >= 6 && memcmp(text->items, "\x93NUMPY", 6) == 0;

@@ -90,7 +90,7 @@ static uint64_t file_hash(uint64_t hash, const char *path)
     return hash;
 }
 
-// Of the contents of the scene's file, meshes and textures, whatever their names.
+// Returns the hash of the contents of the scene's file, meshes and textures, regardless of their names.
 static uint64_t scene_files_hash(const Scene *scene)
 {
     uint64_t hash = scene->text_hash;
@@ -117,7 +117,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
             for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
                 for (size_t i = 0; i < sample_choices; i++) {
                     if (!(options->precisions >> precision & 1) || !(options->bvhs >> bvh & 1)) continue;
-                    // without --lanes: once with the device's default
+                    // without --lanes, once with the device's default
                     if (options->lanes ? !(options->lanes >> lanes & 1) : lanes > 0) continue;
                     settings.precision = (Precision)precision;
                     settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
@@ -193,7 +193,8 @@ bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Pr
     return true;
 }
 
-// Until the times converge, but a benchmark for a fifth of its time at least, to see other work come and go.
+// Runs rounds until the times converge, but a benchmark for at least a fifth of its time, so that passing
+// disturbances show.
 static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progress *progress)
 {
     double start = clock_seconds(), spent = 0;

@@ -1,4 +1,4 @@
-// The configurations of a command line, each for every scene, run interleaved and timed: shared by glint
+// Runs the configurations of a command line, each for every scene, interleaved and timed. Shared by glint
 // bench and glint accuracy.
 #pragma once
 
@@ -11,12 +11,12 @@ enum { SAMPLE_CHOICES_MAX = 16 };
 
 typedef struct {
     CommonOptions common;
-    unsigned precisions, lanes, bvhs; // sets; lanes empty: the device's default
-    uint32_t width, height;           // 0: default
+    unsigned precisions, lanes, bvhs; // sets; empty lanes mean the device's default
+    uint32_t width, height;           // 0 for the default
     uint32_t samples[SAMPLE_CHOICES_MAX];
-    size_t sample_choices; // 0: one sample
+    size_t sample_choices; // 0 for one sample
     uint32_t bounce_count;
-    double seconds; // 0: default
+    double seconds; // 0 for the default
 } VariantOptions;
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
@@ -26,7 +26,7 @@ enum {
     OPTION_SECONDS,
     OPTION_SAMPLES,
     OPTION_BOUNCES,
-    OPTION_BEYOND_VARIANTS // a command's own options start here
+    OPTION_BEYOND_VARIANTS // a command's other options start here
 };
 
 #define VARIANT_LONG_OPTIONS                                                                                 \
@@ -41,7 +41,7 @@ enum {
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
 
-// Their help except --precision, whose default differs.
+// The help of these options except --precision, whose default differs.
 #define HELP_VARIANTS                                                                                        \
     "      --lanes LIST      of 1, 4, 8, 16 (default: the device's vector width)\n"                          \
     "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
@@ -49,41 +49,42 @@ enum {
     "      --seconds MAX     time limit of the measurement, converged or not (default: 5 per "               \
     "row)\n" HELP_DEVICE HELP_REFERENCE HELP_LENIENT HELP_MAX_PIXELS
 
-// Handles one of these options; *valid receives whether its value is valid, with a message if not. False if
-// `option` is another one.
+// Handles one of these options and sets *valid if its value is valid, else prints a message. Returns false if
+// `option` is not one of them.
 bool variant_option(VariantOptions *options, int option, const char *value, bool *valid);
-// Reads a positive number. False with a message otherwise.
+// Reads a positive number. Returns false with a message if the value is not one.
 bool option_positive(const char *option, const char *value, double *result);
 
 typedef struct {
     Scene *scenes;
     size_t scene_count;
-    // parallel arrays, grouped by scene
+    // Parallel arrays, grouped by scene:
     Variant *variants;
     BenchRow *rows;
     size_t *scene_indices;
     size_t count;
-    size_t rows_before, row_count; // of the set that this one is a part of
-    Calibration calibration;       // before each round of a benchmark
+    size_t rows_before, row_count; // positions in the set that this one is a part of
+    Calibration calibration;       // runs before each round of a benchmark
 } VariantSet;
 
-// Reads the scenes. False with a message if one cannot be read; the set must still be closed.
+// Reads the scenes. Returns false with a message if one cannot be read; the set must still be closed.
 bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
-// Returns the variants of one scene as a set that shares them, for variant_set_measure. It is not closed.
+// Returns the variants of one scene as a set that shares them, for variant_set_measure. It must not be
+// closed.
 VariantSet variant_set_part(const VariantSet *set, size_t first, size_t count);
-// Opens each variant and warms it up; progress may be NULL. False if the user interrupted or the device
-// failed.
+// Opens each variant and warms it up. `progress` may be NULL. Returns false if the user interrupted or the
+// device failed.
 bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress);
-// Runs every variant once. False as above.
+// Runs every variant once. Returns false if the user interrupted or the device failed.
 bool variant_set_round(VariantSet *set, bool warm_up);
-// Measures them interleaved (A B C A B C …), so that drift affects all alike, until times converge or a share
-// of options->seconds passes. `is_benchmark`: also times the builds, and calibrates each round. False as
-// above.
+// Measures the variants interleaved (A B C A B C …), so that drift affects all alike, until the times
+// converge or a share of options->seconds passes. If `is_benchmark`, also times the builds, and calibrates
+// each round. Returns false if the user interrupted or the device failed.
 extern const double variants_opened_fraction, variants_measured_fraction; // of a row's work
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
 bool variant_set_any_measured(const VariantSet *set);
-// The share that is done where opening, measuring and comparing rows follow each other: all rows before those
-// of the set, and of each of these the fraction.
+// Returns the share that is done if rows are opened, measured and compared one set after another: all rows
+// before those of the set, and the fraction of the set's rows.
 double variant_set_fraction(const VariantSet *set, double fraction_done);
 void variant_set_close(VariantSet *set);

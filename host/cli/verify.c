@@ -1,4 +1,4 @@
-// glint verify: the hard cases on a device, one line each.
+// glint verify runs the hard cases on a device and prints one line per case.
 #include "host/verify/verify.h"
 #include "host/api/version.h"
 #include "host/base/clock.h"
@@ -71,8 +71,8 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     bool every_precision;
-    bool lean;          // each scene has kernels of its own
-    VerifyChoice cases; // none named: all
+    bool lean;          // builds separate kernels for each scene
+    VerifyChoice cases; // all if none is named
 } VerifyOptions;
 
 typedef struct {
@@ -80,8 +80,8 @@ typedef struct {
     VerifyJournal *journal;
     const Compute *compute;
     Progress progress;
-    size_t case_count, row_count; // of a precision; of all that are asked for
-    // at work
+    size_t case_count, row_count; // the cases of one precision, and of all that are requested
+    // The current state:
     Precision precision;
     PrecisionRecord *record;
     char tier;
@@ -188,7 +188,7 @@ static size_t rows_ended(const Verification *verification)
     return count;
 }
 
-// Clears the line of progress for one of the report.
+// Clears the line of progress for a line of the report.
 static void line_begin(Verification *verification)
 {
     fflush(stdout);
@@ -235,7 +235,7 @@ static RenderSettings precision_settings(const VerifyOptions *options, Precision
     return settings;
 }
 
-// Runs those cases at the verification's precision that have not ended.
+// Runs the cases at the current precision that have not ended.
 static void precision_verify(Verification *verification, Compute *compute)
 {
     const VerifyOptions *options = verification->options;
@@ -296,7 +296,7 @@ static void precision_add_json(Json *json, const PrecisionRecord *record, Precis
     json_end(json);
 }
 
-// What the results are of.
+// Adds the program, the device and the options that the results belong to.
 static void origin_add_json(Json *json, const Device *device, const CommonOptions *common)
 {
     json_int64(json, "schema", 3);
@@ -393,7 +393,7 @@ static bool is_case(const char *name)
 
 static int refuse_case(const char *name)
 {
-    fprintf(stderr, "glint: verify: there is no case \"%s\"; there are ", name);
+    fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
     for (size_t i = 0; verify_case_name(i); i++)
         fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
     fprintf(stderr, " (docs/verify.md)\n");
@@ -417,7 +417,8 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
             return EXIT_USER;
     }
     if (options->common.precision == PRECISION_CERTIFIED)
-        return option_usage_fault("verify", "--precision certified is for images");
+        return option_usage_fault(
+            "verify", "--precision certified is only for images; choose single, strict or double");
     options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
     for (size_t i = 0; i < options->cases.count; i++)
         if (!is_case(options->cases.names[i])) return refuse_case(options->cases.names[i]);

@@ -42,7 +42,7 @@ static void crash_record(VerifyJournal *journal, CaseRecord *record, int status)
     journal->crash[0] = '\0';
 }
 
-// Ignores the signals that end a group of processes: the parent gets them and ends this process.
+// Ignores the signals that end a group of processes. The parent receives them and ends this process.
 static void child_begin(VerifyJournal *journal, pid_t parent)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -57,7 +57,7 @@ int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void
 {
     const pid_t parent = getpid();
     for (;;) {
-        fflush(stdout); // or each process prints what is in the buffer
+        fflush(stdout); // otherwise each process would print the contents of the buffer
         const pid_t child = fork();
         if (child < 0) {
             fprintf(stderr, "glint: verify: cannot start a process: %s\n", strerror(errno));

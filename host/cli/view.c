@@ -1,4 +1,4 @@
-// glint view: a scene in a window.
+// glint view shows a scene in a window.
 #include "host/base/fault.h"
 #include "host/cli/commands.h"
 #include "host/cli/image_output.h"
@@ -35,7 +35,7 @@ static const char help_text[] =
 typedef struct {
     CommonOptions common;
     const char *scene;
-    uint32_t width, height; // 0: not given
+    uint32_t width, height; // 0 if not given
     uint32_t sample_count, bounce_count;
     bool writes_camera;
 } ViewOptions;
@@ -58,7 +58,7 @@ static bool option_take(ViewOptions *options, int option, const char *value)
     }
 }
 
-// The keys and the options.
+// Prints the keys and the options.
 static int help_print(void)
 {
     const char *options = strchr(help_text, '\n') + 2;
@@ -92,7 +92,7 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
 
 #if HAS_WINDOW
 
-// As glint render writes it.
+// Saves the image as glint render writes it.
 static bool image_save(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
                        Renderer *renderer, const Film *film, MessageList *messages)
 {
@@ -125,7 +125,7 @@ static int scene_view(ViewOptions *options, const Device *device)
     window.frames.settings.shift_to_eye = true;
     window.frames.settings.moves = true;
     Progress progress;
-    progress_open(&progress, true); // for the interrupts
+    progress_open(&progress, true); // so that signals only set the flag
     switch (window_run(&window)) {
     case WINDOW_CLOSED:
         return EXIT_DONE;

@@ -1,5 +1,5 @@
-// glint view, of glint itself: the window is a program beside it, so that no other command loads its
-// libraries, which took a tenth of the processor time of a small render.
+// glint view starts the window, which is a separate program, so that no other command loads its libraries.
+// Loading them took a tenth of the processor time of a small render.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
@@ -12,7 +12,7 @@
 
 int command_view(int argument_count, char **arguments)
 {
-    static const char deleted[] = " (deleted)"; // which Linux appends once the file was replaced
+    static const char deleted[] = " (deleted)"; // appended by Linux once the file was replaced
     char self[PATH_MAX];
     const ssize_t read = readlink("/proc/self/exe", self, sizeof self);
     if (read < 0 || read == sizeof self) {
@@ -26,7 +26,7 @@ int command_view(int argument_count, char **arguments)
     Text path = {0};
     text_append(&path, self, length);
     text_appendf(&path, "-view");
-    // the first two, "glint" and "view", are one here
+    // one argument replaces the first two, "glint" and "view"
     char **passed = memory_allocate((size_t)argument_count + 2, sizeof *passed);
     passed[0] = "glint";
     passed[1] = "view";
