@@ -1,9 +1,10 @@
-// AOVs at each pixel's center.
+// Fills the AOVs at each pixel's center.
 #include "aovs.h"
 #include "film.h"
 #include "shading/phong.h"
 
-// Returns infinity on a miss, from bits, since -cl-finite-math-only (--build-options) assumes there is none.
+// Returns the distance of a hit, or infinity on a miss. Infinity is made from its bits, since
+// -cl-finite-math-only (--build-options) assumes that it does not occur.
 static inline real hit_distance(const Hit *hit)
 {
     return real_from_bits(lanes_select(hit_found(hit), bits_from_real(hit->t), (integer)(INFINITY_BITS)));
@@ -20,7 +21,7 @@ typedef struct {
     HIT_AOV_LIST(LAYER_MEMBER)
 } HitLayers;
 
-// light_count: 0 without a shadow layer.
+// Fills the AOVs of a tile. light_count is 0 if there is no shadow layer.
 static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
                                   uint light_count, global int *doubts)
 {

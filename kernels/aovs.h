@@ -1,9 +1,10 @@
-// The layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), which describe
-// the ray through its center. From these lists follow the layers' numbers and names, their places on the
-// device and the files; what remains is to compute an AOV in its kernel and to document it.
+// Lists the layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), which
+// describe the ray through its center. The layers' numbers and names, their places on the device and the
+// files follow from these lists. Adding an AOV also takes its computation in a kernel and its documentation.
 //
-// LAYER(NAME, name, type, components, note). Type: REAL, of the kernel's precision; LENGTH, a real in the
-// scene's unit of length; INTEGER, of 32 bits. Components: values per pixel; PER_LIGHT: one for each light.
+// LAYER(NAME, name, type, components, note). The type is REAL, of the kernel's precision; LENGTH, a real in
+// the scene's unit of length; or INTEGER, of 32 bits. Components are values per pixel; PER_LIGHT means one
+// for each light.
 #ifndef AOVS_H
 #define AOVS_H
 

@@ -6,12 +6,12 @@
 #include "shapes/certain.h"
 
 typedef struct {
-    integer x, y; // in the whole image, from the top left
+    integer x, y; // counted in the whole image from the top left
 } Pixels;
 
-// The ray through a point of each pixel; dx and dy run from -1 to 1 across it, 0 is the center. Coordinates
-// are half pixels from the image's center, 2 i + 1 - width, exact and odd-symmetric: a mirrored scene gives
-// the mirrored image bit for bit.
+// Returns the ray through a point of each pixel. dx and dy run from -1 to 1 across the pixel, and 0 is the
+// center. Coordinates are half pixels from the image's center, 2 i + 1 - width, which are exact and
+// odd-symmetric, so that a mirrored scene gives the mirrored image bit for bit.
 static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, scalar dx, scalar dy,
                              mask active)
 {

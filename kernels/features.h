@@ -1,6 +1,6 @@
-// Kernel features that a scene may need, shared by host and kernels, where each NAME is HAS_NAME, 0 or 1.
-// docs/performance.md has the cost of each where it is not needed. Every shape of SHAPE_LIST
-// (kernels/types.h) is one, so FEATURE takes a name and ignores the rest of a shape's row.
+// Lists the kernel features that a scene may need, shared by host and kernels. In kernels each NAME is
+// HAS_NAME, 0 or 1. docs/performance.md has the cost of each where it is not needed. Every shape of
+// SHAPE_LIST (kernels/types.h) is a feature, so FEATURE takes a name and ignores the rest of a shape's row.
 #ifndef FEATURES_H
 #define FEATURES_H
 

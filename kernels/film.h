@@ -1,26 +1,26 @@
-// A band of the image: the pixels of each work-item, and where their values are stored.
+// The pixels of each work-item in a band of the image, and where their values are stored.
 #ifndef FILM_H
 #define FILM_H
 
 #include "camera.h"
 
 typedef struct {
-    uint first_x, first_y, width, height; // in the whole image; of a list its length and 1
+    uint first_x, first_y, width, height; // in the whole image; in a list, 0, 0, its length and 1
     uint cell;                            // 1, or the side of the squares that have one pixel each
-    global const uint *pixels;            // the list: x and y of each pixel in the whole image
+    global const uint *pixels;            // in a list, x and y of each pixel in the whole image
 } Band;
 
 typedef struct {
     Pixels pixels;
     mask inside;   // pixels inside the band
-    bool whole;    // all are inside the band, which is not a list
-    integer index; // of each pixel within a list
-    uint first;    // of the tile's pixels, its index within the band
-    uint width;    // of the band
-    uint number;   // of the tile, in the order of work-items
+    bool whole;    // all are inside the band, and the band is not a list
+    integer index; // the index of each pixel within a list
+    uint first;    // the index of the tile's first pixel within the band
+    uint width;    // the band's width
+    uint number;   // the tile's number in the order of work-items
 } Tile;
 
-// Mixes 32 bits one to one: as alike as two numbers are, their results are unlike.
+// Mixes 32 bits one to one, so that similar numbers give dissimilar results.
 static inline uint bits_scramble(uint bits)
 {
     bits = (bits ^ (bits >> 16)) * 0x45d9f3bu;
@@ -28,9 +28,9 @@ static inline uint bits_scramble(uint bits)
     return bits ^ (bits >> 16);
 }
 
-// Of each square of cell x cell pixels, whose corner is given, one at a place that a hash chooses: a
-// stratified sample of the image (host/measure/pilot.h). `down` is hashed of all 32 bits, of which `across`
-// shows the first few.
+// Returns one pixel of each square of cell x cell pixels, whose corner is given, at a place that a hash
+// chooses: a stratified sample of the image (host/measure/pilot.h). `down` is hashed from all 32 bits, since
+// `across` reveals the first few.
 static inline Pixels pixels_scatter(Pixels corner, uint cell)
 {
     IntegerLanes x = {corner.x}, y = {corner.y};
@@ -43,8 +43,8 @@ static inline Pixels pixels_scatter(Pixels corner, uint cell)
     return (Pixels){x.all, y.all};
 }
 
-// The work-item's tile number `which` of a list, with pixels from anywhere: of those that `certified` left in
-// doubt.
+// Returns the work-item's tile number `which` of a list, whose pixels, those that `certified` flagged, may be
+// anywhere in the image.
 static inline Tile list_tile(const Band *band, uint which)
 {
     uint first = ((uint)get_global_id(0) * TILES + which) * LANES;
@@ -62,7 +62,7 @@ static inline Tile list_tile(const Band *band, uint which)
     return tile;
 }
 
-// The work-item's tile number `which`, from 0 to TILES - 1.
+// Returns the work-item's tile number `which`, from 0 to TILES - 1.
 static inline Tile band_tile(const Band *band, uint which)
 {
     if (IS_PIXEL_LIST) return list_tile(band, which);
@@ -156,7 +156,7 @@ static inline void film_store_color(global scalar *film, const Tile *tile, Vecto
 #if LANES == 16 && defined(SHUFFLE_ROWS)
 typedef real UnalignedReal __attribute__((aligned(sizeof(scalar)))); // PoCL's vstore16 stores halves
 
-// Rows i and j of a, and then of b.
+// Selects rows i and j of a, followed by those of b.
 #define SELECT_ROWS(a, b, i, j)                                                                              \
     __builtin_shufflevector(a, b, 4 * (i), 4 * (i) + 1, 4 * (i) + 2, 4 * (i) + 3, 4 * (j), 4 * (j) + 1,      \
                             4 * (j) + 2, 4 * (j) + 3, 4 * (i) + 16, 4 * (i) + 17, 4 * (i) + 18,              \
@@ -188,15 +188,15 @@ static inline void film_store_tiles(global scalar *film, const Tile *tiles, cons
 {
     uint i = 0;
 #if LANES == 16 && defined(SHUFFLE_ROWS)
-    for (; i + 4 <= PACKETS && tiles[i + 3].whole; i += 4) // the last one is whole: so are the others
+    for (; i + 4 <= PACKETS && tiles[i + 3].whole; i += 4) // if the last one is whole, so are the others
         film_store_four(film, &tiles[i], &colors[i]);
 #endif
     for (; i < PACKETS; i++)
         film_store_color(film, &tiles[i], colors[i]);
 }
 
-// Notes the lanes in doubt: in a word per tile, as bits; of a list in its pixels' counts. `is_first`:
-// nothing has been noted there yet.
+// Records the uncertain lanes: in a word per tile, as bits; in a list, in the pixels' counts. `is_first`
+// means that nothing has been recorded there yet.
 static inline void film_note_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
 {
     if (!is_first && !lanes_any(doubt)) return;

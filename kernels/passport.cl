@@ -1,5 +1,5 @@
-// What the device's arithmetic does, in the vectors and by the functions that render: the host judges the
-// results (host/opencl/passport_measure.c). Operands come from memory, so that no compiler knows them, and as
+// Tests the device's arithmetic in the vectors and by the functions that render. The host judges the results
+// (host/opencl/passport_measure.c). Operands come from memory, so that the compiler cannot know them, and as
 // bits, so that no load or store changes them.
 #include "numerics/numerics.h"
 #include "probes.h"
@@ -49,7 +49,7 @@ static inline Outcome convert_floats(integer a, integer b)
 #endif
 }
 
-// Four independent chains, which converge.
+// Runs four independent chains, which converge.
 static inline Outcome chains_run(bool is_fused, uint round_count, real start, real factor, real addend)
 {
     real x = start, y = x + addend, z = y + addend, w = z + addend;
@@ -74,8 +74,8 @@ static inline integer mantissa_in_turn(uint first)
 static OUT_OF_LINE Outcome probe_run(uint probe, uint first, uint round_count, integer a_bits, integer b_bits,
                                      integer c_bits)
 {
-    // Without branches: PoCL 6.0 requires InstCombine to reach a fixpoint in one iteration, and aborts the
-    // process where the optimizer threads a branch from here into the switch.
+    // This code has no branches, because PoCL 6.0 requires InstCombine to reach a fixpoint in one iteration,
+    // and aborts the process if the optimizer threads a branch from here into the switch.
     const bool sweeps_b = probe == PROBE_SWEEP_RECIPROCAL, sweeps_root = probe == PROBE_SWEEP_SQRT,
                sweeps_a = probe == PROBE_SWEEP_QUOTIENT || sweeps_root;
     const integer operand = a_bits, mantissa = mantissa_in_turn(first), one = bits_from_real((real)(1));
@@ -130,9 +130,9 @@ static inline void result_store(integer value, global scalar_integer *to)
 #endif
 }
 
-// A work-item probes LANES of `count` operands: all a of operand_count, then all b, then all c. Or all probe
-// the same where there is one. results: the first ones, then the second ones. first: the number of the first
-// mantissa.
+// Each work-item probes LANES of `count` operands: all a of operand_count, then all b, then all c. If there
+// is only one operand, all work-items probe that. `results` has the first results, then the second ones.
+// `first` is the number of the first mantissa.
 kernel void passport(uint probe, uint first, uint round_count, uint operand_count,
                      global const scalar_integer *operands, uint count, global scalar_integer *results)
 {

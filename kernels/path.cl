@@ -1,4 +1,4 @@
-// The signature of the ray tree at each pixel's center.
+// Computes the signature of the ray tree at each pixel's center.
 #define COMPUTE_SIGNATURE 1
 #include "aovs.h"
 #include "film.h"

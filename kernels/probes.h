@@ -1,4 +1,5 @@
-// What passport.cl computes, by the number that the host passes. Each probe has two results per lane.
+// Lists the probes that passport.cl computes, by the number that the host passes. Each probe has two results
+// per lane.
 #ifndef PROBES_H
 #define PROBES_H
 
@@ -9,11 +10,11 @@ enum {
     PROBE_TWO_PRODUCT, // the product; its rounding error
     PROBE_FMA,         // real_fma(a, b, c), twice
     PROBE_DIVIDE,      // a / b as the device rounds it; as kernels use it
-    PROBE_SQRT,        // the root of a, likewise
+    PROBE_SQRT,        // the root of a as the device rounds it; as kernels use it
     PROBE_COMPARE,     // COMPARED_…; real_max(a, b)
     PROBE_INTEGERS,    // the integer a to real; b to an integer
     PROBE_FLOATS,      // in double: a to float; the float b to double
-    // PROBE_DIVIDE and PROBE_SQRT for mantissas in turn (MANTISSA_STRIDE), of which a is the other operand
+    // PROBE_DIVIDE and PROBE_SQRT for successive mantissas (MANTISSA_STRIDE), with a as the other operand.
     PROBE_SWEEP_RECIPROCAL, // a / mantissa
     PROBE_SWEEP_QUOTIENT,   // mantissa / a
     PROBE_SWEEP_SQRT,       // mantissa, in the binade that starts at a
@@ -30,8 +31,8 @@ enum {
     COMPARED_AT_MOST = 16
 };
 
-// Multiples of these, modulo the number of mantissas, are each mantissa once. The first ones are spread
-// evenly: each is odd and the golden ratio's part of that number.
+// The multiples of each stride, modulo the number of mantissas, visit every mantissa once, because the stride
+// is odd. The first ones are spread evenly, because the stride is that number divided by the golden ratio.
 #define MANTISSA_STRIDE_FLOAT  5184445
 #define MANTISSA_STRIDE_DOUBLE 2783377641436327
 

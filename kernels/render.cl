@@ -1,13 +1,13 @@
-// The image: each work-item renders a macro-tile, PACKETS of its packets at a time.
+// Renders the image. Each work-item renders a macro-tile, PACKETS of its packets at a time.
 #define COMPUTE_SIGNATURE 0
 #include "film.h"
 #include "shading/path.h"
 
-// Adds samples first_sample .. last_sample - 1 of tiles first_tile .. first_tile + PACKETS - 1 to the
-// film; the last launch divides the sum by the number of samples. `offsets`: x and y of each sample in its
-// pixel, -1 to 1. `compensation`: the rounding error of the sum, compensated in the next addition and kept
-// between launches (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965): a plain sum of a
-// million equal samples would be off by 1 %.
+// Adds samples first_sample .. last_sample - 1 of tiles first_tile .. first_tile + PACKETS - 1 to the film.
+// The last launch divides the sum by the number of samples. `offsets` has x and y of each sample in its
+// pixel, -1 to 1. `compensation` is the rounding error of the sum, which the next addition compensates and
+// which is kept between launches (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965). A
+// plain sum of a million equal samples would be off by 1 %.
 static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
                                      global scalar *compensation, uint first_sample, uint last_sample,

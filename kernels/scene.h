@@ -1,4 +1,4 @@
-// The scene's arrays, as kernels see them.
+// Gives kernels access to the scene's arrays.
 #ifndef SCENE_H
 #define SCENE_H
 
@@ -12,10 +12,10 @@ typedef struct {
     ARENA_LIST(SCENE_MEMBER)
     global const BvhNode *nodes;
     global const Texel *texels;
-    global uint *ray_counts; // of each RAYS_…; NULL unless rays are counted
+    global uint *ray_counts; // by RAYS_…; NULL unless rays are counted
 } Scene;
 
-// The scene as each kernel's first arguments, and the Scene made of them.
+// The first arguments of each kernel, which have the scene, and the Scene made from them.
 #define SCENE_ARGUMENTS                                                                                      \
     global const char *arena, ArenaOffsets offsets, global const BvhNode *nodes, global const Texel *texels
 #define SCENE_POINTER(NAME, Type, name, names)                                                               \

@@ -1,4 +1,4 @@
-// Traces explicit rays with what follows from their hits.
+// Traces explicit rays and the bounces at their hits.
 #define TRACES_BOUNCES 1
 #include "trace.h"
 

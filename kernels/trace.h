@@ -1,5 +1,5 @@
-// Explicit rays: the closest hit, and where TRACES_BOUNCES the bounces there and the transmittance along
-// each.
+// Traces explicit rays: finds the closest hit and, if TRACES_BOUNCES, the bounces there and the transmittance
+// along each ray.
 #ifndef TRACE_H
 #define TRACE_H
 
@@ -26,9 +26,10 @@ static inline void vector_store(Vector vector, RealLanes *to)
     to[2].all = vector.z;
 }
 
-// Traces up to LANES rays from `first` on. rays: RAY_SCALARS per ray. results: RESULTS per ray, at the
-// offsets RESULT_… (types.h). On a miss only bounds, doubt and transmittance are valid. Bounds are those of
-// Hit at `certified`, for rays from tmin = 0 without an end, else t. Doubt is 1 where the hit is uncertain.
+// Traces up to LANES rays from `first` on. `rays` has RAY_SCALARS per ray and `results` RESULTS per ray, at
+// the offsets RESULT_… (types.h). On a miss only bounds, doubt and transmittance are valid. At `certified`
+// the bounds are those of Hit, for rays from tmin = 0 that have no end; otherwise they are t. Doubt is 1 if
+// the hit is uncertain.
 static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
 {

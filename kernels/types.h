@@ -1,11 +1,11 @@
-// The flat structs that host and kernels share, one array per shape.
+// Defines the flat structs that host and kernels share, one array per shape.
 //
-// In the kernels `scalar` is float or double, the kernel's own precision. The host writes double and narrows
-// each array on upload. So in every struct the scalar4 members come first, the uint4 members last: then no
-// member needs padding, and narrowing goes element by element (tests/test_layout.c checks each on the
-// device).
+// In the kernels `scalar` is float or double, the kernel's precision. The host writes double and narrows each
+// array on upload. So in every struct the scalar4 members come first and the uint4 members last: then no
+// member needs padding, and narrowing proceeds element by element (tests/test_layout.c checks each struct on
+// the device).
 //
-// Positions are relative to the eye that the scene was compiled for. Axes and normals are the scene's own,
+// Positions are relative to the eye that the scene was compiled for. Axes and normals are those of the scene,
 // scaled by a power of two to a length in 1/2..1, so that they are exact and never overflow.
 #ifndef TYPES_H
 #define TYPES_H
@@ -29,12 +29,14 @@ typedef struct {
     uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES | HAS_POWER
 } Sphere;
 
-// In a shape's id.y. The eye's power defines the shape: of a sphere |center|^2 - radius^2 before either is
-// rounded, instead of the radius. Next to a planet the two round to half a meter, the power to an ulp of the
-// distance. id.z: its bits as a float, or id.z, id.w: low and high half of its bits as a double.
+// A bit of a shape's id.y: the eye's power defines the shape. For a sphere it is |center|^2 - radius^2 before
+// either is rounded, and it replaces the radius. Next to a planet, center and radius round to half a meter,
+// the power to an ulp of the distance. id.z has its bits as a float, or id.z and id.w the low and high half
+// of its bits as a double.
 enum { HAS_POWER = 16 };
 
-// In a shape's id.y: front faces are ignored, only rays from inside hit. Never with REVOLUTION_CAPPED.
+// A bit of a shape's id.y: front faces are ignored, so that only rays from inside hit. Never set together
+// with REVOLUTION_CAPPED.
 enum { IGNORES_FRONT_FACES = 8 };
 
 typedef struct {
@@ -48,8 +50,8 @@ typedef struct {
     scalar4 center_radius;
     scalar4 normal; // w: 1 / its length
     scalar4 grid_u, grid_v;
-    scalar4 foot; // with HAS_POWER its plane's point nearest to the eye
-    uint4 id;     // y: HAS_POWER, of the sphere around it
+    scalar4 foot; // with HAS_POWER, its plane's point nearest to the eye
+    uint4 id;     // y: HAS_POWER, for the sphere around it
 } Disc;
 
 typedef struct {
@@ -57,11 +59,11 @@ typedef struct {
     uint4 id;
 } Box;
 
-// Cylinder and cone: the points with |p x axis| = radius |axis| + slope (p . axis), p from the base, for an
-// axis of any length.
+// Cylinder and cone: the points with |p x axis| = radius |axis| + slope (p . axis), with p measured from the
+// base, for an axis of any length.
 //
-// With HAS_POWER the base is the axis' point nearest to the eye, heights along the axis are those above the
-// eye, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution.h).
+// With HAS_POWER the base is the axis' point nearest to the eye, heights along the axis are measured from the
+// eye's height, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution.h).
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
     scalar4 axis_slope;  // xyz axis, w slope: the tangent of the half-angle, 0 for a cylinder
@@ -77,9 +79,9 @@ typedef Revolution Cone;
 typedef struct {
     scalar4 center_major; // w: radius of the circle
     scalar4 axis_minor;   // unit; w: radius of the tube, r
-    // With HAS_POWER, seen from the eye: a / r and A / r, where a leads to the eye from the circle's nearest
-    // point and A is its part along `radial`, the unit direction away from the axis; the eye's distance from
-    // that. The power is (|a|^2 - r^2) / (2 r) (kernels/shapes/torus.h).
+    // With HAS_POWER, values as seen from the eye: a / r and A / r, where a leads to the eye from the
+    // circle's nearest point, and A is its part along `radial`, the unit direction away from the axis; and
+    // the eye's distance from the axis. The power is (|a|^2 - r^2) / (2 r) (kernels/shapes/torus.h).
     scalar4 gradient; // w: A / r
     scalar4 radial;   // w: the eye's distance from the axis
     uint4 id;         // y: HAS_POWER
@@ -87,19 +89,19 @@ typedef struct {
 
 typedef struct {
     scalar4 a, b, c; // w: x, y and z of the normal; the largest is 1/2 to 1, or all are 0
-    // y: 1 + index of its TriangleNormals, 0: flat; z: 1 + index of its TriangleUvs, 0: none. w: the bits of
-    // normal . (a - eye) before a is rounded, as a float; 0: the rounded a will do.
+    // y: 1 + index of its TriangleNormals, or 0 if flat. z: 1 + index of its TriangleUvs, or 0. w: the bits
+    // of normal . (a - eye) before a is rounded, as a float, or 0 if the rounded a suffices.
     uint4 id;
 } Triangle;
 
-// Apart from Triangle: every intersection test reads that, only the closest hit reads these.
+// Separate from Triangle, because every intersection test reads that, but only the closest hit reads these.
 typedef struct {
     scalar4 a, b, c; // unit
 } TriangleNormals;
 
-// At `certified`, of a triangle, or of any object, whose id is the index: the ids of the triangles across the
-// edges opposite a, b and c, and 3 bits for each, from the lowest on. They are set where signs of exact
-// arithmetic on the scene's vertices say so.
+// At `certified`, the neighbors of a triangle: the ids of the triangles across the edges opposite a, b and c,
+// and 3 bits for each, from the lowest on, which are set if signs of exact arithmetic on the scene's vertices
+// prove it. The array has an element for every object, whose id is the index.
 typedef struct {
     uint4 ids_sides;
 } TriangleNeighbors;
@@ -117,13 +119,13 @@ typedef struct {
 typedef struct {
     scalar4 apex_k;   // w: k, 4 |axis| times the focal length
     scalar4 axis_end; // w: p . axis runs from 0 to this where finite
-    // With HAS_POWER the axis' point nearest to the eye, and in w its p . axis, which axis_end.w then lacks;
-    // the power is |m|^2 - k p . axis at the eye (kernels/shapes/paraboloid.h).
+    // With HAS_POWER, the axis' point nearest to the eye, and in w that point's p . axis, which axis_end.w
+    // then lacks. The power is |m|^2 - k p . axis at the eye (kernels/shapes/paraboloid.h).
     scalar4 foot_lift;
     uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | HAS_POWER
 } Paraboloid;
 
-// Every shape: feature, struct, name, name of its array. Adding a shape begins here: docs/adding-a-shape.md.
+// Every shape: feature, struct, name, name of its array. Adding a shape begins here (docs/adding-a-shape.md).
 // clang-format off
 #define SHAPE_LIST(SHAPE)                           \
     SHAPE(SPHERES,   Sphere,   sphere,   spheres)   \
@@ -142,9 +144,9 @@ enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 }
 
 // A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
 // high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. With
-// several lanes a leaf of triangles is a block. The box of an empty slot is inverted, low above high.
+// several lanes a leaf of triangles is a block. The box of an empty slot is inverted, with low above high.
 //
-// The host makes nodes as wide as the kernel's packets, and at least 4 wide.
+// Nodes are as wide as the kernel's packets, and at least 4 wide.
 enum { BVH_WIDTH_MIN = 4, BVH_WIDTH_MAX = 16 };
 enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #ifdef __OPENCL_VERSION__
@@ -160,8 +162,8 @@ typedef struct {
 enum { BVH_NODE = 0xff };
 
 // The vertices of a leaf's triangles, for kernels with several lanes, which test a lane per triangle
-// (kernels/traversal/triangle_block.h): rows of a.x, a.y, a.z, b.x ... c.z, as wide as a node. Triangles that
-// a leaf lacks repeat its first one.
+// (kernels/traversal/triangle_block.h). The rows a.x, a.y, a.z, b.x ... c.z are as wide as a node. If a leaf
+// has fewer triangles, the first one is repeated.
 enum { BLOCK_ROWS = 9 };
 #ifdef __OPENCL_VERSION__
 typedef struct {
@@ -174,11 +176,11 @@ typedef struct {
     uint4 triangles;
 } BlockPlaces;
 
-// A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, the eye or
-// a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x of them: one of the
-// whole BVH, then one of each primitive outside it, kind by kind; planes have none.
+// A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, such as the
+// eye or a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x spheres: one for
+// the whole BVH, then one for each primitive outside it, kind by kind. Planes have none.
 //
-// xyz: v, from the common origin to the center; w: the origin's power |v|^2 - radius^2, lowered by
+// xyz is v, from the common origin to the center. w is the origin's power |v|^2 - radius^2, lowered by
 // CULL_SPHERE_SLACK u |v|^2. With v = 0, -CULL_SPHERE_MAX is never culled (unbounded, or out of float's
 // range) and +CULL_SPHERE_MAX always (an empty BVH).
 typedef struct {
@@ -187,16 +189,16 @@ typedef struct {
 
 #define CULL_SPHERE_MAX 1e37f
 
-// The enlargement of cull spheres, in units of roundoff: of |v|^2, and of the ray's direction squared.
+// The enlargement of cull spheres in units of roundoff, relative to |v|^2 and to the ray's direction squared.
 enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
 // At `certified` the exact shadow ray may be off by SHADOW_ERROR_MAX u of the distance
-// (kernels/shading/phong.h), and near misses count: the lights' spheres, of a radius below |v|, are enlarged
-// by that, too.
+// (kernels/shading/phong.h), and near misses count. So the lights' spheres, whose radius is below |v|, are
+// also enlarged by that.
 enum { CERTIFIED_CULL_SPHERE_SLACK = 1 << 10, CERTIFIED_CULL_DIRECTION_SLACK = 1 << 10 };
 
 enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
 
-// What an object's id refers to.
+// The shape and the material that an object's id refers to.
 typedef struct {
     uint4 kind_index_material; // x: KIND_…, y: index in that shape's array, z: index of the material
 } ObjectEntry;
@@ -207,15 +209,15 @@ typedef struct {
     scalar4 other_color; // the checker's second color, w: shininess
     scalar4 grid;        // xyz: the eye's position in checker cells, w: cells per unit; 0: no checker
     scalar4 reflection_transmission_ior; // w: texels of the texture per unit of length, on planes and discs
-    // What a shadow ray loses here: -log2(transmission) in integer steps, whose sum does not depend on the
-    // order of the objects. x: steps of 2^-24, for float; y, z: low and high half of steps of 2^-48, for
-    // double.
+    // The loss of a shadow ray here: -log2(transmission) in integer steps, whose sum does not depend on the
+    // order of the objects. x counts steps of 2^-24, for float; y and z are the low and high half of the
+    // steps of 2^-48, for double.
     uint4 optical_depth;
-    // x: 1 + the index of its first level, 0: none; y: number of levels; z, w: WRAP_… along u and v
+    // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_… along u and v
     uint4 texture;
 } Material;
 
-// What a texture shows beyond its edges.
+// How a texture extends beyond its edges.
 enum { WRAP_REPEATED, WRAP_CLAMPED, WRAP_MIRRORED };
 
 // One level of a texture's mipmap, each half the size of the one before, down to one texel.
@@ -228,15 +230,15 @@ typedef struct {
 } Texel;
 
 enum { OPAQUE = 0x7fffffff };     // in optical_depth.x: no light passes
-enum { PASSING_DEPTH_MAX = 125 }; // the largest -log2(transmission) of which a float is normal after rounding
+enum { PASSING_DEPTH_MAX = 125 }; // the largest -log2(transmission) whose float is normal after rounding
 
 // The largest bounce depth.
 enum { BOUNCES_MAX = 255 };
 
-// The signature of a ray tree: PATH_START, then per ray, depth first and reflected before refracted,
-// 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is that of the object hit,
-// -1 for the background; events are the bounces there, 0 for none. (Fowler, Noll, Vo: FNV-1a, by words
-// instead of bytes.)
+// The signature of a ray tree is PATH_START, followed for each ray, depth first and reflected before
+// refracted, by the low 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is
+// that of the object hit, -1 for the background. The events are the bounces there, 0 if there are none.
+// (Fowler, Noll, Vo: FNV-1a, by words instead of bytes.)
 enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_EVENTS = 8 };
 #define PATH_START  0x811c9dc5u
 #define PATH_FACTOR 0x01000193u
@@ -249,14 +251,14 @@ enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_E
 #define TILE_WIDTH_OF(lanes)  ((lanes) >= 8 ? 4 : (lanes) == 4 ? 2 : 1)
 #define TILE_HEIGHT_OF(lanes) ((lanes) == 16 ? 4 : (lanes) == 1 ? 1 : 2)
 
-// The macro-tile that a work-item renders: a square of as many tiles as a packet has lanes. On a CPU each
-// work-item is a work-group of its own, which costs PoCL some hundred cycles to start.
+// The macro-tile that a work-item renders is a square of as many tiles as a packet has lanes. On a CPU each
+// work-item is a separate work-group, which costs PoCL some hundred cycles to start.
 #define MACRO_TILE_COLUMNS_LOG2_OF(lanes) ((lanes) == 16 ? 2 : (lanes) == 1 ? 0 : 1)
 #define MACRO_TILE_COLUMNS_OF(lanes)      (1 << MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 #define MACRO_TILE_ROWS_OF(lanes)         ((lanes) >> MACRO_TILE_COLUMNS_LOG2_OF(lanes))
 
-// The scalars of an explicit ray and of its result (kernels/trace.h): the offset of each vector. closest.cl
-// fills CLOSEST_SCALARS per ray, trace.cl all.
+// The scalars of an explicit ray and of its result (kernels/trace.h), as the offset of each vector.
+// closest.cl fills CLOSEST_SCALARS per ray, trace.cl all.
 enum { RAY_ORIGIN, RAY_DIRECTION = 3, RAY_TMIN = 6, RAY_TMAX, RAY_SCALARS };
 enum {
     RESULT_T,
@@ -282,37 +284,37 @@ enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
 
 typedef struct {
     scalar4 color;     // w: the largest of its channels
-    scalar4 position;  // from the eye; point and spot
+    scalar4 position;  // relative to the eye; point and spot
     scalar4 direction; // unit, away from the light; directional and spot
-    // spot: x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which no
-    // kernel reads; z: 1 / (x - y), 0 for a hard edge
+    // For spots, x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which
+    // kernels do not read; z: 1 / (x - y), or 0 for a hard edge.
     scalar4 cone;
     uint4 kind; // x: LIGHT_KIND_…
 } Light;
 
 typedef struct {
     scalar4 background, ambient;
-    // A camera ray: from the eye along forward + x right + y up, x and y in half pixels from the image's
-    // center. The eye is the origin, but for a preview of a scene compiled for another eye.
+    // A camera ray runs from the eye along forward + x right + y up, with x and y in half pixels from the
+    // image's center. The eye is the origin, except in a preview of a scene compiled for another eye.
     scalar4 eye, forward, right, up;
-    scalar4 bounds;                  // of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
+    scalar4 bounds;                  // those of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
     scalar4 bounds_low, bounds_high; // its corners
-    // corners of a box around all points where a transparent object may touch an opaque one; low above high
-    // where none does
+    // The corners of a box around all points where a transparent object may touch an opaque one. Low is above
+    // high if there are no such points.
     scalar4 contact_low, contact_high;
-    // x: width of a sample's share of a pixel, at distance 1; y: the first rival of every hit at `certified`,
-    // the largest scalar, or its negative where no bound holds and so every hit is in doubt
+    // x: width of a sample's share of a pixel, at distance 1. y: the first rival of every hit at `certified`:
+    // the largest scalar, or its negative if no bound holds and so every hit is uncertain.
     scalar4 sample;
     uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: largest depth
-    uint4 cull_spheres;              // x: number per common origin, 0: none
-    uint4 counts[KIND_QUARTETS];     // of each KIND_…, in that order
-    uint4 bvh_counts[KIND_QUARTETS]; // of these those in the BVH, which come first
+    uint4 cull_spheres;              // x: number per common origin, 0 if there are none
+    uint4 counts[KIND_QUARTETS];     // primitives by KIND_…
+    uint4 bvh_counts[KIND_QUARTETS]; // those of them in the BVH, which come first
 } SceneHeader;
 
-// The arena is one buffer with the header and then these arrays, because devices allow a kernel as few as 8
-// buffers. Nodes and texels have separate ones, because devices limit the size of each. ARRAY(NAME, struct, a
-// shape's name, name of the array).
+// The arena is one buffer with the header followed by these arrays, because devices may allow a kernel only 8
+// buffers. Nodes and texels have separate buffers, because devices limit the size of each. ARRAY(NAME,
+// struct, a shape's name, name of the array).
 // clang-format off
 #define ARENA_LIST(ARRAY)                                              \
     SHAPE_LIST(ARRAY)                                                  \
@@ -328,7 +330,7 @@ typedef struct {
     ARRAY(TEXTURE_LEVELS, TextureLevel, , texture_levels)
 // clang-format on
 
-// Where each begins, in units of the largest alignment, that of a double16.
+// Where each array begins, in units of the largest alignment, that of a double16.
 enum { ARENA_UNIT = 128 };
 #define ARENA_OFFSET(NAME, Type, name, names) unsigned names;
 typedef struct {

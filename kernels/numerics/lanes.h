@@ -1,20 +1,20 @@
-// Packet width and precision: a work-item traces packets of LANES rays, one per lane.
+// Defines packet width and precision: a work-item traces packets of LANES rays, one per lane.
 //
-// Above this file code reads like the scalar algorithm, with a mask where that would branch. A mask is the
-// result of a comparison: 0/1 for one lane, 0/-1 for more; `&`, `|` and `!` work on both.
+// Above this file, code reads like the scalar algorithm, with a mask where that would branch. A mask is the
+// result of a comparison: 0/1 for one lane, 0/-1 for more. `&`, `|` and `!` work on both.
 //
 // The host defines these macros before the text (prelude_write in host/render/renderer_kernels.c):
 //     LANES            1, 4, 8 or 16
 //     IS_STRICT, IS_DOUBLE    the precision, at most one of them 1
-//     IS_CERTIFIED     1: every decision has a bound on its error: shapes/certain.h
-//     IS_PIXEL_LIST    1: renders a list of pixels instead of a band: film.h
-//     REPAIRS_DIVIDE   1 at `strict` where the device's division and square root are inexact: numerics.h
-//     HAS_FMA          0 where the device emulates fma: pair.h
-//     PENDING_MAX      of pending refracted rays: shading/path.h
-//     STACK_CAPACITY   of pending children of BVH nodes: traversal/stack.h
+//     IS_CERTIFIED     1: every decision has a bound on its error (shapes/certain.h)
+//     IS_PIXEL_LIST    1: renders a list of pixels instead of a band (film.h)
+//     REPAIRS_DIVIDE   1 at `strict` if the device's division and square root are inexact (numerics.h)
+//     HAS_FMA          0 if the device emulates fma (pair.h)
+//     PENDING_MAX      the most pending refracted rays (shading/path.h)
+//     STACK_CAPACITY   the most pending children of BVH nodes (traversal/stack.h)
 //     IS_COUNTING      1: rays are counted
-//     PERTURB          1: errors are simulated, by PERTURB_SEED and PERTURB_SCALE: perturb.h
-//     HAS_<feature>    0 or 1 for each of features.h
+//     PERTURB          1: errors are simulated, by PERTURB_SEED and PERTURB_SCALE (perturb.h)
+//     HAS_<feature>    0 or 1 for each feature of features.h
 #ifndef LANES_H
 #define LANES_H
 
@@ -47,9 +47,10 @@ typedef int scalar_integer;
 #define SMALLEST_RATIO   0x1p-120f
 #endif
 
-// For large functions with several callers and little live state: inlined, each copy would be compiled. And
-// for the bodies of kernels, of which PoCL compiles three, one per form of launch. But GPUs would pass their
-// structs through memory, unless their compiler can build no body that large (IS_OUT_OF_LINE).
+// For large functions that have several callers and little live state, which would be compiled once per copy
+// if they were inlined, and for the bodies of kernels, of which PoCL compiles three, one per form of launch.
+// GPUs would pass the functions' structs through memory, so there the functions are inlined unless the
+// compiler cannot build so large a body (IS_OUT_OF_LINE).
 #if LANES == 1 && !IS_OUT_OF_LINE
 #define OUT_OF_LINE inline
 #else
@@ -91,10 +92,10 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define MACRO_TILE_COLUMNS      MACRO_TILE_COLUMNS_OF(LANES)
 #define MACRO_TILE_COLUMNS_LOG2 MACRO_TILE_COLUMNS_LOG2_OF(LANES)
 #define MACRO_TILE_ROWS         MACRO_TILE_ROWS_OF(LANES)
-#define TILES                   LANES // of a macro-tile
-// Packets traced together: a macro-tile's, where they traverse a BVH. Else up to eight: each one's work fills
-// the latencies of the others' roots and quotients, and their data stays near. With bounces, which go packet
-// by packet, one.
+#define TILES                   LANES // per macro-tile
+// Packets that are traced together. With a BVH these are a macro-tile's. Without one there are up to eight,
+// because each packet's work fills the latencies of the others' roots and quotients, and their data stays in
+// caches. With bounces, which are traced packet by packet, there is one.
 #define PACKETS (HAS_BVH ? TILES : HAS_REFLECTION || HAS_TRANSMISSION ? 1 : TILES < 8 ? TILES : 8)
 #if LANES == 1
 #define LANE_X ((integer)(0))
@@ -148,7 +149,7 @@ typedef union {
 #define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
 #endif
 
-// clang for a CPU has reductions that take few instructions; halving, written out, takes several times as
+// clang for a CPU has reductions that take few instructions, while halving written out takes several times as
 // many. clang for SPIR may lack them.
 #if defined(__x86_64__) || defined(__aarch64__)
 #if defined(__has_builtin)
@@ -211,7 +212,8 @@ static inline scalar_integer lanes_smallest(integer value)
 }
 #endif
 
-// clang's builtin for the x86 instruction that packs a mask into bits; the fallback below takes some ten.
+// clang's builtin for the x86 instruction that packs a mask into bits. The fallback below takes about ten
+// instructions.
 #if defined(__x86_64__) && defined(__has_builtin)
 #if __clang_major__ >= 18 && __clang_major__ <= 20 && !defined(__EVEX512__)
 // these need EVEX512 for vectors of 512 bits
@@ -226,8 +228,8 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-// 1 / a and 1 / sqrt(a), off by 2^-14 of themselves at most. MASK_BITS says that the compiler knows
-// __has_builtin.
+// Estimates of 1 / a and 1 / sqrt(a) with a relative error of at most 2^-14. MASK_BITS implies that the
+// compiler knows __has_builtin.
 #ifdef MASK_BITS
 #if LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
 #define RECIPROCAL_14_BITS(a)   __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)
@@ -238,7 +240,7 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-// Returns floor(a), by one instruction where the processor has it: PoCL's own floor takes ten.
+// Returns floor(a), by one instruction if the processor has it. PoCL's floor takes ten.
 static inline real real_floor(real a)
 {
 #if IS_CPU_CLANG && LANES > 1 && (defined(__SSE4_1__) || defined(__aarch64__))
@@ -249,7 +251,7 @@ static inline real real_floor(real a)
     return floor(a);
 }
 
-// The mask as bits, lane 0 lowest.
+// Returns the mask as bits, with lane 0 lowest.
 static inline uint lanes_bits(mask condition)
 {
 #if LANES == 1
@@ -276,7 +278,7 @@ static inline mask mask_of_bits(uint bits)
 #endif
 }
 
-// The index of the lowest set bit of bits != 0.
+// Returns the index of the lowest set bit of bits != 0.
 static inline uint lowest_bit(uint bits)
 {
     return 31 - clz(bits & -bits);
@@ -293,7 +295,8 @@ static inline real real_of_lane(const real *lanes, uint lane)
     return (real)(((const scalar *)lanes)[lane]);
 }
 
-// One instruction each, unlike fmin and fmax: if either operand is NaN, the second one is returned.
+// Return the smaller and the larger operand, in one instruction each, unlike fmin and fmax. If either operand
+// is NaN, the second one is returned.
 static inline real real_min(real a, real b)
 {
     return lanes_select(a < b, a, b);
@@ -304,7 +307,8 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
-// Eight vectors, and then the smallest lane of each: lane_minima_reduce turns `all` into `each`.
+// Eight vectors, and then the smallest lane of each, which lane_minima_reduce computes from `all` into
+// `each`.
 enum { MINIMA_COUNT = 8 };
 typedef union {
     real all[MINIMA_COUNT];
@@ -319,7 +323,7 @@ static inline real real_min_of_pairs(real a, real b)
 #endif
 
 #if LANES > 1
-// The smallest lane of each of LANES vectors, a lane per vector.
+// Returns the smallest lane of each of LANES vectors, one lane per vector.
 static inline real lanes_smallest_of_each(const real *vectors)
 {
     real smallest[LANES];
@@ -332,8 +336,8 @@ static inline real lanes_smallest_of_each(const real *vectors)
 }
 #endif
 
-// Comparing lanes in pairs packs two vectors into one, so that all eight take little longer than one.
-// Unrolled, so that they stay in registers.
+// Replaces eight vectors by their smallest lanes. Comparing lanes in pairs packs two vectors into one, so
+// that all eight take little longer than one. Unrolled, so that they stay in registers.
 static inline void lane_minima_reduce(LaneMinima *leasts)
 {
 #if LANES > 1
@@ -351,7 +355,7 @@ static inline void lane_minima_reduce(LaneMinima *leasts)
 #endif
 }
 
-// The largest of the lanes in `members`; -LARGEST if there are none.
+// Returns the largest of the lanes in `members`, or -LARGEST if there are none.
 static inline scalar lanes_largest(mask members, real a)
 {
     // as integers the bits of negative reals order in reverse
@@ -361,7 +365,7 @@ static inline scalar lanes_largest(mask members, real a)
     return -scalar_from_bits(least ^ ((least >> sign) & INTEGER_MAX));
 }
 
-// Prefetches memory that will soon be read, by cache line. PoCL's own prefetch does nothing.
+// Prefetches memory that will soon be read, by cache line. PoCL's prefetch does nothing.
 static inline void memory_prefetch(global const char *from, uint size)
 {
 #if IS_CPU_CLANG

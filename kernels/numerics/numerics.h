@@ -10,12 +10,12 @@
 // Intersections use compensated forms, in pairs.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
 
-// Correct rounding on devices whose division and square root are inexact (REPAIRS_DIVIDE, at `strict`, in
-// floats): computed from the operands' mantissas alone, so that nothing overflows or underflows, brought
-// within an ulp by a Newton step, then chosen among three neighbors by exact comparisons. A Newton step alone
-// does not suffice: the root of 1 - 2^-24 lies 2^-27 ulp from the midpoint of two floats.
+// Rounds quotients and roots correctly on devices whose division and square root are inexact (REPAIRS_DIVIDE,
+// at `strict`, in floats). They are computed from the operands' mantissas alone, so that nothing overflows or
+// underflows, brought within an ulp by a Newton step, then chosen among three neighbors by exact comparisons.
+// A Newton step alone does not suffice: the root of 1 - 2^-24 lies 2^-27 ulp from the midpoint of two floats.
 //
-// For floats alone: FLOAT_… and float_… know their bit patterns.
+// Only for floats, whose bit patterns FLOAT_… and float_… know.
 #define FLOAT_EXPONENT_BITS ((integer)(0x7f800000))
 #define FLOAT_SIGN_BIT      ((integer)(~0x7fffffff))
 #define FLOAT_BITS_OF_ONE   ((integer)(0x3f800000))
@@ -30,7 +30,7 @@ static inline real float_power_of_two(integer exponent)
     return real_from_bits(FLOAT_BITS_OF_ONE + (exponent << 23));
 }
 
-// The neighbors of a > 0.
+// Return the neighbors of a > 0.
 static inline real float_above(real a)
 {
     return real_from_bits(bits_from_real(a) + (integer)(1));
@@ -41,8 +41,8 @@ static inline real float_below(real a)
     return real_from_bits(bits_from_real(a) - (integer)(1));
 }
 
-// The remainder of a quotient within an ulp is exact, and so is its comparison with half the gap to a
-// neighbor.
+// Returns the correctly rounded quotient. The remainder of a quotient within an ulp is exact, and so is its
+// comparison with half the gap to a neighbor.
 static inline real repaired_quotient(real a, real b)
 {
     integer a_bits = bits_from_real(a), b_bits = bits_from_real(b);
@@ -61,9 +61,9 @@ static inline real repaired_quotient(real a, real b)
     return quotient * float_power_of_two(half_exponent) * float_power_of_two(exponent - half_exponent);
 }
 
-// By Tuckerman's test: root (root - ulp) < a <= root (root + ulp) (Agarwal, Cooley, Gustavson, Shearer,
-// Slishman, Tuckerman, New scalar and vector elementary functions for the IBM System/370, IBM Journal of
-// Research and Development 30(2), 1986).
+// Returns the correctly rounded root by Tuckerman's test, root (root - ulp) < a <= root (root + ulp)
+// (Agarwal, Cooley, Gustavson, Shearer, Slishman, Tuckerman, New scalar and vector elementary functions for
+// the IBM System/370, IBM Journal of Research and Development 30(2), 1986).
 static inline real repaired_root(real a)
 {
     integer half_exponent = (bits_from_real(a) - FLOAT_BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
@@ -75,7 +75,7 @@ static inline real repaired_root(real a)
     return lanes_select(rises, up, lanes_select(falls, down, root)) * float_power_of_two(half_exponent);
 }
 
-// Correctly rounded at `strict` on every device, except for subnormal numbers.
+// Returns a / b, correctly rounded at `strict` on every device, except for subnormal numbers.
 static inline real real_divide(real a, real b)
 {
     real quotient = device_divide(a, b);
@@ -84,8 +84,9 @@ static inline real real_divide(real a, real b)
     return lanes_select(ordinary, repaired_quotient(a, b), quotient);
 }
 
-// 1 / a within 2.5 ulp, as devices may divide, for tests with slack; a is finite, a and the result are
-// normal. On AVX-512 an estimate of 14 bits and a Newton step, a third of the time of a division.
+// Returns 1 / a within 2.5 ulp, as devices may divide, for tests with slack. a must be finite, and a and the
+// result normal. On AVX-512 it is an estimate of 14 bits and a Newton step, which take a third of the time of
+// a division.
 static inline real reciprocal_estimate(real a)
 {
 #if defined(RECIPROCAL_14_BITS)
@@ -97,7 +98,7 @@ static inline real reciprocal_estimate(real a)
     return device_divide((real)(1), a);
 }
 
-// 1 / sqrt(a) within 2^-14 and a few u of itself; a and the result are normal.
+// Returns 1 / sqrt(a) with a relative error of at most 2^-14 plus a few u. a and the result must be normal.
 static inline real inverse_root_estimate(real a)
 {
 #if defined(INVERSE_ROOT_14_BITS)
@@ -106,15 +107,15 @@ static inline real inverse_root_estimate(real a)
     return device_divide((real)(1), device_sqrt(a));
 }
 
-// Whether |a / b| < 1 / SMALLEST_RATIO, without dividing. Scales b: of the height of a shadow ray's start
-// above its own plane the product with SMALLEST_RATIO is subnormal, which costs x86 processors more than a
-// hundred cycles.
+// Returns whether |a / b| < 1 / SMALLEST_RATIO, without dividing. Scales b, because the product of
+// SMALLEST_RATIO with the height of a shadow ray's start above the plane it leaves is subnormal, which costs
+// x86 processors more than a hundred cycles.
 static inline mask quotient_is_bounded(real a, real b)
 {
     return fabs(a) < fabs(b) * (real)(1 / SMALLEST_RATIO);
 }
 
-// Correctly rounded at `strict`, as real_divide; 0 for 0. a >= 0.
+// Returns the square root of a >= 0, correctly rounded at `strict` on every device; 0 for 0.
 static inline real real_sqrt(real a)
 {
     real root = device_sqrt(a);
@@ -122,7 +123,7 @@ static inline real real_sqrt(real a)
     return lanes_select(float_is_normal(a), repaired_root(a), root);
 }
 
-// The reciprocal of the largest power of two <= a, for a > 0; huge for 0.
+// Returns the reciprocal of the largest power of two <= a, for a > 0, and a huge number for 0.
 static inline real real_inverse_power_of_two(real a)
 {
 #if IS_DOUBLE
@@ -133,8 +134,8 @@ static inline real real_inverse_power_of_two(real a)
 #endif
 }
 
-// a b - c d within 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of Kahan's
-// algorithm for the accurate computation of 2x2 determinants, Math. Comp. 82, 2013).
+// Returns a b - c d within 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of
+// Kahan's algorithm for the accurate computation of 2x2 determinants, Math. Comp. 82, 2013).
 static inline real difference_of_products(real a, real b, real c, real d)
 {
     real cd = c * d;
@@ -150,7 +151,7 @@ static inline Pair pair_of(real value)
     return (Pair){value, (real)(0)};
 }
 
-// a + b without error, for |larger| >= |smaller| or larger = 0.
+// Returns a + b without error, for |larger| >= |smaller| or larger = 0.
 static inline Pair fast_two_sum(real larger, real smaller)
 {
     real sum = larger + smaller;
@@ -187,15 +188,15 @@ static inline Pair pair_scale(Pair a, real factor)
     return fast_two_sum(product.high, real_fma(a.low, factor, product.low));
 }
 
-// a b - c d in pairs.
+// Returns a b - c d in pairs.
 static inline Pair pair_difference_of_products(Pair a, Pair b, Pair c, Pair d)
 {
     return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
 }
 
-// ln(1 - s) for 0 <= s < 1: -2 artanh(s / (2 - s)) after extracting the power of two, by its Taylor series
-// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). Small s keep all bits, which 1 - s would
-// lose.
+// Returns ln(1 - s) for 0 <= s < 1 as -2 artanh(s / (2 - s)) after extracting the power of two, by its Taylor
+// series (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). Small s keep all bits, which 1 - s
+// would lose.
 static inline real real_log_complement(real s)
 {
     real rest = (real)(1) - s;
@@ -234,8 +235,8 @@ static inline real real_log_complement(real s)
 #define EXP_LOWEST (-87.0f)
 #endif
 
-// e^x for x <= 0: 2^k times the Taylor series of the remainder, at most ln(2)/2 (Abramowitz, Stegun, 4.2.1).
-// 0 where the result would be subnormal.
+// Returns e^x for x <= 0: 2^k times the Taylor series of the remainder, at most ln(2)/2 (Abramowitz, Stegun,
+// 4.2.1). Returns 0 if the result would be subnormal.
 static inline real real_exp_negative(real x)
 {
 #if IS_DOUBLE
@@ -267,14 +268,14 @@ static inline real real_exp_negative(real x)
     return lanes_select(x < lowest, (real)(0), series * power);
 }
 
-// (1 - s)^n for 0 <= s < 1, n >= 0; at most 1.
+// Returns (1 - s)^n for 0 <= s < 1 and n >= 0; at most 1.
 static inline real real_complement_power(real s, real n)
 {
     real power = perturbed_power(real_exp_negative(n * real_log_complement(s)), s, n);
     return real_min(power, (real)(1));
 }
 
-// Where (1 - s)^n, at most e^(-n s), may be above 0.
+// Returns the lanes where (1 - s)^n, at most e^(-n s), may be above 0.
 static inline mask real_complement_power_is_nonzero(real s, real n)
 {
     return (s < (real)(1)) & (n * s < (real)(1 - EXP_LOWEST));

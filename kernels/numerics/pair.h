@@ -1,24 +1,24 @@
-// Sums and products without error, and real_fma: a b + c, rounded once.
+// Computes sums and products without error, and real_fma: a b + c, rounded once.
 //
-// A device that emulates fma does it with integers, at several times the operations; inlined in hundreds of
-// places that is more than some compilers finish. There real_fma adds the two parts of the product to c
+// A device that emulates fma does so with integers, in several times the operations. Inlined in hundreds of
+// places, that is more than some compilers finish. There real_fma adds the two parts of the product to c
 // without error and rounds the sum once, after rounding the remainder to odd (Boldo, Melquiond, Emulation of
 // a FMA and correctly rounded sums: proved algorithms using rounding to odd, IEEE Transactions on Computers
 // 57(4), 2008; here operands are split between bits, which never overflows). Its bits differ from fma's only
-// where the product or the sum is within a few ulp of the largest real or beyond it, or the product is below
-// 2^-102, so that its low part is subnormal; below some 2^-80 on a device that flushes subnormals.
+// where the product or the sum is within a few ulp of the largest real or beyond it, or where the product is
+// below 2^-102, so that its low part is subnormal (on a device that flushes subnormals, below about 2^-80).
 #ifndef PAIR_H
 #define PAIR_H
 
 #include "numerics/lanes.h"
 
-// A double-word (double-double) number: the unevaluated sum high + low, |low| at most half an ulp of high,
-// about 2 x 24 or 2 x 53 bits.
+// A double-word (double-double) number: the unevaluated sum high + low, with |low| at most half an ulp of
+// high, about 2 x 24 or 2 x 53 bits.
 typedef struct {
     real high, low;
 } Pair;
 
-// a + b without error (Knuth, The Art of Computer Programming 2, 4.2.2, theorem B).
+// Returns a + b without error (Knuth, The Art of Computer Programming 2, 4.2.2, theorem B).
 static inline Pair two_sum(real a, real b)
 {
     real sum = a + b;
@@ -51,7 +51,8 @@ static inline Pair two_product(real a, real b)
     return (Pair){product, a_low * b_low - missing};
 }
 
-// high + low rounded to odd: if low is not 0, the one of the two reals around the sum whose last bit is 1.
+// Returns high + low rounded to odd: if low is not 0, the one of the two reals around the sum whose last bit
+// is 1.
 static inline real pair_round_to_odd(Pair sum)
 {
     integer bits = bits_from_real(sum.high);

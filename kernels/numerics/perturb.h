@@ -1,10 +1,10 @@
-// The operations whose results differ between devices, and simulated errors: division and square root are
-// called only here. PERTURB adds to each result the error that the OpenCL C
-// specification permits (3.0, Relative Error as ULPs), times PERTURB_SCALE.
+// Contains the operations whose results differ between devices, and simulates their errors. Division and
+// square root are called only here. PERTURB adds to each result the error that the OpenCL C specification
+// permits (3.0, Relative Error as ULPs), times PERTURB_SCALE.
 //
 // The error is a hash of PERTURB_SEED, the operation and its operands alone, so that equal operations err
-// equally in all work-items. Of the operands of division and root only the mantissas count, from whose tables
-// devices start: signs and powers of two change only those of the result.
+// equally in all work-items. Only the mantissas of the operands of division and root count, since devices
+// start from tables of mantissas. Signs and powers of two change only those of the result.
 #ifndef PERTURB_H
 #define PERTURB_H
 
@@ -22,7 +22,7 @@
 
 enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_COUNT };
 
-// In ulp, in addition to the device's own rounding.
+// The largest errors in ulp, in addition to the device's rounding.
 enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16 };
 
 static inline unsigned_integer perturb_hash(uint operation, integer a, integer b)
@@ -33,14 +33,15 @@ static inline unsigned_integer perturb_hash(uint operation, integer a, integer b
     return (hash ^ (hash >> HALF_WORD)) * HASH_MULTIPLIER;
 }
 
-// From -largest to largest.
+// Returns a hashed number from -largest to largest.
 static inline integer perturb_steps(unsigned_integer hash, uint largest)
 {
     return integer_from_unsigned(mul_hi(hash, (unsigned_integer)(2 * largest + 1))) -
            (integer)((scalar_integer)largest);
 }
 
-// Moves the value by a hashed number of ulp, up to `largest`. 0 and values near underflow or overflow stay.
+// Moves the value by a hashed number of ulp, up to `largest`. Does not change 0 and values near underflow or
+// overflow.
 static inline real perturb(real value, unsigned_integer hash, uint largest)
 {
     integer steps = perturb_steps(hash, largest * PERTURB_SCALE);
@@ -66,7 +67,7 @@ static inline real device_sqrt(real a)
     return perturb(root, perturb_hash(PERTURBED_SQRT, operand, (integer)(0)), SQRT_ERROR);
 }
 
-// Of one number for all lanes.
+// Divides numbers that are the same for all lanes.
 static inline scalar uniform_divide(scalar a, scalar b)
 {
     if (!PERTURB) return a / b;
@@ -81,8 +82,8 @@ static inline scalar uniform_sqrt(scalar a)
     return root.each[0];
 }
 
-// Gives (1 - complement)^exponent, which kernels compute themselves, the error of a device's own power
-// function. Not at `strict`, whose bits are the same on every device.
+// Adds to (1 - complement)^exponent, which kernels compute themselves, the error of a device's power
+// function. Not called at `strict`, whose bits are the same on every device.
 static inline real perturbed_power(real power, real complement, real exponent)
 {
     if (!PERTURB || IS_STRICT) return power;

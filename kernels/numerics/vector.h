@@ -1,4 +1,4 @@
-// Vectors with one value per lane. dot and cross are written out: the built-in ones may be off by any
+// Vectors with one value per lane. dot and cross are written out, because the built-in ones may have any
 // relative error (The OpenCL C Specification 3.0, Relative Error as ULPs).
 #ifndef VECTOR_H
 #define VECTOR_H
@@ -51,8 +51,8 @@ static inline real vector_dot(Vector a, Vector b)
     return real_fma(a.x, b.x, real_fma(a.y, b.y, a.z * b.z));
 }
 
-// The dot product as if in twice the precision (Ogita, Rump, Oishi, Accurate sum and dot product, SIAM J.
-// Sci. Comput. 26(6), 2005, algorithm 5.3).
+// Returns the dot product as if in twice the precision (Ogita, Rump, Oishi, Accurate sum and dot product,
+// SIAM J. Sci. Comput. 26(6), 2005, algorithm 5.3).
 static inline real vector_dot_compensated(Vector a, Vector b)
 {
     Pair x = two_product(a.x, b.x), y = two_product(a.y, b.y), z = two_product(a.z, b.z);
@@ -60,7 +60,7 @@ static inline real vector_dot_compensated(Vector a, Vector b)
     return three.high + (((x.low + y.low) + z.low) + (two.low + three.low));
 }
 
-// Each component within 1.5 ulp.
+// Returns a x b, each component within 1.5 ulp.
 static inline Vector vector_cross(Vector a, Vector b)
 {
     return (Vector){difference_of_products(a.y, b.z, a.z, b.y), difference_of_products(a.z, b.x, a.x, b.z),
@@ -72,7 +72,7 @@ static inline real vector_norm(Vector a)
     return real_sqrt(vector_dot(a, a));
 }
 
-// Unit within 2.5 u. The zero vector stays zero.
+// Returns the unit vector within 2.5 u. The zero vector stays zero.
 static inline Vector vector_normalize(Vector a)
 {
     real norm = vector_norm(a);
@@ -80,21 +80,21 @@ static inline Vector vector_normalize(Vector a)
     return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), norm)));
 }
 
-// The same for a vector that is unit within a rounding e: a Newton step, whose error is e^2.
+// Normalizes a vector that is a unit vector except for a rounding e, by a Newton step, whose error is e^2.
 static inline Vector vector_renormalize(Vector a)
 {
     if (IS_COMPENSATED) return vector_normalize(a);
     return vector_scale(a, real_fma((real)(-0.5f), vector_dot(a, a), (real)(1.5f)));
 }
 
-// The 1-norm |x| + |y| + |z|: error bounds are proportional to it.
+// Returns the 1-norm |x| + |y| + |z|, to which error bounds are proportional.
 static inline real vector_norm1(Vector a)
 {
     return fabs(a.x) + fabs(a.y) + fabs(a.z);
 }
 
-// The 1-norm of the components along a unit normal: how far errors proportional to coordinates move a point
-// off a surface. Errors along the surface do not.
+// Returns the 1-norm of the components along a unit normal, which is how far errors proportional to
+// coordinates move a point off a surface. Errors along the surface do not.
 static inline real vector_norm1_along(Vector unit, Vector a)
 {
     return real_fma(fabs(unit.x), fabs(a.x), real_fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
@@ -138,8 +138,8 @@ static inline Vector pair_vector_high(PairVector a)
     return (Vector){a.x.high, a.y.high, a.z.high};
 }
 
-// a . b rounded about once, in a third of the operations of pairs: vector_dot_compensated of the high parts,
-// plus the low parts' product among the errors it sums.
+// Returns a . b rounded about once, in a third of the operations of pairs: vector_dot_compensated of the high
+// parts, plus the low parts' product among the errors that it sums.
 static inline real pair_vector_dot_once(PairVector a, Vector b)
 {
     Pair x = two_product(a.x.high, b.x), y = two_product(a.y.high, b.y), z = two_product(a.z.high, b.z);
@@ -148,7 +148,7 @@ static inline real pair_vector_dot_once(PairVector a, Vector b)
     return three.high + ((((x.low + y.low) + z.low) + (two.low + three.low)) + low);
 }
 
-// a x b, each component within 2 ulp.
+// Returns a x b, each component within 2 ulp.
 static inline Vector pair_vector_cross_once(PairVector a, Vector b)
 {
     Vector high = vector_cross(pair_vector_high(a), b);

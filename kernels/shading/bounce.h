@@ -1,17 +1,17 @@
-// Reflected and refracted rays (Whitted, An improved illumination model for shaded display,
-// CACM 23(6), 1980), without recursion.
+// Traces reflected and refracted rays without recursion (Whitted, An improved illumination model for shaded
+// display, CACM 23(6), 1980).
 #ifndef BOUNCE_H
 #define BOUNCE_H
 
 #include "shading/surface.h"
 
-// A ray to trace, and the weight of its color in the pixel. A weight of 0 is no ray.
+// A ray to trace, and the weight of its color in the pixel. A weight of 0 means that there is no ray.
 typedef struct {
     Vector origin, direction; // unit
     Color3 weight;
     uint depth;
     real travelled; // distance from the eye along the path
-    // at `certified`: as of a Ray
+    // At `certified`, the errors as in a Ray:
     real origin_error, start_error, direction_error;
     integer left;
     mask leaves_outward;
@@ -47,10 +47,10 @@ static inline Vector vector_reflect(Vector direction, Vector normal)
     return vector_renormalize(vector_fma(normal, (real)(-2) * away, direction));
 }
 
-// Snell's law for a unit direction and a unit normal that faces it; returns the lanes of total internal
-// reflection. With k = (n - 1)(n + 1) and the cosine c the ray into a body of index n runs along
-// d + N (c - sqrt(c^2 + k)), the ray out of it along n d + N (n c - sqrt((n c)^2 - k)). In this form grazing
-// rays survive where n is near 1, and n = 1 bends nothing however inexact a device's division is.
+// Refracts a unit direction by Snell's law at a unit normal that faces it. Returns the lanes of total
+// internal reflection. With k = (n - 1)(n + 1) and the cosine c, the ray into a body of index n runs along d
+// + N (c - sqrt(c^2 + k)), and the ray out of it along n d + N (n c - sqrt((n c)^2 - k)). In this form
+// grazing rays survive if n is near 1, and n = 1 bends nothing however inexact a device's division is.
 static inline mask vector_refract(Vector direction, Vector normal, mask entering, real ior, Vector *refracted)
 {
     real scale = lanes_select(entering, (real)(1), ior);
@@ -63,7 +63,8 @@ static inline mask vector_refract(Vector direction, Vector normal, mask entering
     return total;
 }
 
-// By the shading normal, or by the geometric one where that would send the ray through the surface.
+// Reflects a direction at the shading normal, or at the geometric one if the former would send the ray
+// through the surface.
 static inline Vector surface_reflect(const Surface *surface, Vector direction)
 {
     Vector reflected = vector_reflect(direction, surface->shading_normal);
@@ -72,7 +73,8 @@ static inline Vector surface_reflect(const Surface *surface, Vector direction)
     return vector_select(inward, vector_reflect(direction, surface->normal), reflected);
 }
 
-// Likewise; returns the lanes of total internal reflection.
+// Refracts a direction at the shading normal, or at the geometric one if the former would keep the ray on its
+// side. Returns the lanes of total internal reflection.
 static inline mask surface_refract(const Surface *surface, Vector direction, Vector *refracted)
 {
     mask total =
@@ -86,9 +88,9 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
     return lanes_select(outward, plain_total, total);
 }
 
-// The largest error of a bounced ray's direction that is still traced.
+// The largest error of a bounced ray's direction with which it is still traced.
 #define BOUNCE_ERROR_MAX ((real)(0x1p-6f))
-// Of a bounced ray's direction and of what it is made of, in parts of them.
+// The relative rounding error of a bounced ray's direction and of its terms.
 #define BOUNCE_ROUNDING ((real)(32 * UNIT_ROUNDOFF))
 
 static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask inside)
@@ -99,11 +101,11 @@ static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask ins
     bounce->direction_error = lanes_select(inside, error, bounce->direction_error);
 }
 
-// How a ray meets a surface.
+// How a ray hits a surface.
 typedef struct {
     mask found;
-    real turn;                // error of its direction
-    real cosine, angle_error; // of the angle of incidence
+    real turn;                // the error of its direction
+    real cosine, angle_error; // the cosine of the angle of incidence, and the angle's error
 } Incidence;
 
 static inline Incidence surface_incidence(const Surface *surface, const Ray *ray)
@@ -114,7 +116,8 @@ static inline Incidence surface_incidence(const Surface *surface, const Ray *ray
                        real_fma(turn, normal_error, turn + normal_error)};
 }
 
-// d - 2 (d . N) N is off by the error of d and twice that of N. Returns the lanes in doubt.
+// Sets the error of a reflected ray. d - 2 (d . N) N is off by the error of d and twice that of N. Returns
+// the uncertain lanes.
 static inline mask reflected_set_error(const Surface *surface, const Ray *ray, const Incidence *incidence,
                                        Bounce *reflected)
 {
@@ -137,7 +140,8 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
     return doubt | (reflects & (outward <= error + normal_error));
 }
 
-// Of vector_refract: n d + N (s - sqrt(s^2 - k)), s being n cos, on entering as if n were 1 and -k for k.
+// The terms of vector_refract: n d + N (s - sqrt(s^2 - k)) with s = n cos. On entering, n counts as 1 and k
+// as -k.
 typedef struct {
     real scale; // n
     real s, s_error;
@@ -165,7 +169,8 @@ static inline Snell surface_snell(const Surface *surface, const Incidence *incid
     return snell;
 }
 
-// The refracted ray along a chord, or out of a sphere after one. `computed`: the error of computing it.
+// Sets the errors of a refracted ray that runs along a chord, or leaves a sphere after one. `computed` is the
+// error of computing it.
 static inline void refracted_set_chord(const Surface *surface, const Snell *snell, real angle_error,
                                        real computed, Bounce *refracted)
 {
@@ -182,8 +187,8 @@ static inline void refracted_set_chord(const Surface *surface, const Snell *snel
                                               real_min(leaving, refracted->direction_error));
 }
 
-// n d + N (s - sqrt(s^2 - k)) is off by the errors of d and N and by what the difference changes with s.
-// Returns the lanes in doubt.
+// Sets the error of a refracted ray. n d + N (s - sqrt(s^2 - k)) is off by the errors of d and N and by the
+// change of the difference with s. Returns the uncertain lanes.
 static inline mask refracted_set_error(const Surface *surface, const Incidence *incidence, mask total,
                                        Bounce *refracted)
 {
@@ -198,8 +203,9 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     // s - sqrt(s^2 - k) changes most where s is least
     real least = real_max(snell.s - snell.s_error, (real)(0));
     real change = real_divide(real_max(fabs(least - snell.least_root), snell.root - least), snell.least_root);
-    // Over the length before it is made unit: n on entering, 1 on leaving. A vector that is off by e of its
-    // length is off by at most e / (1 - e) as a unit vector, e being 2^-6 or in doubt.
+    // Relative to the length before it is made a unit vector: n on entering, 1 on leaving. A vector that is
+    // off by e of its length is off by at most e / (1 - e) as a unit vector, with e at most 2^-6 unless it is
+    // uncertain.
     real inverse_length = real_divide((real)(1.02f), lanes_select(surface->entering, surface->ior, one));
     real roundings = snell.scale + snell.s + snell.root + real_divide(snell.squares, snell.least_root);
     real computed = real_fma(BOUNCE_ROUNDING * roundings, inverse_length, BOUNCE_ROUNDING);
@@ -214,7 +220,7 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     return doubt | (refracts & (inward <= refracted->direction_error + normal_error));
 }
 
-// The bounds of a surface's reflected and refracted ray. Lanes in doubt are not traced further.
+// Sets the bounds of a surface's reflected and refracted ray. Uncertain lanes are not traced further.
 static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
                                       Bounce *refracted, mask *doubt)
 {
@@ -234,7 +240,8 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     refracted->weight = vector_select(*doubt, none, refracted->weight);
 }
 
-// A part of the weight, which no product rounds to 0: paths end where nothing reflects or transmits.
+// Returns a part of the weight, which no product rounds to 0, since paths must end only where nothing
+// reflects or transmits.
 static inline Color3 weight_part(Color3 weight, real part)
 {
     const real zero = (real)(0);
@@ -243,9 +250,9 @@ static inline Color3 weight_part(Color3 weight, real part)
     return (Color3){real_max(product.x, least), real_max(product.y, least), real_max(product.z, least)};
 }
 
-// The reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of total
-// internal reflection, whose reflected ray carries the transmission as well. Unless `all`, a ray that no lane
-// carries is not set.
+// Computes the reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of
+// total internal reflection, whose reflected ray carries the transmission in addition. Unless `all`, a ray
+// that no lane carries is not set.
 static inline mask surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
                                   Bounce *reflected, Bounce *refracted)
 {

@@ -1,26 +1,27 @@
-// Bounds of rays inside a sphere, at `certified`. A ray that is reflected there runs along chords of one
-// great circle, all of one angle of incidence, so that errors grow by addition. Bounds of place and direction
-// alone, which are correlated, would multiply with every chord. docs/numerics.md derives what is here.
+// Bounds rays inside a sphere, at `certified`. A ray that is reflected there runs along chords of one great
+// circle, all with the same angle of incidence, so that errors grow by addition. Bounds of place and
+// direction alone, which are correlated, would multiply with every chord. docs/numerics.md has the
+// derivation.
 //
-// Rotate the computed path about the center so that it starts at the exact one's point: that moves no point
-// by more than `place`. What is left is an angle between the first chords, at most `turn`, by which the
+// Rotate the computed path about the center so that it starts at the exact path's point. That moves no point
+// by more than `place`. The remainder is an angle between the first chords, at most `turn`, by which the
 // points at their ends move at most twice the radius times.
 #ifndef CHORDS_H
 #define CHORDS_H
 
 #include "shapes/sphere.h"
 
-// At a point of a sphere.
+// The bounds at a point of a sphere.
 typedef struct {
-    real radius;      // 0: no sphere, or too near to its tangent
-    real off;         // over the cosine of incidence: how far along the ray the sphere is, at most
-    real normal;      // error of the normal, for the place where the computed ray meets the sphere
-    real place, turn; // of the chord that ends there; NEVER where none does
+    real radius;      // 0 if there is no sphere, or the ray is too near to its tangent
+    real off;         // over the cosine of incidence, the largest distance to the sphere along the ray
+    real normal;      // error of the normal, for the place where the computed ray hits the sphere
+    real place, turn; // bounds of the chord that ends there; NEVER if none does
 } ChordEnd;
 
-// The bounds of the chord that a ray starts; NEVER where it starts none.
+// The bounds of the chord that a ray starts; NEVER if it starts none.
 typedef struct {
-    real turn, end_place; // end_place: of the point where it ends, but for what is computed there
+    real turn, end_place; // end_place bounds the point where it ends, except for errors computed there
     real direction_error;
 } Chord;
 
@@ -31,16 +32,16 @@ static inline ChordEnd chord_end_none(void)
 
 // Above this share of the radius times the cosine of incidence a ray is too near to the sphere's tangent.
 #define CHORD_MOVE_MAX ((real)(0x1p-4f))
-// With c the cosine of incidence, a point whose distance from a sphere of radius r is e has it at s along the
-// ray, s (2 c r - s) <= e (2 r + e). With s <= c r / 16, hence e <= r / 16, s is at most e / c times
-// (1 + 1/32) / (1 - 1/32), and its angle at the center s / r times 1 + 1/32: 1.1 in all, and a cosine that
-// decides is within 2 %.
+// With c the cosine of incidence, a point whose distance from a sphere of radius r is e has the sphere at s
+// along the ray, with s (2 c r - s) <= e (2 r + e). With s <= c r / 16, hence e <= r / 16, s is at most e / c
+// times (1 + 1/32) / (1 - 1/32), and its angle at the center is s / r times 1 + 1/32. The product of the
+// factors is 1.1, and a cosine that decides is within 2 %.
 #define CHORD_OFF_FACTOR ((real)(1.125f))
-// The largest error of a chord's direction that bounds are for. An angle exceeds its sine by less than 0.0001
-// of it there, and the sine's square moves by no more.
+// The largest error of a chord's direction to which the bounds apply. There an angle exceeds its sine by less
+// than 0.0001 of it, and the sine's square moves by no more.
 #define CHORD_TURN_MAX ((real)(0x1p-6f))
 
-// Where rays hit a sphere at `point`, in `lanes`.
+// Returns the bounds where rays hit a sphere at `point`, in `lanes`.
 static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit *hit, Vector point,
                                  mask lanes)
 {
@@ -72,22 +73,22 @@ static inline ChordEnd chord_end_select(mask condition, ChordEnd yes, ChordEnd n
         lanes_select(condition, yes.turn, no.turn)};
 }
 
-// A chord from there, at the inner angle of incidence with this cosine. Its direction is off, seen from the
-// normal, by the end's turn and by `turned`, or, where no chord ended, by `turned_first`.
+// Returns the chord that starts there, at the inner angle of incidence with this cosine. Its direction is
+// off, seen from the normal, by the end's turn and by `turned`, or by `turned_first` if no chord ended there.
 static inline Chord chord_start(const ChordEnd *end, real place_error, real cosine, real turned,
                                 real turned_first)
 {
     real moved = divide_or(end->off, cosine, NEVER);
     mask continues = end->turn < NEVER;
     real sine_squared = real_min((real)(1) + CHORD_TURN_MAX - cosine * cosine, (real)(1));
-    // asin(s) / s, what an angle across the plane of incidence is unrolled to: convex in s squared, from 1 to
-    // pi / 2
+    // asin(s) / s, to which an angle across the plane of incidence is unrolled, is convex in s squared, from
+    // 1 to pi / 2
     real unrolled = real_fma((real)(0.571f), sine_squared, (real)(1.0001f));
     real inverse = real_divide((real)(1), lanes_select(end->radius > (real)(0), end->radius, (real)(1)));
     real added = unrolled * (lanes_select(continues, turned, turned_first) + moved * inverse);
     real turn = lanes_select(continues, end->turn, (real)(0)) + added,
          place = lanes_select(continues, end->place, place_error) + moved;
-    // roundings of these sums are below u of the radius; the ends' own bounds have more to spare
+    // roundings of these sums are below u of the radius; the ends' own bounds have more slack
     real end_place = real_fma((real)(2) * end->radius, turn, place);
     mask usable = (end->radius > (real)(0)) & (moved <= CHORD_MOVE_MAX * cosine * end->radius) &
                   (turn <= CHORD_TURN_MAX);

@@ -1,4 +1,4 @@
-// The surface at a hit, as shading needs it: position, normals, material.
+// Computes the surface at a hit as shading needs it: position, normals, material.
 #ifndef SURFACE_H
 #define SURFACE_H
 
@@ -19,26 +19,27 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
                     real_fma(weight.z, color.z, sum.z)};
 }
 
-// Members that only reflection, transmission or images need are not set without them. Of an explicit ray,
+// Members that only reflection, transmission or images need are set only with them. For an explicit ray,
 // whose direction may have any length, colors and `travelled` are not used.
 typedef struct {
-    integer object; // its id; -1: nothing hit
+    integer object; // its id; -1 if nothing is hit
     Vector position;
     Vector normal;         // geometric, unit, facing the ray; only with triangles: surface_normal
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
     real error;            // bound on the position's distance from the true surface
     real refracted_offset; // how far behind the surface a refracted ray starts
-    Color3 ambient;        // what it reflects of the ambient light
-    Color3 diffuse;        // and, as a factor, of a light that it faces
+    Color3 ambient;        // the ambient light that it reflects
+    Color3 diffuse;        // the factor by which it reflects a light that it faces
     real specular, shininess;
     real reflection, transmission, ior;
     mask entering;  // the ray runs into the solid, against its outward normal
     real travelled; // distance from the eye along the path
-    // At `certified`: bounds on the distance of the position from the exact one and of the shading normal
-    // and, with HAS_TRIANGLES, of the geometric normal from the exact ones, and of to_eye; what is in doubt.
+    // At `certified`, bounds on the distance of the position from the exact one; on that of the shading
+    // normal and, with HAS_TRIANGLES, of the geometric normal from the exact ones; on that of to_eye; and the
+    // uncertain lanes.
     real place_error, normal_error, geometric_error, eye_error;
-    real line_error, start_error; // origin_error and -tmin of a reflected ray
+    real line_error, start_error; // a reflected ray's origin_error and -tmin
     mask doubt;
     ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
@@ -48,7 +49,7 @@ static inline mask surface_found(const Surface *surface)
     return surface->object >= (integer)(0);
 }
 
-// The geometric normal, facing the ray.
+// Returns the geometric normal, facing the ray.
 static inline Vector surface_normal(const Surface *surface)
 {
     return HAS_TRIANGLES ? surface->normal : surface->shading_normal;
@@ -67,7 +68,7 @@ static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, ui
 }
 
 #if IS_CERTIFIED
-// Sets the errors of a point that a shape gives; returns the lanes that may be at an edge.
+// Sets the errors of a point that a shape returned. Returns the lanes that may be at an edge.
 static inline mask shape_set_errors(const Scene *scene, uint kind, uint index, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {
@@ -85,10 +86,10 @@ static inline mask shape_set_errors(const Scene *scene, uint kind, uint index, c
 typedef struct {
     mask lanes;
     SurfacePoint point;
-    TextureCoordinates coordinates; // of triangles only
+    TextureCoordinates coordinates; // only for triangles
 } LaneSurfacePoints;
 
-// Where rays hit a sphere.
+// Sets the chord's end where rays hit a sphere.
 static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere, const Ray *ray,
                                          const Hit *hit, const LaneSurfacePoints *found)
 {
@@ -101,8 +102,9 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
 // Marks lanes that are done: larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
 
-// The triangles of one material among the objects hit. In a fine mesh each lane hits one of its own: vertices
-// are gathered triangle by triangle, then evaluated for all lanes at once.
+// Returns the surface points of the triangles of one material among the objects hit. In a fine mesh each lane
+// hits a different triangle, so vertices are gathered triangle by triangle, then evaluated for all lanes at
+// once.
 static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
                                                              uint material, const Ray *ray, real t)
 {
@@ -150,8 +152,8 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     return hit;
 }
 
-// How far a hit's position may be from the exact one: across the ray by the ray's error, along it by t's, and
-// by the roundings of ray_point, with the shapes' own.
+// Bounds how far a hit's position may be from the exact one: across the ray by the ray's error, along it by
+// that of t, and by the roundings of ray_point and those of the shape.
 static inline void surface_set_place_error(Surface *surface, const Ray *ray, const Hit *hit)
 {
     real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
@@ -162,13 +164,13 @@ static inline void surface_set_place_error(Surface *surface, const Ray *ray, con
     // not less than the root of the sum of squares
     real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
     surface->place_error = real_fma((real)(1.04f), both, rounding);
-    surface->line_error = across * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding; // but for the surface
+    surface->line_error = across * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding; // excludes the surface
     surface->start_error = along * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
 }
 
-// A flat mirror that is `height` off moves the line of a reflected ray by twice that, and keeps its distance
-// from the exact one: errors of place add up from mirror to mirror, where those of points grow by one over
-// the cosine.
+// Sets the error of a reflected ray's line. A flat mirror that is `height` off moves that line by twice the
+// height, and keeps its distance from the exact line. So errors of place add up from mirror to mirror,
+// whereas those of points grow by one over the cosine.
 static inline void surface_set_line_error(Surface *surface, const SurfacePoint *point)
 {
     real line_error = real_fma((real)(2), point->height, surface->line_error);
@@ -177,7 +179,7 @@ static inline void surface_set_line_error(Surface *surface, const SurfacePoint *
     surface->start_error = lanes_select(flat, surface->start_error, (real)(0));
 }
 
-// Of the shading normal.
+// Bounds the error of the shading normal.
 static inline real point_normal_error(const SurfacePoint *point, real place_error)
 {
     real turned = point->curvature * place_error; // to first order
@@ -190,9 +192,9 @@ static inline mask floor_is_doubtful(real a, real error)
     return !(real_floor(a - error) == real_floor(a + error));
 }
 
-// Where the checker has its second color. On planes and discs squares lie in the surface; elsewhere they are
-// cubes in space, looked up a 1024th of a cube behind the surface, so that a face on the border between cubes
-// has one color.
+// Returns the lanes where the checker has its second color. On planes and discs squares lie in the surface.
+// Elsewhere they are cubes in space, looked up a 1024th of a cube behind the surface, so that a face on the
+// border between cubes has one color.
 static inline mask checker_odd(const Scene *scene, uint kind, uint index, const SurfacePoint *point,
                                const Ray *ray, scalar4 grid, real place_error, mask *doubt)
 {
@@ -224,7 +226,8 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
     return real_floor(halved) != halved;
 }
 
-// The object's color at the hit: plain, checkered or textured. `entry` is the object's kind_index_material.
+// Returns the object's color at the hit: plain, checkered or textured. `entry` is the object's
+// kind_index_material.
 static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
                                   const LaneSurfacePoints *hit, const Ray *ray, real travelled,
                                   real place_error, mask *doubt)
@@ -260,14 +263,14 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
     surface->ior = lanes_select(lanes, (real)(bounces.z), surface->ior);
 }
 
-// Sets the bounds at a hit, and what is in doubt: the side that the ray comes from, and that of the shading
-// normal.
+// Sets the bounds at a hit, and the lanes that are uncertain: in the side that the ray comes from, or in that
+// of the shading normal.
 static inline void surface_set_errors(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
     surface->normal_error = point_normal_error(point, surface->place_error);
     real geometric_error = surface->normal_error;
     mask is_open = mask_none();
-    if (HAS_TRIANGLES) { // those with smooth normals
+    if (HAS_TRIANGLES) { // triangles with smooth normals
         real shading_cosine = vector_dot(point->shading_normal, point->normal);
         mask flat = shading_cosine == vector_dot(point->normal, point->normal);
         geometric_error =
@@ -303,8 +306,8 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     if (HAS_TRANSMISSION) surface->refracted_offset = surface->error + surface->error;
 }
 
-// The surface at the closest hit. Rays of a packet mostly hit one or two objects: each is looked up once, for
-// all its lanes.
+// Returns the surface at the closest hit. Rays of a packet mostly hit one or two objects, so each object is
+// looked up once, for all its lanes.
 static inline Surface surface_interaction(const Scene *scene, const Ray *ray, const Hit *hit)
 {
     Surface surface;
@@ -354,7 +357,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         surface_point_replace(&point, found.lanes, &found.point);
         Material material = scene->materials[entry.z];
         mask doubt;
-        // stored in every surface the zeros would cost frames 2 %
+        // stored in every surface, the zeros would cost frames 2 %
         Color3 color =
             object_color(scene, entry, &material, &found, ray, HAS_IMAGES ? surface.travelled : (real)(0),
                          IS_CERTIFIED ? surface.place_error : (real)(0), &doubt);
@@ -365,9 +368,9 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     return surface;
 }
 
-// The origin of a secondary ray, on the side the ray came from or, if `through`, on the other. It lies off
-// the surface by twice the bound on the position's error: once for that error and once for the new ray's own
-// test of the surface.
+// Returns the origin of a secondary ray, on the side that the ray came from or, if `through`, on the other.
+// It lies off the surface by twice the bound on the position's error: once for that error and once for the
+// new ray's test of the surface.
 static inline Vector secondary_ray_origin(const Surface *surface, bool through)
 {
     if (IS_CERTIFIED) return surface->position; // the ray knows which object it leaves
@@ -376,7 +379,7 @@ static inline Vector secondary_ray_origin(const Surface *surface, bool through)
                       surface->position);
 }
 
-// Lanes where a transparent object may touch an opaque one.
+// Returns the lanes where a transparent object may touch an opaque one.
 static inline mask may_be_in_contact(const Scene *scene, Vector position)
 {
     Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
@@ -384,8 +387,8 @@ static inline mask may_be_in_contact(const Scene *scene, Vector position)
            (position.z >= low.z) & (position.z <= high.z);
 }
 
-// Lanes of a transparent surface that an opaque one may touch: one that lies in it would be crossed by a
-// short line along the normal.
+// Returns the lanes of a transparent surface that an opaque one may touch. An opaque surface that lies in it
+// would be crossed by a short line along the normal.
 static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
 {
     mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
@@ -404,8 +407,8 @@ static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *s
 }
 
 // Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
-// errors: a refracted ray starts 2 behind, and t is off by up to 1. An opaque surface within the error
-// coincides with the transparent one: it becomes the hit of the lanes returned. If it is farther, the
+// errors, since a refracted ray starts 2 behind and t is off by up to 1. An opaque surface within the error
+// coincides with the transparent one and becomes the hit of the lanes returned. If it is farther, the
 // refracted ray starts halfway to it.
 static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
 {
@@ -426,9 +429,9 @@ static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit
     return touches;
 }
 
-// The visible surface: where a transparent and an opaque one coincide, the opaque one, so that glass on a
-// floor shows the floor. Secondary rays start beyond both. The second round is for the lanes whose hit the
-// opaque surface replaced; a loop, since compilers would inline surface_interaction twice.
+// Returns the visible surface: where a transparent and an opaque one coincide, the opaque one, so that glass
+// on a floor shows the floor. Secondary rays start beyond both. The second round is for the lanes whose hit
+// the opaque surface replaced. It is a loop, since compilers would inline surface_interaction twice.
 static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *hit)
 {
     real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);

@@ -1,4 +1,4 @@
-// Textures: a surface point's texture coordinates, and the texture's color there, filtered over the footprint
+// Computes a surface point's texture coordinates and the texture's color there, filtered over the footprint
 // of the pixel (trilinear: Williams, Pyramidal parametrics, SIGGRAPH 1983).
 #ifndef TEXTURE_H
 #define TEXTURE_H
@@ -7,15 +7,15 @@
 #include "scene.h"
 #include "shapes/surface_point.h"
 
-// u runs along the texture's rows, v from bottom to top, from 0 to 1; beyond that the texture wraps.
+// u runs along the texture's rows and v from bottom to top, from 0 to 1. Beyond that the texture wraps.
 typedef struct {
     real u, v;
     real density; // texels of the full texture per unit of length
 } TextureCoordinates;
 
-// The poles lie along y, the texture's center faces +z, and seen from outside u grows eastward. Textures of
-// globes vary little along rows near the poles, so that the density is that of texels at the equator or of
-// their height.
+// Returns a sphere's texture coordinates. The poles lie along y, the texture's center faces +z, and seen from
+// outside u grows eastward. Textures of globes vary little along rows near the poles, so the density is that
+// of texels at the equator or of their height.
 static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere, Vector outward, uint4 level)
 {
     real equator = real_sqrt(real_fma(outward.x, outward.x, outward.z * outward.z));
@@ -28,19 +28,19 @@ static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere
     return coordinates;
 }
 
-// Planes and discs have a grid of their own in the surface.
+// Returns whether shapes of this kind have a grid in the surface, as planes and discs do.
 static inline bool kind_has_grid(uint kind)
 {
     if (HAS_PLANES && kind == KIND_PLANES) return true;
     return HAS_DISCS && kind == KIND_DISCS;
 }
 
-// The axes of that grid; w: where it begins.
+// The axes of that grid; w is where it begins.
 typedef struct {
     scalar4 u, v;
 } GridAxes;
 
-// All 0 on other kinds, which take no image.
+// Returns the axes of the grid, all 0 for other kinds, which have no grid.
 static inline GridAxes grid_axes(const Scene *scene, uint kind, uint index)
 {
     if (HAS_PLANES && kind == KIND_PLANES)
@@ -54,7 +54,7 @@ typedef struct {
     real u, v; // in checker squares, or texture repeats
 } GridCoordinates;
 
-// The grid coordinates of a point of a plane or disc; (0, 0) on other kinds.
+// Returns the grid coordinates of a point of a plane or disc, (0, 0) for other kinds.
 static inline GridCoordinates grid_coordinates(const Scene *scene, uint kind, uint index, Vector position)
 {
     GridAxes axes = grid_axes(scene, kind, index);
@@ -62,7 +62,7 @@ static inline GridCoordinates grid_coordinates(const Scene *scene, uint kind, ui
                              vector_dot(position, vector_of(axes.v)) + (real)(axes.v.w)};
 }
 
-// How far they are off, for a position that is off by `place_error`.
+// Bounds the error of grid coordinates, for a position that is off by `place_error`.
 static inline real grid_error(const Scene *scene, uint kind, uint index, Vector position, real place_error)
 {
     GridAxes axes = grid_axes(scene, kind, index);
@@ -86,9 +86,9 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ki
     return (TextureCoordinates){grid.u, grid.v, (real)(material->reflection_transmission_ior.w)};
 }
 
-// From here on one lane at a time, since each reads texels of its own.
+// The functions from here on treat one lane at a time, since each lane reads different texels.
 
-// The texture coordinate in 0..1 whose color one beyond that has; 0 if it is NaN.
+// Returns the texture coordinate in 0..1 whose color a coordinate beyond that has, or 0 if it is NaN.
 static inline scalar wrap_unit(scalar a, uint wrap)
 {
     scalar part = a - floor(a);
@@ -116,7 +116,8 @@ static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
     return fma(b - a, (scalar4)(part), a);
 }
 
-// Bilinear between texel centers. `level`: x its first texel, y width, z height.
+// Returns the color of a level, bilinear between texel centers. x of `level` is its first texel, y its width,
+// z its height.
 static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, uint wrap_u,
                                   uint wrap_v)
 {
@@ -132,8 +133,8 @@ static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, sca
     return scalar4_between(above, below, y - top);
 }
 
-// `footprint`: the pixel's width in texels of the full texture. Colors are linear in it between the levels
-// for 2^n and 2^(n + 1) texels.
+// Returns the color filtered over `footprint`, the pixel's width in texels of the full texture. Colors are
+// linear in it between the levels for 2^n and 2^(n + 1) texels.
 static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar u, scalar v,
                                        scalar footprint, uint wrap_v)
 {
@@ -152,8 +153,8 @@ static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar
     return scalar4_between(color, coarser, part);
 }
 
-// The texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance `travelled`
-// from the eye. At a grazing angle the footprint grows by at most 2^10.
+// Returns the texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance
+// `travelled` from the eye. At a grazing angle the footprint grows by at most 2^10.
 static inline Vector texture_color(const Scene *scene, uint kind, const Material *material,
                                    TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
                                    real travelled, mask wanted)
