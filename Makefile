@@ -274,6 +274,8 @@ lint-man:
 # What is free of the wording that tools/lint-words finds.
 worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
           $(foreach room,base cli compile image import measure mpi opencl render scene verify view,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
+          $(filter-out kernels/shading/path.h kernels/shading/phong.h,\
+                       $(wildcard kernels/*.h kernels/*.cl kernels/numerics/*.h kernels/shading/*.h kernels/shapes/*.h)) \
           $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/numerics/* tools/peers/* tools/peers/embree/*))
 
 lint-words:

@@ -1,4 +1,4 @@
-// Axis-aligned box, faces included.
+// An axis-aligned box, faces included.
 #ifndef BOX_H
 #define BOX_H
 
@@ -6,8 +6,8 @@
 #include "shapes/interval.h"
 #include "shapes/surface_point.h"
 
-// The interval of t where the ray is between low and high on one axis. A direction of exactly 0, of either
-// sign, is between them always or never: decided by comparison, since 0 times infinity is NaN.
+// Returns the interval of t where the ray is between low and high on one axis. A direction of exactly 0, of
+// either sign, is always or never between them, which comparisons decide, since 0 times infinity is NaN.
 static inline Interval slab_crossings(real low, real high, real origin, real direction, real inverse)
 {
     mask parallel = direction == (real)(0);
@@ -38,8 +38,8 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
     return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
 }
 
-// |t - crossing| for the nearer of a slab's crossings, and whether that is its low face: a ray towards larger
-// coordinates enters there and leaves at the high one.
+// Returns |t - crossing| for the nearer of a slab's crossings, and whether that is its low face: a ray
+// towards larger coordinates enters there and leaves at the high one.
 static inline real slab_distance(Interval slab, real direction, real t, mask *low_face)
 {
     real to_near = fabs(t - slab.near), to_far = fabs(t - slab.far);
@@ -53,7 +53,8 @@ static inline real slab_clamp(real value, real low, real high)
     return real_min(real_max(value, low), high);
 }
 
-// The face is the one whose crossing is t, x before y before z; the position lies exactly on it.
+// Returns the point on the face whose crossing is t, with x before y before z. The position lies exactly on
+// that face.
 static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
@@ -82,8 +83,8 @@ static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, rea
     return surface_point_make(position, normal, zero);
 }
 
-// Where the ray is between two planes across an axis, of a box larger by `more`. ray_prepare sets `inverse`,
-// which is exact within 2 u.
+// Returns the interval where the ray is between two planes across an axis, for a box enlarged by `more`.
+// ray_prepare sets `inverse`, which is exact within 2 u.
 static inline Interval certain_slab(real low, real high, real more, real origin, real direction, real inverse)
 {
     mask parallel = fabs(direction) <= (real)(SMALLEST_RATIO);
@@ -104,7 +105,8 @@ static inline Interval certain_box(const Box *box, const Ray *ray, real more)
     return (Interval){real_max(real_max(x.near, y.near), z.near), real_min(real_min(x.far, y.far), z.far)};
 }
 
-// The box enlarged contains the exact crossings' interval, the box shrunk lies within it.
+// Returns the hit with bounds. The enlarged box contains the interval of the exact crossings, and the shrunk
+// box lies within it.
 static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
 {
     mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, box->id.x, false);
@@ -124,12 +126,13 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
     CertainHit far =
         certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
-    // where it starts on a face, the other crossing counts
+    // if the ray starts on a face, the other crossing counts
     mask left = ray->left == (integer)((scalar_integer)box->id.x);
     return certain_select(left & certain, far, certain_first(ray, near, near_high, far));
 }
 
-// Faces that meet at an edge have normals of their own: whether another one is as near as the error.
+// Sets the errors of a point. Faces that join at an edge have different normals, so another face that is as
+// near as the error makes the lane uncertain.
 static inline mask box_set_errors(const Box *box, const Ray *ray, real t, real place_error,
                                   SurfacePoint *point)
 {

@@ -1,56 +1,59 @@
-// Hits with proven bounds, for images at `certified`: each shape against the exact ray, which the packet's
-// ray only approximates, and against the exact shape, whose numbers were rounded. docs/numerics.md derives
-// every bound; constants leave room beyond what it needs.
+// Finds hits with proven bounds, for images at `certified`: each shape is intersected with the exact ray,
+// which the packet's ray only approximates, and as the exact shape, whose numbers were rounded.
+// docs/numerics.md derives every bound. Constants leave slack beyond what it needs.
 //
-// The exact ray's point at t, or its line's before it starts, lies within origin_error + direction_error |d|
-// t of the packet's. So a shape is hit for certain where the packet's ray hits it shrunk by all errors, and
-// missed where it misses it enlarged by them; in between the answer is in doubt.
+// The exact ray's point at t, or its line's point before it starts, lies within origin_error +
+// direction_error |d| t of the packet's. So a shape is certainly hit if the packet's ray hits it shrunk by
+// all errors, and certainly missed if the ray misses it enlarged by them. In between, the answer is
+// uncertain.
 #ifndef CERTAIN_H
 #define CERTAIN_H
 
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// A lane's answer: a hit, which is the exact ray's between low and high, and about at t; or no hit; or in
-// doubt: a hit, if any, is not before low.
+// A lane's answer: a hit, in which the exact ray's t is between low and high, and about t; no hit; or
+// uncertain, in which a hit, if any, is not before low.
 typedef struct {
     mask found, doubt;
     real t, low, high;
 } CertainHit;
 
-// Of camera rays, in u of their length: the three vectors' roundings add up to sqrt 3, as they are
-// perpendicular, two sums to 2, an offset in the pixel to 1, the unit length's to 1.
+// The direction error of camera rays, in u of their length. The roundings of the three vectors, which are
+// perpendicular, add up to sqrt 3, those of two sums to 2, of an offset in the pixel to 1 and of the unit
+// length to 1.
 enum { CAMERA_DIRECTION_ERROR = 7 };
 
-// a / b, or `otherwise` where that is out of range.
+// Returns a / b, or `otherwise` if that is out of range.
 static inline real divide_or(real a, real b, real otherwise)
 {
     mask usable = quotient_is_bounded(a, b);
     return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
 }
 
-// How far the exact ray is from the packet's, up to a distance.
+// Returns how far the exact ray is from the packet's, up to a distance.
 static inline real ray_place_error(const Ray *ray, real distance)
 {
     return real_fma(ray->direction_error, distance, ray->origin_error);
 }
 
-// The ray starts on this shape, and does not meet it again: it is flat, or convex and left outward.
+// Returns the lanes whose ray starts on this shape and does not hit it again, because it is flat, or convex
+// and left outward.
 static inline mask ray_left_for_good(const Ray *ray, uint id, bool is_flat)
 {
     mask left = ray->left == (integer)((scalar_integer)id);
     return is_flat ? left : left & ray->leaves_outward;
 }
 
-// Sorts a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and in no
-// others than `perhaps`, there between low and high.
+// Classifies a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and in
+// no others than `perhaps`, there between low and high.
 static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask perhaps, real low, real high)
 {
     CertainHit hit;
-    // beyond the end: of a ray to a light t = 1, from which tmax differs by rounding
+    // beyond the end, which for a ray to a light is t = 1, from which tmax differs by rounding
     mask beyond = low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
     mask before = high < ray->tmin;
-    low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers: anywhere
+    low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers, it may be anywhere
     perhaps = perhaps & !(beyond | before);
     hit.found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
     hit.doubt = perhaps & !hit.found;
@@ -60,7 +63,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask per
     return hit;
 }
 
-// Moves a hit to t, which may be far from the middle of its bounds, unless t is outside of them.
+// Moves a hit to t, which may be far from the middle of its bounds, unless t is outside them.
 static inline CertainHit certain_at(CertainHit hit, real t)
 {
     hit.t = lanes_select((t >= hit.low) & (t <= hit.high), t, hit.t);
@@ -79,7 +82,7 @@ static inline CertainHit certain_miss(void)
     return (CertainHit){mask_none(), mask_none(), (real)(0), (real)(0), (real)(0)};
 }
 
-// The first of two crossings: the second where the first lies before the start.
+// Returns the first of two crossings, or the second if the first lies before the start.
 static inline CertainHit certain_first(const Ray *ray, CertainHit near, real near_high, CertainHit far)
 {
     return certain_select(near_high < ray->tmin, far, near);
@@ -92,15 +95,16 @@ static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
     return hit;
 }
 
-// A sphere: with l the line's closest point to the center, r^2 - l^2 is half the chord squared.
+// A sphere crossed by a line. With l the line's closest point to the center, r^2 - l^2 is half the chord
+// squared.
 typedef struct {
-    Vector start; // the ray's, seen from the center
+    Vector start; // the ray's start, seen from the center
     real radius;
-    mask certain, perhaps;       // the line crosses it, not behind the ray's start or beyond its end
+    mask certain, perhaps;       // whether the line crosses it, not behind the ray's start or beyond its end
     real middle_t, middle_error; // the closest point
-    real half_chord, t_error;    // in t; t_error is that of sphere_near and sphere_far
+    real half_chord, t_error;    // in t; t_error applies to sphere_near and sphere_far
     mask refines;                // a Newton step is taken
-    real inverse_slope;          // for it: of |x|^2 at the far crossing, x seen from the center
+    real inverse_slope;          // for that step, of |x|^2 at the far crossing, with x seen from the center
 } CertainSphere;
 
 static inline real sphere_refine(const CertainSphere *sphere, const Ray *ray, real t, real inverse_slope)
@@ -110,7 +114,7 @@ static inline real sphere_refine(const CertainSphere *sphere, const Ray *ray, re
     return lanes_select(sphere->refines, real_fma(excess, inverse_slope, t), t);
 }
 
-// The crossings.
+// Return the two crossings.
 static inline real sphere_near(const CertainSphere *sphere, const Ray *ray)
 {
     return sphere_refine(sphere, ray, sphere->middle_t - sphere->half_chord, -sphere->inverse_slope);
@@ -130,17 +134,17 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     crossed.middle_t = -vector_dot(f, ray->direction) * ray->inverse_squared;
     Vector l = vector_fma(ray->direction, crossed.middle_t, f);
     real squared = real_fma(radius, radius, -vector_dot(l, l));
-    // not less than |f| where |l| is up to twice the radius: beyond, errors in proportion to |l| do not count
+    // not less than |f| if |l| is up to twice the radius; beyond, errors in proportion to |l| do not count
     real distance = real_fma(fabs(crossed.middle_t), ray->length, radius + radius);
     real rounding = (real)(UNIT_ROUNDOFF)*real_fma((real)(3), distance,
                                                    real_fma((real)(6), radius, vector_norm1(ray->origin)));
-    // crossings are no farther than this and the place; so is the closest point
+    // neither crossings nor the closest point are farther than this and the place
     real farthest = distance - radius;
     real place = ray_place_error(ray, farthest) * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
     place = real_fma(ray->direction_error, place, place);
     real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
     real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
-    // not where all of it is behind the start, or beyond the end
+    // not if all of it is behind the start, or beyond the end
     const real inverse_length = ray_inverse_length(ray);
     real reach = inverse_length * (radius + (real)(2) * (place + along));
     real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
@@ -150,14 +154,14 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     crossed.half_chord = crossed.inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
     crossed.refines = mask_none();
     if (!lanes_any(crossed.perhaps)) return crossed;
-    // in t; where it is in doubt, of the band: between 0 and that of twice the band
+    // In t. If it is uncertain, that of the band, between 0 and that of twice the band.
     crossed.half_chord = real_sqrt(real_max(squared, band) * ray->inverse_squared);
     mask usable = crossed.half_chord > (real)(0);
     real inverse = real_divide((real)(1), lanes_select(usable, crossed.half_chord, (real)(1)));
     crossed.inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
     // A place that moves by p moves the crossing by p over the cosine there, the least half chord over r.
-    // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75; beyond, h
-    // changes by at most h x (1 + x) / 2 across the ray, and p, at most 1.4 x p, counts along it.
+    // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75. Beyond that,
+    // h changes by at most h x (1 + x) / 2 across the ray, and p, at most 1.4 x p, counts along it.
     real inverse_chord = inverse * inverse_length;
     real x = band * (inverse_chord * inverse_chord);
     real steepness = real_fma((real)(1.6f) * inverse_chord, x, inverse_chord);

@@ -1,33 +1,33 @@
-// Hits with bounds of surfaces of revolution, and of spheres with the eye's power. The side bounds a convex
-// set, so that the exact ray is within it along one interval of t. Roots are computed as they may; points
-// next to them are then evaluated, and only what their values, beyond all errors, prove counts: the constants
-// of steps and widths just choose the points.
+// Finds hits with bounds of surfaces of revolution, and of spheres with the eye's power. The side bounds a
+// convex set, so the exact ray is within it along one interval of t. Roots are computed approximately. Points
+// next to them are then evaluated, and only the conclusions that their values prove beyond all errors count.
+// The constants of steps and widths only choose the points.
 //
-// A sphere with the eye's power is a cylinder with the axis 0.
+// A sphere with the eye's power is a cylinder whose axis is 0.
 #ifndef CERTAIN_ROUND_H
 #define CERTAIN_ROUND_H
 
 #include "shapes/certain.h"
 #include "shapes/surface_point.h"
 
-// The exact interval of t contains `inner`, if `certain`, and lies within `outer`, if `perhaps`. Its ends are
+// If `certain`, the exact interval of t contains `inner`; if `perhaps`, it lies within `outer`. Its ends are
 // about those of `roots`.
 typedef struct {
     Interval outer, inner, roots;
     mask certain, perhaps;
 } CertainInterval;
 
-// The inside: rho <= radius + slope z, or rho^2 <= k z where k > 0, for the distance rho from the axis and
-// the height z along it.
+// The inside is rho <= radius + slope z, or rho^2 <= k z if k > 0, for the distance rho from the axis and the
+// height z along it.
 typedef struct {
-    Vector start; // the ray's origin, seen from the base; with a power from the eye
-    Vector foot;  // a point of the axis, seen from there
+    Vector start; // the ray's origin, seen from the base or, with a power, from the eye
+    Vector foot;  // a point of the axis, seen from the same point
     Vector axis;  // unit, or 0
     real radius, slope, k;
-    real power;                    // with HAS_POWER, of the unit axis
+    real power;                    // with HAS_POWER, that for the unit axis
     real foot_norm1;               // the 1-norm of the foot
     real start_error, error_per_t; // a point at t is off by start_error + error_per_t |t|
-    bool has_power, curves;        // curves: k > 0
+    bool has_power, curves;        // curves means k > 0
 } Round;
 
 typedef struct {
@@ -50,7 +50,7 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
     point.rho = vector_norm(point.across);
     point.radius = real_fma(round->slope, z, round->radius);
-    // what the axis' length, off by 14 u, leaves of z in the distance from it, squared
+    // the contribution of z, since the axis' length is off by 14 u, to the squared distance from the axis
     real left_of_z = (real)(20 * UNIT_ROUNDOFF) * z, power_band = left_of_z * left_of_z;
     real from_eye = (real)(0), lift = round->k * z;
     if (round->has_power) {
@@ -79,10 +79,10 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     return point;
 }
 
-// a t^2 + 2 b t + c = 0 where the ray crosses the side.
+// The quadratic a t^2 + 2 b t + c = 0, whose roots are where the ray crosses the side.
 typedef struct {
     Vector m, q; // the ray's origin and direction across the axis
-    real rise;   // and along it
+    real rise;   // the direction along it
     real a, b, c, discriminant;
     real h; // how fast the radius grows
 } RoundQuadratic;
@@ -120,8 +120,8 @@ static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
     return quadratic;
 }
 
-// Whether a height above a plane, which is linear, stays above 0 between `from` and `to`, and beyond but in
-// the lanes `ends`.
+// Returns whether a height above a plane, which is linear, stays above 0 between `from` and `to`, and beyond
+// except in the lanes `ends`.
 static inline mask height_is_positive(real height, real slope, real slope_error, real t, real from, real to,
                                       mask ends)
 {
@@ -131,10 +131,10 @@ static inline mask height_is_positive(real height, real slope, real slope_error,
            ((slope >= slope_error) | (ends & (at_to > (real)(0))));
 }
 
-// Whether the exact ray misses the side between `from` >= 0 and `to`, and beyond but in the lanes `ends`. At
-// t1, about its closest approach, a plane separates it from the side, or from a parallel surface. Tilted a
-// little, it also does so for unbounded rays: rho is at least n . x for
-// n = (across / rho + s q / |q|) / (1 + |s|), and rho^2 at least 2 a . x - a . a for any a.
+// Returns whether the exact ray misses the side between `from` >= 0 and `to`, and beyond except in the lanes
+// `ends`. At t1, about its closest approach, a plane separates it from the side, or from a parallel surface.
+// Tilted slightly, the plane does so for unbounded rays: rho is at least n . x for n = (across / rho + s q /
+// |q|) / (1 + |s|), and rho^2 at least 2 a . x - a . a for any a.
 static inline mask round_misses(const Round *round, const RoundQuadratic *quadratic, const Ray *ray,
                                 real from, real to, mask ends)
 {
@@ -179,8 +179,8 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
            (tilts & height_is_positive(tilted, tilted_slope, slope_error, t1, from, to, ends));
 }
 
-// Where the exact ray is inside the side. Roots are looked for from `from` to `to`, beyond which nothing
-// matters if `is_finite`; `perhaps` is said for t >= tmin.
+// Returns where the exact ray is inside the side. Roots are searched between `from` and `to`, beyond which
+// nothing matters if `is_finite`. `perhaps` applies to t >= tmin.
 static inline CertainInterval round_interval(const Round *round, const Ray *ray, mask lanes, real from,
                                              real to, bool is_finite)
 {
@@ -188,7 +188,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     interval.outer = interval.inner = interval.roots = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     interval.certain = mask_none();
     const RoundQuadratic quadratic = round_quadratic(round, ray);
-    real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF); // of rays to a light
+    real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF); // for rays to a light
     mask ends = is_finite ? mask_all() : end < to;
     interval.perhaps = lanes & !round_misses(round, &quadratic, ray, real_max(from, ray->tmin),
                                              real_max(real_min(to, end), ray->tmin), ends);
@@ -201,7 +201,8 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     real one = divide_or(sum, a, lanes_select(positive, (real)(LARGEST), (real)(-LARGEST)));
     real other = lanes_select(sum == (real)(0), one, divide_or(quadratic.c, sum, one));
     real near = real_min(one, other), far = real_max(one, other);
-    // a cone around the ray's direction is left or entered once: the other root is the other nappe's
+    // a cone around the ray's direction is left or entered once, and the other root belongs to the other
+    // nappe
     mask outer = a<(real)(0), grows = quadratic.h>(real)(0);
     real entry = lanes_select(outer, lanes_select(grows, far, (real)(-LARGEST)), near);
     real leave = lanes_select(outer, lanes_select(grows, (real)(LARGEST), near), far);
@@ -210,9 +211,9 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     for (uint i = 0; i < 2; i++) {
         real t = real_min(real_max(roots[i], from), to);
         RoundPoint point = round_point(round, ray, t);
-        real slope = real_fma(a, t, quadratic.b); // half of it
+        real slope = real_fma(a, t, quadratic.b); // half the slope
         real step = divide_or((real)(0.5f) * point.value, slope, (real)(0));
-        // else the root was none; from an end, where it is clamped, a step would lead beyond it
+        // otherwise it was not a root; from an end, where it is clamped, a step would lead beyond the end
         mask settles = (t == roots[i]) & (fabs(step) * (real)(0x1p6f) < fabs(t));
         roots[i] = t = lanes_select(settles, t - step, t);
         real band = (real)(2.5f) * point.band, bend = fabs(a) * band;
@@ -250,14 +251,15 @@ static inline Interval intervals_common(Interval a, Interval b)
     return (Interval){real_max(a.near, b.near), real_min(a.far, b.far)};
 }
 
-// Beyond this t a rounding of the distance exceeds a 1024th of the size: nothing is certain there.
+// Returns the t beyond which a rounding of the distance exceeds a 1024th of the size, so that nothing is
+// certain.
 static inline real round_range(const Ray *ray, real size)
 {
     return (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray_inverse_length(ray);
 }
 
-// In u of the coordinates: what the axis' direction and the products add; where the radius depends on the
-// height, the axis' length as well.
+// The error in u of the coordinates that the axis' direction and the products add. If the radius depends on
+// the height, the axis' length adds to it.
 enum { ROUND_ERROR = 8, SLOPED_ROUND_ERROR = 20 };
 
 static inline real round_error_per_t(const Ray *ray, uint units)

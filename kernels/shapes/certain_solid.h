@@ -1,11 +1,12 @@
-// Hits with bounds of what is within a round side (shapes/certain_round.h), and between ends if it has any.
+// Finds hits with bounds of solids within a round side (shapes/certain_round.h), and between ends if they
+// have any.
 #ifndef CERTAIN_SOLID_H
 #define CERTAIN_SOLID_H
 
 #include "shapes/certain_round.h"
 
-// The first hit of a shape between side and ends: as ends_first_hit. `left`: the ray starts on it and runs
-// into it.
+// Returns the first hit of a shape between side and ends, as ends_first_hit does, with bounds. In the lanes
+// `left` the ray starts on the shape and runs into it.
 static inline CertainHit round_first_hit(uint flags, const Ray *ray, const CertainInterval *side,
                                          const CertainInterval *slab, mask left)
 {
@@ -50,12 +51,12 @@ typedef struct {
     Round round;
     bool is_finite;
     real low, high;   // the ends' heights
-    real half_height; // of the distance between them
-    real widest;      // radius
+    real half_height; // half the distance between them
+    real widest;      // the largest radius
     Vector middle;
 } RoundSolid;
 
-// Where slope t >= least.
+// Returns the interval where slope t >= least.
 static inline Interval interval_above(real slope, real least)
 {
     mask rises = slope > (real)(SMALLEST_RATIO), falls = slope < (real)(-SMALLEST_RATIO);
@@ -65,10 +66,10 @@ static inline Interval interval_above(real slope, real least)
     return (Interval){none, lanes_select(falls, t, (real)(LARGEST))};
 }
 
-// Between the heights low and high.
+// Returns the interval between the heights low and high.
 static inline CertainInterval round_slab(const Round *round, const Ray *ray, real low, real high)
 {
-    const real few = (real)(4 * UNIT_ROUNDOFF); // of the ends: their subtractions
+    const real few = (real)(4 * UNIT_ROUNDOFF); // the error of the ends' subtractions
     real z = vector_dot(round->axis, round->start), rise = vector_dot(round->axis, ray->direction);
     real low_error = real_fma(few, fabs(low), round->start_error),
          high_error = real_fma(few, fabs(high), round->start_error);
@@ -84,7 +85,7 @@ static inline CertainInterval round_slab(const Round *round, const Ray *ray, rea
     return slab;
 }
 
-// The part of the line in a sphere that contains a finite shape.
+// Computes the part of the line in a sphere that contains a finite shape.
 static inline mask round_bounds(Vector center, real radius, const Ray *ray, real *from, real *to)
 {
     CertainSphere bounding =
@@ -95,7 +96,8 @@ static inline mask round_bounds(Vector center, real radius, const Ray *ray, real
     return bounding.perhaps & (*to >= ray->tmin);
 }
 
-// Both nappes of an unbounded cone, each a convex body of its own. A ray that starts on one leaves that.
+// Returns the first hit of both nappes of an unbounded cone, each a separate convex body. A ray that starts
+// on one leaves that.
 static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ray, mask lanes, mask left,
                                           real from, real to)
 {
@@ -152,9 +154,9 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
     return round_first_hit(id.y, ray, &side, &slab, left);
 }
 
-// The errors of a point's normal, at t, and whether it may be at the rim, where side and cap have normals of
-// their own. The normal turns by 1 / rho, or by 2 / k of a paraboloid, along the surface. A vector off by e,
-// made unit, is off by up to 2 e over its length.
+// Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the
+// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 2 / k, along the
+// surface. A vector that is off by e is, once normalized, off by up to 2 e over its length.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {

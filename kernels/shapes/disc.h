@@ -1,18 +1,18 @@
-// Disc: a plane within a circle.
+// A disc: a plane within a circle.
 #ifndef DISC_H
 #define DISC_H
 
 #include "shapes/eye_power.h"
 #include "shapes/plane.h"
 
-// t = height / along; across / along leads from the center to the crossing, up to sign: only its square is
-// used.
+// t = height / along. across / along leads from the center to the crossing, up to its sign, since only its
+// square is used.
 typedef struct {
     real height, along;
     Vector across;
 } DiscCrossing;
 
-// A point of its plane.
+// Returns a point of the disc's plane.
 static inline Vector disc_foot(const Disc *disc)
 {
     return vector_of(has_eye_power(disc->id) ? disc->foot : disc->center_radius);
@@ -38,8 +38,8 @@ static inline DiscCrossing disc_crossing_compensated(const Disc *disc, const Ray
     };
 }
 
-// Whether the ray's point at t lies within the sphere that the power defines: its power is the eye's plus
-// p . (p - 2 center).
+// Returns whether the ray's point at t lies within the sphere that the power defines. The point's power is
+// the eye's plus p . (p - 2 center).
 static inline mask disc_contains(const Disc *disc, const Ray *ray, real t)
 {
     Vector p = ray_point(ray, t), twice_center = vector_scale(vector_of(disc->center_radius), (real)(2));
@@ -47,9 +47,9 @@ static inline mask disc_contains(const Disc *disc, const Ray *ray, real t)
            (real)(0);
 }
 
-// Inside the rim: with v the crossing from the center, (n . d) v = n x E for the moment E = f x d, so that
-// |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a distance. At less than 4 degrees
-// to the plane all three cancel: pairs there at any precision.
+// Decides whether the crossing is inside the rim. With v the crossing from the center, (n . d) v = n x E for
+// the moment E = f x d, so that |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a
+// distance. At less than 4 degrees to the plane all three cancel, so pairs are used there at any precision.
 static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 {
     Vector center = vector_of(disc->center_radius), normal = vector_of(disc->normal);
@@ -72,7 +72,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     if (!lanes_any(hit)) return hit;
     if (has_eye_power(disc->id)) return hit & disc_contains(disc, ray, *t) & (*t > ray->tmin);
     real radius = (real)(disc->center_radius.w);
-    // nearly in the plane n . d hardly determines t, but the crossing is no farther from the center than the
+    // nearly in the plane n . d hardly determines t, but the crossing is not farther from the center than the
     // rim
     real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
     real half_chord = radius * real_sqrt(ray->inverse_squared);
@@ -87,7 +87,8 @@ static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, 
     return plane_crossing_point(disc_foot(disc), disc->normal, ray, t);
 }
 
-// Its bounding sphere is missed by most; else the crossing with its plane lies within the rim, or not.
+// Returns the hit with bounds. Most rays miss the bounding sphere. Otherwise the crossing with the plane lies
+// within the rim, or not.
 static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 {
     Vector center = vector_of(disc->center_radius);
@@ -97,7 +98,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
     mask crosses = certain_plane(disc_foot(disc), disc->normal, ray, &low, &high);
-    // nearly parallel to it: no nearer than the sphere
+    // nearly parallel to it, the hit is not nearer than the sphere
     if (!lanes_all(crosses)) {
         low = lanes_select(crosses, low, real_max(low, sphere_near(&bounding, ray) - bounding.t_error));
         high = lanes_select(crosses, high, sphere_far(&bounding, ray) + bounding.t_error);
@@ -106,7 +107,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     Vector f = vector_subtract(ray->origin, center);
     Vector across = vector_fma(ray->direction, hit.t, f);
     real moved = ray->length, path = moved * fabs(hit.t);
-    // 3 u of f and the path are needed, and as of a sphere 4 u of the radius
+    // 3 u of f and the path are needed, and 4 u of the radius, as for a sphere
     real place = ray_place_error(ray, path) + moved * ((real)(0.5f) * (hit.high - hit.low)) +
                  (real)(UNIT_ROUNDOFF) *
                      ((real)(4) * (vector_norm1(f) + path) + (real)(8) * radius + vector_norm1(ray->origin));

@@ -1,13 +1,13 @@
-// Shapes around an axis with ends: cylinder, cone and paraboloid.
+// Intersects shapes around an axis that have ends: cylinder, cone and paraboloid.
 #ifndef ENDS_H
 #define ENDS_H
 
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// The first hit of a surface of revolution, of which the ray is inside the side between two roots and between
-// the ends within the slab. A capped solid is the intersection of both: one comparison decides both, so that
-// no ray passes between side and cap. An open or unbounded one is hit at a root between the ends.
+// Finds the first hit of a surface of revolution, inside whose side the ray is between two roots, and between
+// whose ends it is within the slab. A capped solid is the intersection of both: one comparison decides both,
+// so that no ray passes between side and cap. An open or unbounded one is hit at a root between the ends.
 static inline mask ends_first_hit(uint flags, const Ray *ray, Interval side, Interval slab, real *t)
 {
     if (flags & REVOLUTION_CAPPED) {
@@ -22,7 +22,8 @@ static inline mask ends_first_hit(uint flags, const Ray *ray, Interval side, Int
     return (*t >= slab.near) & (*t <= slab.far);
 }
 
-// Whether the hit at t is on a cap: the surface whose crossing is nearer to t; at the rim the side.
+// Returns whether the hit at t is on a cap: on the surface whose crossing is nearer to t, at the rim the
+// side.
 static inline mask ends_on_cap(Interval side, Interval slab, real t)
 {
     real to_slab = real_min(fabs(t - slab.near), fabs(t - slab.far));

@@ -1,5 +1,6 @@
-// Shapes next to the eye: a power, computed on the host before anything is rounded, defines where the surface
-// lies. Of a sphere |center - eye|^2 - radius^2, of other shapes the constant term of a ray from the eye.
+// Intersects shapes next to the eye. A power, which the host computes before anything is rounded, defines
+// where the surface lies. For a sphere it is |center - eye|^2 - radius^2, for other shapes the constant term
+// of a ray from the eye.
 #ifndef EYE_POWER_H
 #define EYE_POWER_H
 
@@ -19,7 +20,7 @@ static inline real eye_power_of(uint4 id)
 #endif
 }
 
-// start + a . b, rounded about once.
+// Returns start + a . b, rounded about once.
 static inline real power_sum(Pair start, Vector a, PairVector b)
 {
     Pair xx = two_product(a.x, b.x.high), yy = two_product(a.y, b.y.high), zz = two_product(a.z, b.z.high);

@@ -1,10 +1,10 @@
-// Paraboloid: |p x w|^2 = k (p . w) for the axis w from the apex, with k = 4 |w| times the focal length.
+// A paraboloid: |p x w|^2 = k (p . w) for the axis w from the apex, with k = 4 |w| times the focal length.
 //
 // Along a ray p = f + t d, with q = d x w and m = f x w:
 //     a = q . q,   b = m . q - k/2 (d . w),   c = m . m - k (f . w),
 // and by Lagrange's identity b^2 - a c = (k/2 d . w)^2 - |w|^2 (k E . q + (w . E)^2) with the moment E = f x
-// d, whose terms do not grow with the distance where b^2 and a c do. All of it is in pairs: c cancels next to
-// the surface, b along it.
+// d, whose terms do not grow with the distance where b^2 and a c do. Everything is computed in pairs, because
+// c cancels next to the surface and b along it.
 //
 // With the eye's power C, m = (o - F) x w for the axis' point F nearest to the eye, and
 //     c = C + (o x w) . ((o - 2 F) x w) - k o . w.
@@ -19,11 +19,11 @@
 
 typedef struct {
     Interval side; // the ray is inside the surface between them
-    Interval slab; // and on the apex' side of the end
+    Interval slab; // the ray is on the apex' side of the end
     mask real_roots;
 } ParaboloidCrossings;
 
-// The interval of t where the ray is on the apex' side of the shape's end plane.
+// Returns the interval of t where the ray is on the apex' side of the shape's end plane.
 static inline Interval paraboloid_slab(real end, Pair from, real towards)
 {
     mask parallel = towards == (real)(0), leaving = towards > (real)(0);
@@ -72,7 +72,7 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     mask ahead = b < (real)(0);
     real sum = lanes_select(ahead, root - b, -(root + b));
     mask zero = sum == (real)(0);
-    // a ray along the axis has a = 0 and one root; the other is infinitely far on the open side
+    // a ray along the axis has a = 0 and one root, since the other is infinitely far on the open side
     mask within = quotient_is_bounded(sum, a);
     real far_root = lanes_select(within, real_divide(sum, lanes_select(within, a, (real)(1))),
                                  lanes_select(ahead, (real)(LARGEST), (real)(-LARGEST)));
@@ -92,8 +92,8 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
     return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
-// On the cap the point is moved along the axis, on the side by two Newton steps along the gradient of
-// rho^2 - 4 f z, which is 2 (rho - 2 f w).
+// Returns the surface point. On the cap it is moved along the axis, on the side by two Newton steps along the
+// gradient of rho^2 - 4 f z, which is 2 (rho - 2 f w).
 static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, const Ray *ray, real t)
 {
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);

@@ -1,11 +1,12 @@
-// Plane.
+// A plane.
 #ifndef PLANE_H
 #define PLANE_H
 
 #include "shapes/certain.h"
 #include "shapes/surface_point.h"
 
-// t = height / along where that is finite, tested without dividing; equal signs mean ahead of the ray.
+// Sets t = height / along and returns where that is finite, tested without dividing. Equal signs mean ahead
+// of the ray.
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
     mask ahead = (height > (real)(0)) == (along > (real)(0));
@@ -15,7 +16,8 @@ static inline mask plane_quotient(real height, real along, const Ray *ray, real 
     return hit & (*t > ray->tmin);
 }
 
-// t = n . (p - o) / n . d, the difference first. Only n . d = 0 is no hit: a threshold would cut the horizon.
+// Computes t = n . (p - o) / n . d, with the difference first. Only n . d = 0 is not a hit, since a threshold
+// would cut the horizon.
 static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, real *t)
 {
     real along, height;
@@ -34,7 +36,7 @@ static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
     return plane_crossing(vector_of(plane->point), vector_of(plane->normal), ray, t);
 }
 
-// The ray's point, moved onto the plane once. The normal's w is one over its length.
+// Returns the ray's point, moved onto the plane once. The normal's w is one over its length.
 static inline SurfacePoint plane_crossing_point(Vector point, scalar4 normal, const Ray *ray, real t)
 {
     Vector unit = IS_COMPENSATED ? vector_normalize(vector_of(normal))
@@ -51,8 +53,8 @@ static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ra
     return plane_crossing_point(vector_of(plane->point), plane->normal, ray, t);
 }
 
-// Where the line meets a plane, n . (p - o) / n . d; *low <= t <= *high where the result is set. Elsewhere it
-// may meet it at or beyond *low.
+// Returns the lanes where the line crosses a plane, at n . (p - o) / n . d, with *low <= t <= *high. In other
+// lanes it may cross it at or beyond *low.
 static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const Ray *ray, real *low,
                                  real *high)
 {
@@ -74,7 +76,7 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
     *low = t - t_error;
     *high = t + t_error;
     if (lanes_all(crosses)) return crosses;
-    // nearly parallel: beyond the least distance over the greatest approach
+    // nearly parallel, it crosses beyond the least distance over the greatest approach
     real least = real_max(fabs(height) - height_error, (real)(0));
     real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
     mask moves = quotient_is_bounded(least, greatest);
@@ -95,7 +97,7 @@ static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
     return certain_crossing(ray, lanes & crosses, lanes, low, high);
 }
 
-// A bound on the height of a point over a plane.
+// Returns a bound on the height of a point over a plane.
 static inline real certain_plane_height(Vector point, scalar4 normal_and_inverse, Vector position)
 {
     Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, position);

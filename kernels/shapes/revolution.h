@@ -25,7 +25,7 @@ typedef struct {
     mask compensated; // all of these are rounded about once
 } RevolutionQuadric;
 
-// f . w, rounded about once.
+// Returns f . w, rounded about once.
 static inline Pair revolution_height(const Revolution *shape, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_slope);
@@ -38,7 +38,7 @@ static inline mask revolution_near_side(real c, Vector m)
     return fabs(c) < (real)(0.5f) * vector_dot(m, m);
 }
 
-// c by the eye's power, and next to the side the discriminant.
+// Computes c by the eye's power, and next to the side the discriminant.
 static inline void revolution_quadric_from_eye(RevolutionQuadric *quadric, const Revolution *shape,
                                                bool sloped, const Ray *ray, Pair a, Pair b)
 {
@@ -145,9 +145,9 @@ static inline RevolutionQuadric revolution_quadric_select(mask condition, Revolu
                                lanes_select(condition, yes.compensated, no.compensated)};
 }
 
-// Lanes that start outside, at least their roundings off the side, and do not approach it: no crossing is
-// ahead. a > 0 and c must exceed their roundings, which grow with the slope; b may have any sign within its
-// own.
+// Returns the lanes that start outside, at least their roundings off the side, and do not approach it, so
+// that no crossing is ahead. a > 0 and c must exceed their roundings, which grow with the slope. b may have
+// any sign within its rounding.
 static inline mask revolution_leaves_outward(const RevolutionQuadric *quadric, const Revolution *shape,
                                              const Ray *ray)
 {
@@ -160,7 +160,7 @@ static inline mask revolution_leaves_outward(const RevolutionQuadric *quadric, c
            (ray->tmin >= (real)(0));
 }
 
-// For lanes that start next to the side: rejects those that leave it, compensates the others.
+// Refines lanes that start next to the side: rejects those that leave it and compensates the others.
 static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
                                                   bool sloped, const Ray *ray, mask near_side)
 {
@@ -172,8 +172,8 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
         revolution_quadric_select(near_side, revolution_quadric_compensated(shape, sloped, ray), *quadric);
 }
 
-// Next to the side c cancels, and the discriminant is off by some 6 u a r^2, which would break the horizon of
-// ground that is a cylinder: pairs there at any precision.
+// Returns the quadric. Next to the side c cancels, and the discriminant is off by about 6 u a r^2, which
+// would break the horizon of ground that is a cylinder. So pairs are used there at any precision.
 static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool sloped, const Ray *ray)
 {
     if (IS_COMPENSATED) return revolution_quadric_compensated(shape, sloped, ray);
@@ -187,8 +187,8 @@ static inline RevolutionQuadric revolution_quadric(const Revolution *shape, bool
     return quadric;
 }
 
-// Two Newton steps on |m + t q| - |g + t h|. For a cone seen along its side or from afar a, b and c cancel
-// and this does not: there the plain roots are off by up to 700 ulp at 2500 sizes.
+// Polishes a root by two Newton steps on |m + t q| - |g + t h|. For a cone seen along its side or from afar
+// a, b and c cancel and this does not. There the plain roots are off by up to 700 ulp at 2500 sizes.
 static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 {
     for (uint i = 0; i < 2; i++) {
@@ -212,7 +212,7 @@ typedef struct {
     Vector m, q;   // at t the point is |m + t q| / |w| from the axis
 } RevolutionCrossings;
 
-// The interval of t between the planes of a finite shape's ends.
+// Returns the interval of t between the planes of a finite shape's ends.
 static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_slope);
@@ -229,7 +229,7 @@ static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
                           real_inverse_or_zero(towards));
 }
 
-// Restricts `outer` lanes to the nappe that the ends bound: the one towards which the radius grows.
+// Restricts `outer` lanes to the nappe that the ends bound, towards which the radius grows.
 static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask growing)
 {
     Interval side = crossings->side;
@@ -239,15 +239,15 @@ static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask gr
     crossings->side.far = lanes_select(crossings->outer, nappe.far, side.far);
 }
 
-// Lines that may cross the unbounded surface: those with roots, those within a cone but for an interval
-// between its nappes, and those along the side.
+// Returns the lanes whose line may cross the unbounded surface: those with roots, those within a cone except
+// for an interval between its nappes, and those along the side.
 static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
 {
     return (quadric->discriminant >= (real)(0)) | (quadric->a <= (real)(0));
 }
 
-// The interval between the roots c / q and q / a. q / a is a root only where it is finite; a = 0 is a ray
-// along the side, with one root, c / q, and one at infinity. *zero: q = 0.
+// Returns the interval between the roots c / q and q / a. q / a is a root only if it is finite. A ray along
+// the side has a = 0, one root, c / q, and one at infinity. *zero receives q = 0.
 static inline Interval revolution_roots(const RevolutionQuadric *quadric, bool sloped, mask *zero)
 {
     real root = real_sqrt(real_max(quadric->discriminant, (real)(0)));
@@ -269,7 +269,8 @@ static inline Interval revolution_roots(const RevolutionQuadric *quadric, bool s
     return (Interval){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
 }
 
-// Lanes along a cylinder's axis, or along a cone's through its apex, are inside everywhere or nowhere.
+// Decides lanes along a cylinder's axis, or along a cone's through its apex, which are inside everywhere or
+// nowhere.
 static inline void revolution_along_axis(RevolutionCrossings *crossings, const RevolutionQuadric *quadric,
                                          mask along)
 {
@@ -298,9 +299,9 @@ static inline RevolutionCrossings revolution_crossings(const Revolution *shape, 
     return crossings;
 }
 
-// Lanes whose point at t is no farther from the axis than the shape's largest radius, within 8 u of the
-// distance. A ray along a cone's side has a root near infinity with a random sign; the wrong one swaps inside
-// and outside.
+// Returns the lanes whose point at t is not farther from the axis than the shape's largest radius, within 8 u
+// of the distance. A ray along a cone's side has a root near infinity with a random sign, and the wrong sign
+// swaps inside and outside.
 static inline mask revolution_reaches(const Revolution *shape, const RevolutionCrossings *crossings,
                                       const Ray *ray, real t)
 {
@@ -326,7 +327,7 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
-// The point of the side next to p, which is relative to the base; height is p . axis.
+// Returns the point of the side next to p, which is relative to the base. `height` is p . axis.
 static inline SurfacePoint revolution_side_point(const Revolution *shape, bool sloped, Vector p, real height)
 {
     Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
@@ -345,7 +346,7 @@ static inline SurfacePoint revolution_side_point(const Revolution *shape, bool s
         mask mirrored = signed_radius < (real)(0);
         real signed_slope = lanes_select(mirrored, -slope, slope);
         Vector gradient = vector_fma(axis, -signed_slope, vector_scale(radial, axis_length));
-        // the apex has no normal: use the axis, the normal that an eye on it would expect
+        // the apex does not have a normal; use the axis, the normal that an eye on it would expect
         mask apex = axis_distance == (real)(0);
         normal = vector_normalize(vector_select(apex, axis, gradient));
         real excess = axis_distance - real_divide(fabs(signed_radius), axis_length);
@@ -358,7 +359,7 @@ static inline SurfacePoint revolution_side_point(const Revolution *shape, bool s
                               vector_norm1(p) + vector_norm1(base) + fabs(radius));
 }
 
-// Likewise of the cap next to p, whose height is the ends' own.
+// Returns the point of the cap next to p, at the height of an end.
 static inline SurfacePoint revolution_cap_point(const Revolution *shape, Vector p, real height,
                                                 real rounding_scale)
 {
@@ -373,7 +374,8 @@ static inline SurfacePoint revolution_cap_point(const Revolution *shape, Vector 
                               rounding_scale);
 }
 
-// The position is moved onto the cap's plane, or else onto the side, along its normal.
+// Returns the surface point. Its position is moved onto the cap's plane, or else onto the side, along its
+// normal.
 static inline SurfacePoint revolution_surface_point(const Revolution *shape, bool sloped, const Ray *ray,
                                                     real t)
 {
@@ -386,7 +388,7 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     if (shape->id.y & REVOLUTION_CAPPED) {
         RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
         RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
-        // by F, rounded, the point of a thin plate could seem at its other end
+        // relative to the rounded F, the point of a thin plate could appear at its other end
         if (has_eye_power(shape->id)) height = vector_dot(ray_point(ray, t), vector_of(shape->axis_slope));
         SurfacePoint cap = revolution_cap_point(shape, p, height, rounding_scale);
         if (has_power) surface_point_move_to_ray(&cap, ray, t, rounding_scale);

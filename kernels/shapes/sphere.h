@@ -1,4 +1,5 @@
-// Sphere: with f from the center to the ray's start, b = f . d, c = f . f - r^2, discriminant b^2 - a c.
+// A sphere. With f from the center to the ray's start, b = f . d, c = f . f - r^2, and the discriminant is
+// b^2 - a c.
 #ifndef SPHERE_H
 #define SPHERE_H
 
@@ -10,8 +11,9 @@ typedef struct {
     real b, c;
 } SphereCoefficients;
 
-// Each rounded about once. `to_center` is -f. c is the origin's power: f . f - r^2, or the eye's plus
-// o . (o - 2 center), in which the center's rounding counts only by the origin's distance from the eye.
+// Computes the coefficients, each rounded about once. `to_center` is -f. c is the origin's power: f . f -
+// r^2, or the eye's plus o . (o - 2 center), in which the center's rounding counts only by the origin's
+// distance from the eye.
 static inline SphereCoefficients sphere_coefficients(const Sphere *sphere, PairVector to_center,
                                                      const Ray *ray)
 {
@@ -32,20 +34,21 @@ static inline SphereCoefficients sphere_coefficients(const Sphere *sphere, PairV
     return coefficients;
 }
 
-// From rounded b and c, off by 2 u (b^2 + |a c|): for rays that start near the closest approach.
+// Computes the discriminant from rounded b and c, off by 2 u (b^2 + |a c|), for rays that start near the
+// closest approach.
 static inline real sphere_discriminant_near(SphereCoefficients compensated, const Ray *ray)
 {
     return difference_of_products(compensated.b, compensated.b, ray->squared, compensated.c);
 }
 
-// a r^2 - |E|^2 for the line's moment E = f x d (Lagrange's identity): off by some 10 u a r^2 at any
-// distance.
+// Computes the discriminant as a r^2 - |E|^2 for the line's moment E = f x d (Lagrange's identity), off by
+// about 10 u a r^2 at any distance.
 static inline real sphere_discriminant_far(Vector moment, real radius, const Ray *ray)
 {
     return real_fma(ray->squared * radius, radius, -vector_dot(moment, moment));
 }
 
-// The more accurate of the two.
+// Returns the more accurate of the two discriminants.
 static inline real sphere_discriminant(SphereCoefficients compensated, Vector moment, real radius,
                                        const Ray *ray)
 {
@@ -56,16 +59,16 @@ static inline real sphere_discriminant(SphereCoefficients compensated, Vector mo
     return discriminant;
 }
 
-// Two conservative rejects first. b^2 - a c, divided by a to stay in range for any direction, with f . f
-// lowered by more than all roundings (some 20 u), costs no more than the textbook's test. Then rays that
-// leave the sphere outward.
+// Intersects a sphere after two conservative rejects. The first is b^2 - a c, divided by a to stay in range
+// for any direction, with f . f lowered by more than all roundings (about 20 u), which costs no more than the
+// textbook's test. The second rejects rays that leave the sphere outward.
 //
-// The plain form takes the line's closest point to the center, l = f - (b / a) d, and is off by about
-// 1.4 u rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
+// The plain form takes the line's closest point to the center, l = f - (b / a) d, and is off by about 1.4 u
+// rho r at distance rho r (Haines, Gunther, Akenine-Moller, Precision improvements for ray/sphere
 // intersection, Ray Tracing Gems, 2019, chapter 7). Within 0.4 radii of the surface c cancels, and both roots
-// with it: up to 21 ulp at 1.1 radii, but 3.5 from c rounded once. There b^2 - a c also decides hit or miss:
-// |l|^2, off by some 3 u r^2, would break the horizon of a ground sphere. The compensated form rounds each
-// number once.
+// with it: up to 21 ulp at 1.1 radii, but 3.5 from c rounded once. There b^2 - a c also decides hit or miss,
+// because |l|^2, off by about 3 u r^2, would break the horizon of a ground sphere. The compensated form
+// rounds each number once.
 static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -112,8 +115,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     return hit & (*t > ray->tmin);
 }
 
-// The point seen from the center; compensated n = (l -+ h d) / r with l = d x E / a and h the root of the
-// discriminant over a, which loses no bits with distance.
+// Returns the point seen from the center. The compensated form is n = (l -+ h d) / r with l = d x E / a and h
+// the root of the discriminant over a, which loses no bits with distance.
 static inline Vector sphere_normal(const Sphere *sphere, const Ray *ray, real t)
 {
     Vector center = vector_of(sphere->center_radius);
@@ -183,7 +186,7 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
     hit = certain_select(passed, certain_crossing(ray, crossed.certain, crossed.perhaps, far_low, far_high),
                          hit);
     if (!lanes_any(left)) return hit;
-    // one crossing is the start; the other lies twice as far as the closest point
+    // one crossing is the start, and the other lies twice as far as the closest point
     real t = (real)(2) * crossed.middle_t, t_error = (real)(2.1f) * crossed.middle_error;
     CertainHit other =
         certain_crossing(ray, left, left, real_max(t - t_error, far_low), real_min(t + t_error, far_high));
@@ -194,7 +197,7 @@ static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real 
                                      SurfacePoint *point)
 {
     point->curvature = real_divide((real)(1), (real)(sphere->center_radius.w));
-    // of the point seen from the center: their roundings
+    // the roundings of the point seen from the center
     real sizes =
         (real)(4) * vector_norm1(vector_of(sphere->center_radius)) + (real)(2) * vector_norm1(ray->origin);
     point->normal_error = (real)(UNIT_ROUNDOFF)*point->curvature * sizes;

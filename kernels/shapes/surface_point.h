@@ -1,4 +1,4 @@
-// A point of a surface, as a shape's own formulas give it.
+// A point of a surface, as a shape's formulas compute it.
 #ifndef SURFACE_POINT_H
 #define SURFACE_POINT_H
 
@@ -13,8 +13,8 @@ typedef struct {
     Vector normal;         // geometric, unit, to either side
     Vector shading_normal; // unit; differs on smooth triangles
     real rounding_scale;
-    // At `certified`: how fast the shading normal turns along the surface, and a bound on its own error; of a
-    // flat surface a bound on the position's height over the exact one, else NEVER.
+    // At `certified`, how fast the shading normal turns along the surface, and a bound on its error. For a
+    // flat surface, a bound on the position's height over the exact surface, else NEVER.
     real curvature, normal_error, height;
 } SurfacePoint;
 
@@ -31,11 +31,11 @@ static inline SurfacePoint surface_point_make(Vector position, Vector normal, re
     return point;
 }
 
-// Replaces the position by the ray's own point at t where the ray's origin and its path to the hit are below
-// 1/16 of `shape_scale`, the magnitude of the shape's numbers. There their rounding would dominate: on a
-// planet, meters. The shape's t must be accurate: along the normal off by at most 13 u of the ray's origin
-// and path (a sphere at `single` with a device's worst quotients and roots; 3 u without), plus the 6 u^2 of
-// the shape's numbers that sums of exact products lose.
+// Replaces the position by the ray's point at t if the ray's origin and its path to the hit are below 1/16 of
+// `shape_scale`, the magnitude of the shape's numbers. There their rounding would dominate, by meters on a
+// planet. The shape's t must be accurate: along the normal off by at most 13 u of the ray's origin and path
+// (a sphere at `single` with a device's worst quotients and roots; 3 u without them), plus the 6 u^2 of the
+// shape's numbers that sums of exact products lose.
 static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray, real t, real shape_scale)
 {
     real path_length = vector_norm1(ray->direction) * fabs(t), limit = shape_scale * (real)(0x1p-4f);

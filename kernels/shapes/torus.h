@@ -1,9 +1,10 @@
-// Torus, from the ray's closest approach to the center (shapes/torus_line.h) or seen from the eye.
+// A torus, intersected from the ray's closest approach to the center (shapes/torus_line.h) or as seen from
+// the eye.
 //
-// With the eye's power the zeros are those of F / (2 r), F = (rho - R)^2 + z^2 - r^2, from the eye on: for a
+// With the eye's power the zeros are those of F / (2 r), F = (rho - R)^2 + z^2 - r^2, from the eye on. For a
 // point x from there, with the parts x_u along `radial`, x_v across it and x_w along the axis,
 //     F = F(0) + 2 a . x + 2 A delta + (x_u + delta)^2 + x_w^2,   delta = rho - rho(0) - x_u,
-// where delta = x_v^2 / (rho + rho(0) + x_u). Nothing is large next to the eye but what cancels exactly.
+// where delta = x_v^2 / (rho + rho(0) + x_u). Next to the eye, only terms that cancel exactly are large.
 #ifndef TORUS_H
 #define TORUS_H
 
@@ -33,14 +34,14 @@ static inline TorusTube torus_tube(const Torus *torus)
     return tube;
 }
 
-// F / (2 r) at a point and its gradient, by which it is also the normal.
+// Returns F / (2 r) at a point and its gradient, whose direction is the normal.
 static inline real torus_tube_value(const TorusTube *tube, Vector x, Vector *normal)
 {
     real off = vector_dot(x, tube->across), z = vector_dot(x, tube->axis),
          along = vector_dot(x, tube->radial);
     real y = tube->eye_rho + along;
     real rho = real_sqrt(real_fma(y, y, off * off)), inverse_rho = real_inverse_or_zero(rho);
-    mask beyond = y <= (real)(0); // of the axis
+    mask beyond = y <= (real)(0); // beyond the axis
     real sum = lanes_select(beyond, (real)(1), rho + y);
     real delta = lanes_select(beyond, rho - y, off * real_divide(off, sum));
     real change = along + delta;
@@ -61,8 +62,8 @@ static inline real torus_tube_value_at(const TorusTube *tube, const Ray *ray, re
     return value;
 }
 
-// As torus_zero, along the ray. The first guess is its start, where that is in the bracket: next to it the
-// bracket's middle is far away.
+// Returns the zero along the ray in a bracket, as torus_zero does along a line. The first guess is the ray's
+// start if that is in the bracket, since the bracket's middle is far from it.
 static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real low, real high, mask entering)
 {
     real t = lanes_select(low <= ray->tmin, real_max(low, ray->tmin), (real)(0.5f) * (low + high));
@@ -81,7 +82,8 @@ static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real l
     return t;
 }
 
-// Where the slope is 0 in a bracket where its signs differ, by false position and halving in turn.
+// Returns where the slope is 0 in a bracket at whose ends its signs differ, by false position and halving in
+// turn.
 static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ray, real low, real high,
                                             real slope_low, real slope_high)
 {
@@ -101,7 +103,7 @@ static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ra
     return low;
 }
 
-// The first zero beyond the ray's start; the breaks are in s, in parts of `unit`.
+// Finds the first zero beyond the ray's start. The breaks are in s, in parts of `unit`.
 static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
                                   const real breaks[TORUS_BREAKS], real unit, real closest_t, real *t)
 {
@@ -150,7 +152,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     Vector axis = vector_of(torus->axis_minor);
     real inverse_length = real_sqrt(ray->inverse_squared);
     Vector direction = vector_scale(ray->direction, inverse_length);
-    real unit = (real)(1); // a power of two below which nothing overflows
+    real unit = (real)(1); // a power of two, in whose parts nothing overflows
     if (has_eye_power(torus->id)) {
         unit = real_inverse_power_of_two(bounding_radius);
         closest = vector_scale(closest, unit);
@@ -171,7 +173,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
     if (has_eye_power(torus->id))
         return torus_tube_hit(torus, ray, hit, breaks, real_divide(inverse_length, unit), closest_t, t);
 
-    real start = (ray->tmin - closest_t) * real_sqrt(ray->squared); // of the ray, as s
+    real start = (ray->tmin - closest_t) * real_sqrt(ray->squared); // the ray's start as s
     real slope, found_s = (real)(LARGEST);
     real before = torus_distance(&line, breaks[0], &slope);
     mask found = mask_none();
@@ -212,8 +214,9 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
     return point;
 }
 
-// Hits with bounds. The quartic's derivative separates intervals where the distance to the tube has at most
-// one zero; the distance at their ends and around its zero, beyond all errors, says what is certain.
+// A torus for hits with bounds. The quartic's derivative separates intervals where the distance to the tube
+// has at most one zero. The distances at their ends and around the zero, beyond all errors, decide what is
+// certain.
 typedef struct {
     Vector start, axis; // the ray's origin, seen from the center
     real major, minor;
@@ -255,7 +258,7 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
     return point;
 }
 
-// How fast the normal turns along the surface, at most.
+// Returns a bound on how fast the normal turns along the surface.
 static inline real torus_curvature(const CertainTorus *torus, real rho)
 {
     real least = real_min(rho, torus->minor);
@@ -264,8 +267,8 @@ static inline real torus_curvature(const CertainTorus *torus, real rho)
                         (real)(1 / SMALLEST_RATIO));
 }
 
-// A ray that starts on the torus: until when it cannot return, 0 if that is unknown. Within half of the
-// smaller radius the distance bends by no more than 2 over that.
+// Returns until when a ray that starts on the torus cannot return, or 0 if that is unknown. Within half of
+// the smaller radius the distance bends by no more than 2 over that.
 static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 {
     TorusPoint start = torus_point(torus, ray, (real)(0));
@@ -277,9 +280,9 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
     return lanes_select(known, (real)(0.5f) * cosine * least * ray_inverse_length(ray), (real)(0));
 }
 
-// The crossing in a bracket at whose ends the exact ray is certainly on different sides. It is narrowed. Only
-// signs beyond `place` count; the constants just choose the points: the zero is off by `place` over the
-// slope, and beyond twice that the sign is certain.
+// Returns the crossing in a bracket at whose ends the exact ray is certainly on different sides. The bracket
+// is narrowed. Only signs beyond `place` count, and the constants only choose the points: the zero is off by
+// `place` over the slope, and beyond twice that the sign is certain.
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {
@@ -342,7 +345,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     real start = real_max(from, ray->tmin), departure = torus_departure(&certain, ray);
     start = lanes_select(left, departure, start);
     TorusPoint point = torus_point(&certain, ray, start);
-    // a break is a turning point within rounding, whose distance that moves by less than this part of it
+    // a break is a turning point within rounding; its distance moves by less than this part of the rounding
     const real margin = real_fma(radius, real_divide((real)(0.125f), certain.minor), (real)(2));
     mask outside = lanes_select(left, ray->leaves_outward, point.distance > (real)(0));
     mask known = fabs(point.distance) > point.place;

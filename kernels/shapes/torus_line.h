@@ -1,14 +1,14 @@
 // A torus along a line: the points at distance `minor` from a circle of radius `major`.
 //
-// Everything happens around the ray's closest approach to the center, where the quartic has no cubic term and
-// no large numbers: in s, the length along the ray from there, it is
+// Everything is computed around the ray's closest approach to the center, where the quartic has no cubic term
+// and no large numbers. In s, the length along the ray from there, it is
 //     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
 // for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
 // The quartic's derivative only separates the intervals where the quartic is monotonic: in each the distance
 // to the surface, whose sign is the quartic's, has at most one zero. There the distance itself,
 //     sqrt((rho - R)^2 + z^2) - r,
-// which is exact to a few u where the quartic cancels, is solved for its one zero. All by + - * / sqrt and
-// bracketing, so that axis-parallel and equatorial rays need no case of their own.
+// which is exact to a few u where the quartic cancels, is solved for its one zero. Everything uses + - * /
+// sqrt and bracketing, so that axis-parallel and equatorial rays need no special cases.
 #ifndef TORUS_LINE_H
 #define TORUS_LINE_H
 
@@ -22,7 +22,7 @@ typedef struct {
     real major, minor;
 } TorusLine;
 
-// The signed distance to the tube's surface, negative inside, and its derivative along the line.
+// Returns the signed distance to the tube's surface, negative inside, and its derivative along the line.
 static inline real torus_distance(const TorusLine *line, real s, real *slope)
 {
     Vector radial = vector_fma(line->direction_cross_axis, s, line->closest_cross_axis);
@@ -35,14 +35,14 @@ static inline real torus_distance(const TorusLine *line, real s, real *slope)
     return from_circle - line->minor;
 }
 
-// The quartic's derivative, 4 s^3 + 2 p s + q.
+// Returns the quartic's derivative, 4 s^3 + 2 p s + q.
 static inline real torus_cubic(real p, real q, real s, real *slope)
 {
     *slope = real_fma((real)(12) * s, s, p + p);
     return real_fma(real_fma((real)(4) * s, s, p + p), s, q);
 }
 
-// The next iterate within a bracket: Newton's step if it lies inside, else the middle.
+// Returns the next iterate within a bracket: Newton's step if it lies inside, else the middle.
 static inline real bracket_next(real low, real high, real s, real value, real slope)
 {
     mask usable = quotient_is_bounded(value, slope);
@@ -51,15 +51,16 @@ static inline real bracket_next(real low, real high, real s, real value, real sl
     return lanes_select(inside, newton, (real)(0.5f) * (low + high));
 }
 
-// Steps enough to find all bits where Newton's method fails and the bracket is halved. Turning points need
-// fewer: they only have to separate the distance's zeros.
+// There are enough steps to find all bits if Newton's method fails and the bracket is halved. Turning points
+// need fewer, since they only have to separate the distance's zeros.
 enum { TORUS_ZERO_STEPS = IS_DOUBLE ? 60 : 30, TORUS_TURNING_STEPS = IS_DOUBLE ? 40 : 20 };
 
-// The bounding sphere's squared radius is taken this much larger: the ends of the line in it lie outside the
-// torus whatever is rounded.
+// The bounding sphere's squared radius is enlarged by this factor, so that the ends of the line in it lie
+// outside the torus however numbers are rounded.
 #define TORUS_ENLARGEMENT 1.001f
 
-// The cubic's zero between low and high if its signs differ there; else the end where it is nearer to 0.
+// Returns the cubic's zero between low and high if its signs differ there, else the end where it is nearer to
+// 0.
 static inline real torus_turning_point(real p, real q, real low, real high)
 {
     real slope;
@@ -78,7 +79,7 @@ static inline real torus_turning_point(real p, real q, real low, real high)
     return lanes_select(crosses, s, end);
 }
 
-// The zero of the distance in a bracket where its signs differ.
+// Returns the zero of the distance in a bracket where its signs differ.
 static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
 {
     real s = (real)(0.5f) * (low + high);
@@ -95,7 +96,7 @@ static inline real torus_zero(const TorusLine *line, real low, real high, mask e
     return s;
 }
 
-// The ray's closest point to the center, relative to the center, and its t.
+// Returns the ray's closest point to the center, relative to the center, and its t.
 static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *closest_t)
 {
     Vector center = vector_of(torus->center_major);
@@ -111,9 +112,9 @@ static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *clo
     return vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
 }
 
-// The ends of the line in the bounding sphere, and in between the zeros of the quartic's derivative: between
-// neighbors the distance has at most one zero. The derivative's turning points, +-sqrt(-p / 6), separate its
-// zeros.
+// Finds the ends of the line in the bounding sphere, and in between the zeros of the quartic's derivative:
+// between neighbors the distance has at most one zero. The derivative's turning points, +-sqrt(-p / 6),
+// separate its zeros.
 enum { TORUS_BREAKS = 5 };
 
 static inline void torus_breaks(const TorusLine *line, real squared_distance, real span,

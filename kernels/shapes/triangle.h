@@ -1,10 +1,10 @@
-// Triangle, watertight: a ray through an edge or a vertex that triangles share hits at least one of them.
+// A watertight triangle: a ray through an edge or a vertex that triangles share hits at least one of them.
 //
-// Vertices relative to the ray's start are rotated into a frame whose third axis is the ray; a shared vertex
-// gives the same numbers in every triangle. There the signs of three edge functions decide, and
+// Vertices relative to the ray's start are rotated into a frame whose third axis is the ray, so that a shared
+// vertex gives the same numbers in every triangle. There the signs of three edge functions decide, and
 // difference_of_products has the exact sign (after Woop, Benthin, Wald, Watertight ray/triangle intersection,
-// JCGT 2(1), 2013; they shear along the direction's largest axis and fall back to double precision where an
-// edge function is 0).
+// JCGT 2(1), 2013; they shear along the direction's largest axis and fall back to double precision if an edge
+// function is 0).
 #ifndef TRIANGLE_H
 #define TRIANGLE_H
 
@@ -29,10 +29,10 @@ static inline Corners corners_select(mask condition, Corners yes, Corners no)
 }
 
 typedef struct {
-    real u, v, w;                // edge functions opposite a, b, c; all of one sign inside, edges included
-    real determinant;            // their sum
-    Vector a, b, c;              // the vertices, from the ray's start
-    real ax, ay, bx, by, cx, cy; // and across it
+    real u, v, w;     // the edge functions opposite a, b, c; all of one sign inside, edges included
+    real determinant; // their sum
+    Vector a, b, c;   // the vertices, from the ray's start
+    real ax, ay, bx, by, cx, cy; // the vertices across the ray
 } TriangleEdges;
 
 static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
@@ -80,8 +80,8 @@ static inline bool has_eye_height(uint4 id)
 }
 
 // The plain step. Each product is off by at most 2 u of its factors' lengths, u of itself, and u each for the
-// rounding of `to_plane`, from the ray's start to a vertex, and of the normal; by 4 u where the height nearly
-// vanishes, and by 5 u from the plane that the eye's height defines, as the vertex was rounded, too.
+// rounding of `to_plane`, from the ray's start to a vertex, and of the normal. It is off by 4 u if the height
+// nearly vanishes, and by 5 u from the plane that the eye's height defines, since the vertex is rounded.
 typedef struct {
     real height, along;
     mask behind;           // the plane lies behind the ray's start
@@ -108,9 +108,9 @@ static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_p
     return plane;
 }
 
-// The accurate step. At a low angle both products cancel; compensated, the normal itself is in pairs. Next to
-// the eye the height above the plane is the eye's less n . o.
-// `in_plane` is the t of rays in the triangle's plane.
+// The accurate step. At a low angle both products cancel, so they are compensated, with the normal in pairs.
+// Next to the eye the height above the plane is the eye's less n . o. `in_plane` is the t of rays in the
+// triangle's plane.
 static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray, real in_plane)
 {
     Vector a = vector_of(triangle->a);
@@ -136,7 +136,8 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
     return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), in_plane);
 }
 
-// The interval of t between the vertices' least and largest coordinate on one axis, widened by the slack.
+// Returns the interval of t between the vertices' least and largest coordinate on one axis, widened by the
+// slack.
 static inline Interval triangle_slab(real a, real b, real c, real slack, real inverse)
 {
     real low = (real_min(real_min(a, b), c) - slack) * inverse;
@@ -144,7 +145,7 @@ static inline Interval triangle_slab(real a, real b, real c, real slack, real in
     return (Interval){real_min(low, high), real_max(low, high)};
 }
 
-// The largest |coordinate| on each axis.
+// Returns the largest |coordinate| on each axis.
 static inline Vector corners_max_abs(Corners corners)
 {
     Vector a = corners.a, b = corners.b, c = corners.c;
@@ -153,9 +154,9 @@ static inline Vector corners_max_abs(Corners corners)
                     real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
 }
 
-// The clamped step. Edge-on the error of t is unbounded, while the edge functions, which know nothing of t,
-// still report a hit. Clamping to the vertices' own t and to their box keeps that hit on the triangle and
-// within the boxes of the BVH, whose slack is four times this one.
+// The clamped step. Edge-on the error of t is unbounded, while the edge functions, which do not depend on t,
+// still report a hit. Clamping to the vertices' t and to their box keeps that hit on the triangle and within
+// the boxes of the BVH, whose slack is four times this one.
 static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray, real accurate_t)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
@@ -232,8 +233,8 @@ static inline Vector triangle_blend(TriangleWeights weights, Corners corners)
                       vector_fma(corners.b, weights.b, vector_scale(corners.c, weights.c)));
 }
 
-// The hit point, blended from the vertices. The normal may have any length. `next_to_eye`: triangles with an
-// eye's height.
+// Returns the hit point, blended from the vertices. The normal may have any length. `next_to_eye` marks
+// triangles with an eye's height.
 static inline SurfacePoint corners_surface_point(Corners corners, Vector normal, TriangleWeights weights,
                                                  mask next_to_eye, const Ray *ray, real t)
 {
@@ -257,7 +258,7 @@ static inline SurfacePoint triangle_surface_point(const Triangle *triangle, cons
                                  next_to_eye, ray, t);
 }
 
-// Interpolates the shading normal from the vertices'; a triangle whose are all 0 is flat.
+// Interpolates the shading normal from those of the vertices. A triangle whose normals are all 0 is flat.
 static inline void triangle_smooth(Corners normals, TriangleWeights weights, SurfacePoint *point)
 {
     Vector normal = triangle_blend(weights, normals);
@@ -265,12 +266,12 @@ static inline void triangle_smooth(Corners normals, TriangleWeights weights, Sur
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
-// Upper bounds: `size` of the vertices' distances from the eye, `longest` of the edges' lengths.
+// Upper bounds: `size` on the vertices' distances from the eye, `longest` on the edges' lengths.
 typedef struct {
     scalar size, longest;
 } TriangleSizes;
 
-// An upper bound of the length of xyz >= 0: a root would make packets wait.
+// Returns an upper bound on the length of xyz >= 0. A root would make packets wait.
 static inline scalar norm_above(scalar4 a)
 {
     scalar xy = a.x > a.y ? a.x : a.y, largest = xy > a.z ? xy : a.z;
@@ -287,11 +288,11 @@ static inline TriangleSizes triangle_sizes(const Triangle *triangle)
     return (TriangleSizes){norm_above(largest), norm_above(high - low)};
 }
 
-// The signs of the edge functions: where a vertex is off by `error` along each axis of the ray's frame, they
-// are off by that times the coordinates that they are made of.
+// The signs of the edge functions. If a vertex is off by `error` along each axis of the ray's frame, they are
+// off by that times the coordinates that they are made of.
 typedef struct {
     mask perhaps, certain;
-    real coordinates; // times the error that of all three together
+    real coordinates; // the error of all three together, divided by `error`
 } TriangleSigns;
 
 static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real error)
@@ -313,15 +314,15 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
     return signs;
 }
 
-// The error across the ray of a vertex up to a distance from the ray's start.
+// Returns the error across the ray of a vertex up to a distance from the ray's start.
 static inline real triangle_place_error(const Ray *ray, real distance, TriangleSizes sizes)
 {
     return ray_place_error(ray, distance) +
            (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, (real)(sizes.size));
 }
 
-// t is between those of the vertices, weighted by the edge functions. The vertices of a triangle that is hit
-// are no farther across the ray than its longest edge and the error.
+// Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
+// vertices of a triangle that is hit are not farther across the ray than its longest edge and the error.
 static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, const Ray *ray, mask lanes,
                                                    TriangleSigns signs, TriangleSizes sizes, real error)
 {
@@ -334,11 +335,11 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
     real place = triangle_place_error(ray, distance, sizes);
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
-    // in doubt as well: if it is hit, then where the weights say
+    // also if it is uncertain: if it is hit, then where the weights place it
     mask narrows = perhaps & (fabs(edges->determinant) > (real)(8) * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
     real t = c_t + real_fma(a_t - c_t, edges->u * inverse, (b_t - c_t) * (edges->v * inverse));
-    // of all weights: the edge functions' errors and as much of the determinant's, over 7/8 of it: 16/7
+    // for all weights, the edge functions' errors and as much of the determinant's, over 7/8 of it: 16/7
     real part = (real)(2.5f) * edge_error * fabs(inverse);
     real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
                    real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
@@ -350,7 +351,7 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
     return certain_select(narrows, certain_at(hit, t), hit);
 }
 
-// By the vertices' distances from the ray's start, which may be much less than those from the eye.
+// Uses the vertices' distances from the ray's start, which may be much less than those from the eye.
 static OUT_OF_LINE CertainHit triangle_certain_hit_near(const TriangleEdges *edges, const Ray *ray,
                                                         mask lanes, TriangleSizes sizes, real error)
 {
@@ -363,7 +364,7 @@ static OUT_OF_LINE CertainHit triangle_certain_hit_near(const TriangleEdges *edg
     return triangle_certain_crossing(edges, ray, lanes & !misses, signs, sizes, error);
 }
 
-// First by one error for all edge functions of triangles that are hit: docs/numerics.md.
+// Tests first by one error for all edge functions of triangles that are hit (docs/numerics.md).
 static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
 {
     TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
@@ -378,13 +379,13 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     lanes = lanes & signs.perhaps & !ray_left_for_good(ray, triangle->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     CertainHit hit = triangle_certain_crossing(&edges, ray, lanes, signs, sizes, error);
-    if (RARELY(lanes_any(hit.doubt))) // lanes without must not depend on those with
+    if (RARELY(lanes_any(hit.doubt))) // certain lanes must not depend on uncertain ones
         hit = certain_select(hit.doubt, triangle_certain_hit_near(&edges, ray, lanes, sizes, error), hit);
     return hit;
 }
 
-// How much longer than high a triangle is at least, over its length: a vertex that moves by e turns the
-// normal by e times this at most, and a point that does moves its weights by as much.
+// Returns a bound on how much longer than high a triangle is, over its length. A vertex that moves by e turns
+// the normal by at most e times this, and a point that moves by e moves its weights by as much.
 static inline real triangle_slimness(Corners corners)
 {
     Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
@@ -395,8 +396,8 @@ static inline real triangle_slimness(Corners corners)
     return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
 }
 
-// The errors of the normals: each vertex is off by u of its length, and where normals are blended the weights
-// move with the place.
+// Sets the errors of the normals. Each vertex is off by u of its length, and if normals are blended, the
+// weights move with the place.
 static inline void triangle_set_normal_errors(Corners corners, Corners normals, TriangleWeights weights,
                                               SurfacePoint *point)
 {
@@ -410,9 +411,9 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
     point->normal_error = vertex_error * (slimness + point->curvature);
 }
 
-// The lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor. So they
-// cannot meet this one if it lies behind the neighbor's plane and they leave to its front; nor if they run to
-// the side of this one's plane that the neighbor is on.
+// Returns the lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor. So
+// they cannot hit this triangle if it lies behind the neighbor's plane and they leave to its front, nor if
+// they run to the side of this triangle's plane that the neighbor is on.
 static inline mask triangle_left_behind(const Triangle *triangle, const TriangleNeighbors *neighbors,
                                         const Ray *ray, mask lanes)
 {
