@@ -32,7 +32,7 @@ bool option_report(ReportOptions *options, int option, const char *value, bool *
     }
 }
 
-// A command writes one report. Its file is opened before anything is measured.
+// The file of the report, of which a command writes one. It is opened before anything is measured.
 static OutputFile report_file;
 
 static ReportFormat format_of_ending(const char *path)
@@ -65,7 +65,7 @@ bool report_options_check(ReportOptions *options, const ResultTable *table)
     return is_open;
 }
 
-// A row, with the objects that its columns may come from.
+// A row with the objects that its columns may come from.
 typedef struct {
     const json_t *sources[3]; // the row, the object around it, the document
 } Row;
@@ -135,7 +135,7 @@ static size_t column_count(const ResultTable *table)
     return count;
 }
 
-// Appends the row's name, its first columns with `between` between them.
+// Appends the row's name, which is its first columns with `between` between them.
 static void name_append(Text *text, const Row *row, const ResultTable *table, const char *between)
 {
     for (size_t i = 0; i < table->name_count; i++) {
@@ -241,7 +241,7 @@ static void markdown_row(Writing *writing, const Row *row)
     text_appendf(&writing->body, "|\n");
 }
 
-// What is not in the row's name, for those who read of its failure.
+// Appends the values that are not in the row's name, for readers of a failure.
 static void details_append(Text *text, const Row *row, const ResultTable *table)
 {
     const size_t start = text->count;

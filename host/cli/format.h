@@ -1,4 +1,5 @@
-// A report's formats for other programs, all made from its JSON: the text is what a command prints by itself.
+// Writes a report in formats for other programs, which are all made from its JSON. The text is what a command
+// prints by default.
 #pragma once
 
 #include "host/base/json.h"
@@ -16,33 +17,35 @@ typedef enum {
 
 typedef struct {
     ReportFormat format;
-    const char
-        *output; // the file that gets the report, next to the text on stdout; NULL: it replaces the text
+    // The file that receives the report while stdout receives the text. NULL prints the report instead of the
+    // text.
+    const char *output;
 } ReportOptions;
 
-// A column of a row's values. `path` names its member, with dots between members, such as "frame_ms.median";
-// it is looked for in the row, then in the object whose array has the row, then in the document.
+// A column of a row's values. `path` names its member, with dots between members, such as "frame_ms.median".
+// It is looked up in the row, then in the object whose array has the row, then in the document.
 typedef struct {
     const char *heading, *path;
 } ResultColumn;
 
 enum { RESULT_COLUMNS_MAX = 24 };
 
-// A command's results as rows.
+// Describes a command's results as rows.
 typedef struct {
     const char *command;
-    const char *rows; // the array of rows, or one array in each object of another, such as "scenes.variants";
-                      // "": one row, the document
-    ResultColumn
-        columns[RESULT_COLUMNS_MAX]; // up to one without a heading; the first `name_count` name the row
+    // The array of rows, or one array in each object of another, such as "scenes.variants". With "" the
+    // document is the only row.
+    const char *rows;
+    // The columns, up to the first that has no heading. The first `name_count` name the row.
+    ResultColumn columns[RESULT_COLUMNS_MAX];
     size_t name_count;
     // The paths of verdicts, up to NULL, and the value with which a row has failed: "true", "false" or a
-    // text. The first that the row has counts.
+    // text. The first verdict that the row has counts.
     const char *verdicts[2], *failed;
-    // Of times, for FORMAT_BENCHMARK: in milliseconds, one or one of each run. NULL: the command measures
-    // none.
+    // The paths of times in milliseconds, one per row or one per run, for FORMAT_BENCHMARK. NULL if the
+    // command measures none.
     const char *times, *processor_times;
-    const char *seconds; // that the row took, for FORMAT_JUNIT; NULL: not known
+    const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL
 } ResultTable;
 
 enum { OPTION_FORMAT = 0x500, OPTION_REPORT_JSON, OPTION_REPORT_OUTPUT };
@@ -57,17 +60,17 @@ enum { OPTION_FORMAT = 0x500, OPTION_REPORT_JSON, OPTION_REPORT_OUTPUT };
     "      --output FILE     write the report to a file and print the text\n"                                \
     "      --json            print JSON\n"
 
-// Handles one of FORMAT_LONG_OPTIONS; *valid receives whether its value is valid. False if `option` is
-// another.
+// Handles one of FORMAT_LONG_OPTIONS and sets *valid if its value is valid. Returns false if `option` is not
+// one of them.
 bool option_report(ReportOptions *options, int option, const char *value, bool *valid);
-// Checks the options together, last of a command's, and opens the file. False with a message: the command has
-// no times, the file's format is not known, or it cannot be written.
+// Checks the options together, after all others of a command, and opens the file. Returns false with a
+// message if the command has no times, if the file's format is unknown, or if the file cannot be written.
 bool report_options_check(ReportOptions *options, const ResultTable *table);
-// Whether the command prints its text.
+// Returns whether the command prints its text.
 static inline bool report_has_text(const ReportOptions *options)
 {
     return options->format == FORMAT_TEXT || options->output;
 }
-// Writes the report in the options' format, which is not FORMAT_TEXT, and frees it. False with a message: the
-// file cannot be written.
+// Writes the report in the options' format, which must not be FORMAT_TEXT, and frees it. Returns false with a
+// message if the file cannot be written.
 bool report_write(Json *json, const ResultTable *table, const ReportOptions *options);

@@ -1,5 +1,5 @@
-// glint golden: the images of scenes at strict, which have the same bits on every device, as one line per
-// scene.
+// glint golden writes and checks the images of scenes at strict, which have the same bits on every device, as
+// one line per scene.
 #include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
@@ -27,7 +27,8 @@ static const char file_head[] = "# glint golden 1: images at strict; glint golde
                                 "Hashes are of the scene as the device gets it,\n"
                                 "# of the layers' values, and of 12 x 8 tiles of the color.\n";
 
-// What is compared, in the order in which an image is computed: what differs first explains the rest.
+// The compared layers in the order in which an image is computed, since the first that differs explains the
+// others.
 static const struct {
     const char *name;
     Layer layer;
@@ -56,14 +57,14 @@ typedef struct {
     bool writes;
 } GoldenOptions;
 
-// The comparison of a scene. `first`: the layer that differs first, HASHED_COUNT: none. The rectangle has all
-// tiles that differ.
+// The comparison of a scene. `first` is the first layer that differs, or HASHED_COUNT. The rectangle contains
+// all tiles that differ.
 typedef struct {
     const char *scene;
     bool is_new, scene_differs;
     size_t first, tile_count;
-    uint32_t left, top, right, bottom; // pixels; right and bottom are not part of it
-    char *crop;                        // the file that shows it; NULL: none
+    uint32_t left, top, right, bottom; // in pixels; right and bottom are exclusive
+    char *crop;                        // the file that shows it, or NULL
 } Finding;
 
 static const struct option long_options[] = {
@@ -135,7 +136,7 @@ static void golden_append(Text *text, const Golden *golden)
     text_appendf(text, " %s\n", golden->scene);
 }
 
-// Reads hexadecimal digits; returns what follows them, NULL if there are fewer.
+// Reads hexadecimal digits. Returns the position after them, or NULL if there are fewer.
 static const char *hex_read(const char *at, size_t digits, uint64_t *value)
 {
     *value = 0;
@@ -147,7 +148,7 @@ static const char *hex_read(const char *at, size_t digits, uint64_t *value)
     return at;
 }
 
-// Reads " NAME=" and 16 digits; NULL if they are not there.
+// Reads " NAME=" and 16 digits. Returns NULL if they are not there.
 static const char *hash_read(const char *at, const char *name, uint64_t *hash)
 {
     const size_t length = strlen(name);
@@ -155,7 +156,7 @@ static const char *hash_read(const char *at, const char *name, uint64_t *hash)
     return hex_read(at + 2 + length, 16, hash);
 }
 
-// Reads a prefix and a number of up to nine digits; NULL if they are not there.
+// Reads a prefix and a number of up to nine digits. Returns NULL if they are not there.
 static const char *count_read(const char *at, const char *prefix, uint32_t *value)
 {
     const size_t length = strlen(prefix);
@@ -167,7 +168,7 @@ static const char *count_read(const char *at, const char *prefix, uint32_t *valu
     return at + digits;
 }
 
-// Reads a line, which ends with a NUL. False: it is not one of the file's.
+// Reads a line, which ends with a NUL. Returns false if it is not a line of the file's format.
 static bool golden_read(Golden *golden, const char *line)
 {
     const char *at = count_read(line, "size=", &golden->width);
@@ -192,7 +193,7 @@ static bool golden_read(Golden *golden, const char *line)
     return is_sound;
 }
 
-// Reads the file. False with messages.
+// Reads the file. Returns false with messages if it cannot be read.
 static bool golden_list_read(GoldenList *list, const char *path, MessageList *messages)
 {
     Text text = {0};
@@ -223,7 +224,7 @@ static uint64_t layer_hash(const Film *film, Layer layer)
     const double *values = film->layers[layer];
     uint64_t hash = HASH_START;
     for (size_t i = 0; i < size / sizeof *values; i++) {
-        const float value = (float)values[i]; // strict computes in float: exact
+        const float value = (float)values[i]; // exact, since strict computes in float
         hash = hash_bytes(hash, &value, sizeof value);
     }
     return hash;
@@ -252,7 +253,7 @@ static void tiles_hash(const Film *film, uint16_t tiles[TILES])
         }
 }
 
-// Writes the rectangle of the image as SCENE-golden.png. NULL with a message if that fails.
+// Writes the rectangle of the image as SCENE-golden.png. Returns NULL with a message if that fails.
 static char *crop_write(const Film *film, const Finding *finding)
 {
     const uint32_t width = finding->right - finding->left, height = finding->bottom - finding->top;
@@ -300,7 +301,8 @@ static void findings_compare(Finding *finding, const Golden *golden, const Golde
     if (finding->tile_count > 0) finding->crop = crop_write(film, finding);
 }
 
-// Renders a scene as `golden` says, and sets its hashes. Returns EXIT_DONE, or why not.
+// Renders a scene with the settings of `golden`, and sets its hashes. Returns EXIT_DONE or the exit status of
+// the failure.
 static int golden_render(Golden *golden, Film *film, const GoldenOptions *options, Compute *compute)
 {
     Scene scene = {0};
@@ -401,7 +403,7 @@ static bool golden_list_write(const GoldenList *list, const char *path)
     return is_written;
 }
 
-// Adds the scenes to the lines, or replaces theirs. Returns the exit status.
+// Adds the scenes to the lines, or replaces the lines that exist. Returns the exit status.
 static int scenes_write(GoldenList *list, const GoldenOptions *options, char **scenes, size_t count,
                         Compute *compute)
 {
@@ -510,7 +512,7 @@ int command_golden(int argument_count, char **arguments)
     status = EXIT_USER;
     if (is_read && device_open(&open, &options.common)) {
         Progress progress;
-        progress_open(&progress, true); // for the interrupts
+        progress_open(&progress, true); // so that signals only set the flag
         char **scenes = arguments + optind;
         const size_t count = (size_t)(argument_count - optind);
         status = options.writes ? scenes_write(&list, &options, scenes, count, &open.compute)
