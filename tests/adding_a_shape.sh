@@ -22,7 +22,7 @@ for name in names:
 for match in re.finditer(r"```c\n(.*?)```", text, re.DOTALL):
     count += 1
     named = re.findall(r"`((?:host|kernels)/[\w/]+\.[ch])`", text[:match.start()])
-    # `flatten.c` after `host/compile/features.c` lies beside it
+    # `flatten.c` after `host/compile/features.c` is in the same folder
     beside = [f"{named[-1].rsplit('/', 1)[0]}/{name}" for name in re.findall(r"`(\w+\.[ch])`", text[:match.start()])]
     sources = []
     for name in reversed(named + beside):

@@ -1,6 +1,6 @@
 #!/bin/bash
-# The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/design.md). At length:
-# GLINT_LONG_TESTS=1, tools/chaos --long. A sanitized build has allocators and handlers of its own.
+# The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/design.md). With
+# GLINT_LONG_TESTS=1 it runs tools/chaos --long. A sanitized build replaces the allocators and handlers.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}

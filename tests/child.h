@@ -1,10 +1,10 @@
-// Work in a process of its own: OpenCL reads its environment once per process, and a fault ends one.
+// Runs work in a separate process, since OpenCL reads its environment once per process, and a fault ends one.
 #pragma once
 
 #include <stddef.h>
 
 typedef struct {
-    int status;        // as exit() got it; -1: ended by a signal
+    int status;        // the argument of exit(), or -1 if a signal ended the process
     char errors[8192]; // the start of its standard error
 } ChildEnd;
 

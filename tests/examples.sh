@@ -1,6 +1,6 @@
 #!/bin/bash
 # What the documents show a command print is what it prints today: exactly where nothing is timed, else line for line with
-# other numbers, hashes and device names. GLINT_LONG_TESTS=1 runs what measures, too.
+# other numbers, hashes and device names. GLINT_LONG_TESTS=1 also runs commands that measure.
 . "$(dirname "$0")/support.bash"
 
 # example DOCUMENT COMMAND: the lines below "$ COMMAND" in the document, without their indentation.
@@ -36,6 +36,6 @@ printf 'objects:\n  # a comment\n  - sphere: {center: [0, 1, 0], radius: 1, mate
 check "$guide: its scene renders" "$GLINT" render "$scratch/first.yaml" --size 96x54 --quiet -o "$scratch/first.png"
 exact $guide 'glint trace scenes/article.yaml --rays rays.txt'
 exact $guide 'glint check scenes/article.yaml'
-# sixteen kernels of its own
+# it builds sixteen kernels
 ! is_long || is_sanitized || alike $guide 'glint accuracy scenes/mirror-glass.yaml --size 320x180' '--seconds 0.01'
 finish

@@ -1,4 +1,4 @@
-// Rendering films for the tests that compare them.
+// Renders films for the tests that compare them.
 #pragma once
 
 #include "host/render/renderer.h"
@@ -7,25 +7,26 @@
 // GLINT_LONG_TESTS=1: tests take minutes instead of seconds.
 bool tests_are_long(void);
 
-// The lanes to compare, up to a 0: 1 and the device's own, which most other tests use, or 4 where that is 1;
-// where tests are long 1, 4, 8 and 16.
+// Returns the lanes to compare, up to a 0: 1 and the device's default, which most other tests use, or 4 if
+// that is 1; in long tests 1, 4, 8 and 16.
 const uint32_t *tested_lanes(const Device *device);
 
-// The whole image, one sample per pixel, with the defaults of glint render, but for the features: unless
-// tests are long all are built in, so that all tests of a run share one program per precision.
+// Returns settings for the whole image, one sample per pixel, with the defaults of glint render except for
+// the features: unless tests are long, all are built in, so that all tests of a run share one program per
+// precision.
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
 
-// Renders what the settings say; fails the test where they do not fit the device.
+// Renders with the settings. Fails the test if they do not fit the device.
 Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs);
 
-// The color of the part of a film that starts at x, y.
+// Returns the color of the part of a film that starts at x, y.
 Film film_cut(const Film *film, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
-// Its color with the columns from right to left.
+// Returns its color with the columns from right to left.
 Film film_flipped(const Film *film);
 
-// The layers that both have are equal in value (hence in their bits, but for the sign of a zero); else fails
-// the test, naming the first pixel that differs. Frees neither.
+// Fails the test, naming the first pixel that differs, unless the layers that both have are equal in value
+// (hence in their bits, except for the sign of a zero). Frees neither.
 void film_assert_same(const Film *film, const Film *expected, const char *what);
 
-// The number of pixels with a value that is not finite, or a negative color.
+// Returns the number of pixels with a value that is not finite, or a negative color.
 size_t film_count_faulty(const Film *film);

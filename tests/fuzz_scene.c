@@ -1,8 +1,9 @@
 // Feeds damaged files to one reader, in this process: fuzz_scene FORMAT RUNS SEED FILE…
-// FORMAT: of a scene, yaml, rt, cfg, nff or dat, or the ending of a mesh: those that assimp reads it reads in
-// a process each. The same arguments give the same inputs. Build it with sanitizers; it ends with a failure
-// only where a reader crashes, leaks or hangs, which assimp may; it then leaves the input in fuzz_scene.input
-// (sanitizers: with ASAN_OPTIONS=abort_on_error=1).
+//
+// FORMAT is yaml, rt, cfg, nff or dat for scenes, or the ending of a mesh. Meshes that assimp reads are each
+// read in a separate process. The same arguments give the same inputs. Build it with sanitizers. It fails
+// only if a reader crashes, leaks or hangs, which assimp may, and then leaves the input in fuzz_scene.input
+// (with sanitizers, if ASAN_OPTIONS=abort_on_error=1).
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
@@ -29,7 +30,8 @@ typedef struct {
 static const char *input;
 static size_t input_length;
 
-// SplitMix64 (Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014, figure 17).
+// The state of SplitMix64 (Steele, Lea and Flood, Fast splittable pseudorandom number generators, 2014,
+// figure 17).
 static uint64_t random_state;
 
 static size_t random_below(size_t limit)
@@ -166,9 +168,9 @@ static bool scene_read(const char *format, const char *bytes, size_t length)
     return read;
 }
 
-static size_t crash_count; // of assimp's processes, and of those that reached a limit
+static size_t crash_count; // assimp's processes that crashed or reached a limit
 
-// A file of the format in the working folder.
+// Writes a file of the format in the working folder and reads it.
 static bool mesh_read(const char *format, const char *bytes, size_t length)
 {
     char path[32];
@@ -241,7 +243,7 @@ int main(int argument_count, char **arguments)
         Text text = {0};
         text_append(&text, seed->items, seed->count);
         text_damage(&text, &seeds);
-        // Of exactly this length, so that the sanitizer sees a read past the end.
+        // The buffer has exactly this length, so that the sanitizer sees a read past the end.
         char *bytes = memory_allocate(text.count + !text.count, 1);
         memcpy(bytes, text.items, text.count);
         input = bytes;

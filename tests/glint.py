@@ -1,4 +1,4 @@
-"""Shared by the Python tests: runs the program in a folder of its own and reads the files that it writes.
+"""Shared by the Python tests: runs the program in a separate folder and reads the files that it writes.
 
 Tests are the executable tests/test_*.py; other Python files are helpers. A test finds the program in GLINT and its build
 folder in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG_CACHE_HOME, shared by the tests of a run.
@@ -49,7 +49,7 @@ BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
 
 
 def plain(name, folder="."):
-    """One of scenes/; unless tests are long a copy with the features of BALLS, whose kernels then serve it, too."""
+    """One of scenes/; unless tests are long a copy with the features of BALLS, so that the same kernels serve both."""
     if IS_LONG:
         return ROOT / "scenes" / name
     others = "plane:", "box:", "cylinder:", "directional:"
@@ -142,7 +142,7 @@ def has_device(**options):
 
 
 class TestCase(unittest.TestCase):
-    """Each test runs in an empty folder of its own."""
+    """Each test runs in a new, empty folder."""
 
     maxDiff = 4000
 

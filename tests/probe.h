@@ -1,4 +1,4 @@
-// The renderer as tests use it: one device for the whole program, chosen as glint chooses its own.
+// The renderer as tests use it, with one device for the whole program, chosen as glint chooses its default.
 #pragma once
 
 #include "host/base/fault.h"
@@ -12,7 +12,7 @@
 static DeviceList probe_devices;
 static Compute probe_compute;
 
-// For cmocka's group setup and teardown, which fails if a call of OpenCL did.
+// cmocka's group setup and teardown. The teardown fails if a call of OpenCL failed.
 static inline int probe_open(void **state)
 {
     (void)state;
@@ -53,7 +53,7 @@ static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings 
     return renderer;
 }
 
-// A program of a test's own kernels, which may include the shipped ones.
+// Builds a program of the test's kernels, which may include the shipped ones.
 static inline cl_program probe_program(const char *text, const char *prelude, const char *options)
 {
     size_t file_count = 0;
@@ -74,8 +74,8 @@ static inline cl_program probe_program(const char *text, const char *prelude, co
     return program;
 }
 
-// Closest hits with every feature built in, so that one program serves all scenes. False where the device
-// cannot, after its reason is printed.
+// Finds closest hits with every feature built in, so that one program serves all scenes. Returns false, after
+// printing the reason, if the device cannot.
 static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t lanes, const TraceRay *rays,
                                size_t count, TraceHit *hits)
 {
@@ -98,8 +98,8 @@ static inline bool probe_keep_band(void *context, const Film *band, double fract
     return true;
 }
 
-// The whole image, one sample per pixel, as glint renders it: built for what the scene needs, seen from the
-// eye.
+// Renders the whole image with one sample per pixel, as glint does: built for the features that the scene
+// needs, seen from the eye.
 static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t height, Precision precision,
                                 float *colors)
 {

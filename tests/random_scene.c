@@ -33,7 +33,7 @@ static Material random_material(Random *random, size_t index)
     return material;
 }
 
-// One of each form, then bounded ones; none so large that it hides the rest.
+// Returns one object of each form, then bounded ones, none so large that it hides the rest.
 static Object random_object(Random *random, size_t index)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
@@ -44,7 +44,7 @@ static Object random_object(Random *random, size_t index)
         RandomShape shape = random_shape(form, random);
         if (shape.radius > 3 || (!form->bounded && !first)) continue;
         Object *object = &shape.object;
-        // a plane behind the objects and a narrow cone beside them, not across the view
+        // a plane behind the objects and a narrow cone next to them, not across the view
         if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
         if (form->kind == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
         // the order of a triangle's vertices distinguishes glass from air, and the mirror reverses it

@@ -1,4 +1,4 @@
-// Scenes from texts and files, for the tests of the readers.
+// Reads scenes from texts and files, for the tests of the readers.
 #pragma once
 
 #include "host/base/text.h"
@@ -7,22 +7,24 @@
 // Reads with the reader for the ending of `name`.
 bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages);
 
-// A message as tests write it: `line:column: severity: text`, without a place where it has none.
+// Describes a message as tests write it: `line:column: severity: text`, or only the severity and text if it
+// has no place.
 void message_describe(Text *description, const Message *message);
 
-// All messages that a text gets, one per line. Whether the scene was read must agree with them.
+// Returns all messages that a text gets, one per line. Fails the test if they disagree with whether the scene
+// was read.
 Text scene_messages(const char *name, const char *text, bool lenient);
 
-// A scene that must be read without any message; `name` relative to the repository.
+// Returns a scene that must be read with no messages. `name` is relative to the repository.
 Scene scene_of_file(const char *path);
-// The same from a text, which may get warnings.
+// Returns the scene of a text, which may get warnings.
 Scene scene_of_text(const char *name, const char *text);
 
 // The scene of a file that has all of its format, for the tests of a group.
 extern Scene complete;
 int complete_open(const char *path);
 int complete_close(void **state);
-// Of one of its objects.
+// Returns the material of an object of that scene.
 const Material *material_of(const Object *object);
 
 void check_number(double value, double expected, const char *file, int line);
@@ -31,7 +33,7 @@ void check_vector(Vector3 vector, Vector3 expected, const char *file, int line);
 
 #define assert_near(value, expected, tolerance) check_near(value, expected, tolerance, __FILE__, __LINE__)
 
-// Equal but for the rounding of a few operations.
+// Compares numbers, which may differ by the rounding of a few operations.
 #define assert_number(value, expected)    check_number(value, expected, __FILE__, __LINE__)
 #define assert_vector(vector, ex, ey, ez) check_vector(vector, (Vector3){ex, ey, ez}, __FILE__, __LINE__)
 

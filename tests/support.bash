@@ -53,7 +53,7 @@ python_with() {
     done
     [ -x "$python" ] || python=${PYTHON:-python3}
     command -v "$python" >/dev/null || skip_all "there is no $python"
-    # one test after the other: they run beside each other
+    # tests run at the same time and must do this one after another
     mkdir -p "$folder" && exec {lock}>"$folder/lock" && flock "$lock"
     [ -x "$folder/python/bin/pip" ] ||
         "$python" -m venv --clear --system-site-packages "$folder/python" >"$log" 2>&1 ||

@@ -1,6 +1,6 @@
-// The errors of images made by hand, in which the count of each kind is known, and what follows from errors
-// and times. tests/test_accuracy.py checks the same figures of rendered images against an independent
-// implementation.
+// Checks the errors of images made by hand, in which the count of each kind is known, and the conclusions
+// from errors and times. tests/test_accuracy.py checks the same figures of rendered images against an
+// independent implementation.
 #include "host/base/memory.h"
 #include "host/measure/accuracy.h"
 #include "tests/scene_reading.h"
@@ -148,7 +148,7 @@ static void test_wrong_shadows(void **state)
     assert_true(errors.shading.largest == 0);
 
     variant.shadow[LIGHTS * at(5, 0) + 1] = 1; // where two objects meet
-    variant.shadow[LIGHTS * at(0, 3) + 1] = 1; // no edge of light 1
+    variant.shadow[LIGHTS * at(0, 3) + 1] = 1; // not an edge of light 1
     variant.shadow[LIGHTS * at(2, 7)] = 0;     // acne, or light behind a wall
     errors = compare(&reference, &variant);
     assert_int_equal(errors.shadow.edge, 2);
@@ -184,7 +184,7 @@ static void test_shading(void **state)
     Film reference = film_make(), variant = film_make();
     variant.color[3 * at(0, 0)] += 0.25;
     variant.color[3 * at(3, 4) + 2] -= 0.125;
-    variant.color[3 * at(11, 4)] += 0.375; // the background is no shading
+    variant.color[3 * at(11, 4)] += 0.375; // the background is not shaded
     AccuracyErrors errors = compare(&reference, &variant);
     const double values = 3.0 * NOTHING_FROM * HEIGHT, squares = 0.25 * 0.25 + 0.125 * 0.125;
     assert_near(errors.shading.largest, 0.25, 0);

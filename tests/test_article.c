@@ -1,6 +1,8 @@
-// The faults of the article's own program. Each test writes out its formula, in float as its kernel has it,
-// shows that the answer is wrong by the reference, and compares glint with the right one on the same `.cfg`
-// scene. run_tests: sanitize-long-only
+// Shows the faults of the program in Mouad Sidqi's "Ray Tracing in C explained". Each test writes out its
+// formula in float, as its kernel has it, shows by the reference that the answer is wrong, and compares glint
+// with the right answer on the same `.cfg` scene.
+//
+// run_tests: sanitize-long-only
 #include "host/verify/reference_color.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
@@ -27,13 +29,13 @@ static Float3 narrow(Vector3 a)
     return (Float3){(float)a.x, (float)a.y, (float)a.z};
 }
 
-// What the program counts as a hit.
+// Returns whether the program counts a distance as a hit.
 static bool within_limits(float t)
 {
     return t > 1e-6f && t < 300.0f;
 }
 
-// It solves a t^2 + b t + c = 0 and looks at the nearer root only.
+// The program solves a t^2 + b t + c = 0 and uses only the nearer root.
 static float nearer_root(float a, float b, float c)
 {
     float discriminant = b * b - 4 * a * c;
@@ -68,7 +70,7 @@ static Scene read_scene(const char *text)
     return scene_of_text("article.cfg", text);
 }
 
-// The reference's hit, after comparing glint's with it at `single`.
+// Returns the reference's hit, after comparing glint's with it at `single`.
 static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
 {
     for (size_t i = 0; i < scene->objects.count; i++)
@@ -124,7 +126,7 @@ static void looks_along_a_cylinder(void **state)
     assert_true(hit.t == 7);
     const Float3 axis = {0, 0, 1};
     assert_true(isnan(article_cylinder((Float3){0, 0, 0}, axis, 2, narrow(eye), narrow(forward))));
-    // So near the axis that a^2 - b^2 cancels, the side is there to be hit, at 1.5 / 2^-13.
+    // Near enough to the axis that a^2 - b^2 cancels, the ray hits the side, at 1.5 / 2^-13.
     const Vector3 nearly = {0x1p-13, 0, 1};
     hit = hit_of_both(&scene, (Vector3){0.5, 0, 8}, nearly);
     assert_int_equal(hit.object, 0);
@@ -208,7 +210,7 @@ static void sees_far_and_near(void **state)
     scene_free(&scene);
 }
 
-// How many pixels of the middle row and of the middle column an image shows as lit.
+// The number of lit pixels in an image's middle row and middle column.
 typedef struct {
     unsigned across, down;
 } Extent;

@@ -1,5 +1,5 @@
-// Messages with their place, growing text, words near to one another, stages, hashes, and output beside its
-// target.
+// Tests messages with their place, growing text, similar words, stages, hashes, and output files next to
+// their target.
 #include "host/base/array.h"
 #include "host/base/base64.h"
 #include "host/base/fault.h"
@@ -200,7 +200,7 @@ static void test_read_failures(void **state)
     text_free(&text);
 }
 
-// In place of libc's.
+// These replace libc's functions.
 static bool modes_are_refused, unnamed_are_refused, syncs_fail, is_killed_at_rename;
 static int sync_count;
 
@@ -412,8 +412,8 @@ static void output_in_killed_process(KilledWhile killed_while)
     check_content("kept", "old");
 }
 
-// Killed while it writes, a process leaves nothing where files need no name. What it leaves elsewhere the
-// next one removes, but not what belongs to a living one.
+// A process that is killed while it writes leaves nothing if files need no name. Otherwise the next process
+// removes what it left, but not the files of a living process.
 static void test_output_of_killed_processes(void **state)
 {
     (void)state;
@@ -442,8 +442,8 @@ static void test_output_of_killed_processes(void **state)
     unlink("kept");
 }
 
-// A process that faults with a file half written: status 2, the old file whole, nothing beside it (the folder
-// could not be removed at the end otherwise).
+// A process that faults with a file half written exits with status 2, leaves the old file whole, and leaves
+// nothing next to it (otherwise the folder could not be removed at the end).
 static void test_fault_removes_the_temporary(void **state)
 {
     (void)state;
@@ -464,7 +464,7 @@ static void test_fault_removes_the_temporary(void **state)
     unlink("kept");
 }
 
-// A product that wraps would be an allocation that is too small.
+// A product that wraps would make an allocation that is too small.
 static void test_products_do_not_wrap(void **state)
 {
     (void)state;
@@ -552,7 +552,7 @@ static void test_stage(void **state)
     stage_end(stage);
     stage_check(stage, "");
     stage_close(stage);
-    // nobody wants it
+    // without a receiver
     stage_begin(NULL, "reading", "a.obj", 1);
     stage_set(NULL, 1);
     stage_add(NULL, 1);

@@ -64,7 +64,7 @@ static void node_check(TreeCheck *check, uint32_t index, unsigned depth)
     }
 }
 
-// Wide nodes: every primitive in exactly one leaf, every node met once, none too deep.
+// Checks wide nodes: every primitive is in exactly one leaf, every node is visited once, none is too deep.
 static void wide_node_check(TreeCheck *check, const BvhWide *wide, unsigned width, uint32_t index,
                             unsigned depth)
 {
@@ -102,8 +102,8 @@ static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds
     bvh_wide_free(&wide);
 }
 
-// Every primitive in exactly one leaf, all of them counted, leaves of one kind, boxes that hold what is below
-// them, bounded depth.
+// Checks that every primitive is in exactly one leaf, that all are counted, that leaves have one kind, that
+// boxes contain everything below them, and that the depth is bounded.
 static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves)
 {
     Bvh bvh;
@@ -159,7 +159,7 @@ static Bounds box_of_set(int set, size_t index, size_t count)
         double size = exp2(random_between(&random_state, -60, 60));
         return cube_around(random_cube_point(&random_state, size), size / 16);
     }
-    case NESTED: // each beside the next, which is smaller: a split leaves one behind
+    case NESTED: // each next to a smaller one, so that a split separates only one
         return cube_around((Vector3){exp2(-100 * part), 0, 0}, exp2(-100 * part) / 64);
     case ON_A_LINE:
         return cube_around((Vector3){part, 0, 0}, 0);
@@ -205,7 +205,7 @@ static void few_boxes_make_a_tree(void **state)
     }
 }
 
-// Beside a town of size 2: the slack of its boxes must not be a planet's.
+// Next to a town of size 2, the slack of its boxes must not be that of a planet.
 static void planets_stay_outside_the_tree(void **state)
 {
     (void)state;

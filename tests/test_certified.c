@@ -1,10 +1,9 @@
-// Images at `certified` of scenes that nearly touch the rays of pixels: round shapes and boxes that rays
-// graze, edges of triangles and rims through pixels' centers, faces that all but coincide, bodies of glass,
-// ground that is a planet's, mirrors, a spot's edge; shadows of all of them. Also of lights on surfaces,
-// checkers far out, paths of little weight, needles, and sizes from 1e-29 to 1e29 in one scene. Each object,
-// shadow and path must be the reference's, where `single` errs, and each color within the bound that is
-// certified. So must those of the hard cases' images. The
-// program takes a pattern of its tests' names.
+// Renders at `certified` scenes that nearly touch the rays of pixels: round shapes and boxes that rays graze,
+// edges of triangles and rims through pixels' centers, faces that almost coincide, bodies of glass, planets
+// as ground, mirrors, a spot's edge, and shadows of all of them; and also lights on surfaces, checkers far
+// out, paths of little weight, needles, and sizes from 1e-29 to 1e29 in one scene. Each object, shadow and
+// path must equal the reference's, where `single` errs, and each color must be within the certified bound.
+// The same holds for the images of the hard cases. The program takes a pattern of its tests' names.
 // run_tests: sanitize-long-only
 // run_tests: first
 #include "host/base/array.h"
@@ -42,7 +41,7 @@ static Vector3 random_pixel_direction(void)
     return pixel_direction(column, row);
 }
 
-// Of a length, by 2^-20 to 2^-36 of it: within single's reach, not double's.
+// Changes a length by 2^-20 to 2^-36 of it, which is within single's reach but not double's.
 static double nudge(double value)
 {
     const double part = random_power(&random_state, -10.8, -6);
@@ -93,7 +92,7 @@ static Object flat_in_view(size_t index)
         const Vector3 normal = vector_cross(aside, random_unit_vector(&random_state));
         return (Object){.kind = SHAPE_DISC, .as.disc = {vector_nudge(center), normal, nudge(size)}};
     }
-    default: // a corner at the point, whose edges the ray meets
+    default: // a corner at the point, whose edges the ray hits
         return (Object){
             .kind = SHAPE_BOX,
             .as.box = {vector_nudge(point), vector_add(point, (Vector3){size, 0.5 * size, size})}};
@@ -159,7 +158,7 @@ static Object round_in_view(size_t index)
 }
 
 // A bumpy mesh whose vertices lie next to the rays of every other pixel, and so its edges next to those of
-// the others: hits are near edges, where shadow rays start beside the neighbors.
+// the others: hits are near edges, where shadow rays start next to the neighbors.
 static Mesh mesh_in_view(void)
 {
     enum { COLUMNS = WIDTH / 2, ROWS = HEIGHT / 2 };
@@ -197,7 +196,7 @@ static Object object_in_view(Family family, unsigned seed, size_t index)
     return family == ROUND ? round_in_view(index) : flat_in_view(index);
 }
 
-// What the eye stands on: a plane, an infinite cylinder or cone, or a planet.
+// The ground on which the eye stands: a plane, an infinite cylinder or cone, or a planet.
 static Object ground(Family family, unsigned seed)
 {
     const double radius = random_power(&random_state, 4, 7.5), depth = radius - floor_y;
@@ -216,7 +215,7 @@ static Object ground(Family family, unsigned seed)
     return (Object){.kind = SHAPE_PLANE, .as.plane = {{0, floor_y, 0}, {0, 1, 0}}};
 }
 
-// Turns the light into a spot whose edge all but meets what a pixel shows of the floor.
+// Turns the light into a spot whose edge almost touches a pixel's view of the floor.
 static void spot_light_attack(Light *spot)
 {
     Vector3 direction;
@@ -312,11 +311,11 @@ static Answer answer(const Scene *scene, const CertifySample *reference, const R
     return counted;
 }
 
-// Of optics so many that rays run along several chords of a sphere.
+// For optics there are enough bounces that rays run along several chords of a sphere.
 static const uint32_t bounce_counts[FAMILY_COUNT] = {2, 2, 2, 5};
 
-// Of these crowded scenes' samples, a little above what was measured: 0.62, 0.18, 0.54, 0.22 and 0.002,
-// 0.02, 0.03, 0.00035. Optics without chords: 0.26 and 0.003.
+// The shares of these crowded scenes' samples that may be re-rendered, a little above the measured 0.62,
+// 0.18, 0.54, 0.22 and 0.002, 0.02, 0.03, 0.00035. For optics without chords 0.26 and 0.003 were measured.
 static const double repeated_max[FAMILY_COUNT] = {0.7, 0.25, 0.65, 0.24},
                     undecided_max[FAMILY_COUNT] = {0.005, 0.03, 0.06, 0.0005};
 
@@ -357,7 +356,7 @@ static void check_family(Family family)
                   "undecided\n",
                   family_names[family], compared, single_wrong, repeated_share, undecided_share);
     assert_true(single_wrong >= scene_count);
-    // a bound that doubts all would be right, and of no use
+    // a bound that flags every pixel would be right but useless
     assert_true(repeated_share < repeated_max[family]);
     assert_true(undecided_share < undecided_max[family]);
 }
@@ -384,11 +383,11 @@ static void planets_are_decided(void **state)
 static void mirrors_glass_and_spots_are_decided(void **state)
 {
     (void)state;
-    if (!tests_are_long()) skip(); // likewise
+    if (!tests_are_long()) skip(); // its kernels also take long to build
     check_family(OPTICS);
 }
 
-// What the certified images of the hard cases come to.
+// The results of the certified images of the hard cases.
 typedef struct {
     size_t images, compared, wrong, wrong_decided;
 } Pictures;
@@ -579,9 +578,9 @@ static void skimming_rays_are_decided(void **state)
     }
 }
 
-// Bubbles with walls of glass, some of them thinner than what rays through it start off a surface by, except
-// at certified: `single` (of long tests `strict`, too) shows walls above the bound that docs/numerics.md
-// states.
+// Bubbles with walls of glass, some of them thinner than the distance at which rays through them start off a
+// surface, except at certified. `single` (in long tests also `strict`) shows walls above the bound that
+// docs/numerics.md states.
 static void thin_walls_are_decided(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// Checkpoints: what was appended is read again, whatever a crash left at the end of the file; a file that is
-// not this image's is refused and stays as it was.
+// Tests checkpoints: appended bands are read back whatever a crash left at the end of the file, and a file of
+// another image is refused and stays unchanged.
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/render/scheduler.h"
@@ -131,7 +131,7 @@ static void test_bands_are_read_again(void **state)
     text_free(&bytes);
 }
 
-// Cut off at any byte, the file has the bands before it, and goes on from there.
+// If the file is cut off at any byte, it has the bands before that byte, and a render resumes from them.
 static void test_torn_writes(void **state)
 {
     (void)state;
@@ -158,7 +158,7 @@ static void test_torn_writes(void **state)
     text_free(&bytes);
 }
 
-// A wrong byte ends what is believed.
+// A wrong byte ends the bands that are used.
 static void test_wrong_bytes(void **state)
 {
     (void)state;
@@ -184,7 +184,7 @@ static void append_film(const Film *band)
     close_checked(checkpoint, false);
 }
 
-// Whole records that are not the image's are not believed.
+// Whole records that do not fit the image are not used.
 static void test_other_sizes(void **state)
 {
     (void)state;
@@ -216,7 +216,7 @@ static void test_other_sizes(void **state)
     close_checked(checkpoint, false);
 }
 
-// Refused with a reason, and left as it is.
+// Expects a refusal with a reason, which leaves the file unchanged.
 static void refused(const char *other_key, const char *reason)
 {
     Text before = {0}, after = {0};
@@ -267,7 +267,7 @@ static void test_refusals(void **state)
     message_list_free(&messages);
 }
 
-// A symbolic link stays; the file behind it is removed, and is made by the next render.
+// A symbolic link stays. The file behind it is removed, and the next render creates it.
 static void test_symbolic_links(void **state)
 {
     (void)state;
@@ -357,7 +357,7 @@ static bool band_sink(void *context, const Film *band, double fraction_done)
 }
 
 // Only missing bands are handed out; all reach the sink in order.
-static void test_a_render_goes_on(void **state)
+static void test_a_render_resumes(void **state)
 {
     (void)state;
     for (unsigned done = 0; done < 1 << BANDS; done++) {
@@ -411,6 +411,6 @@ int main(void)
                                        cmocka_unit_test(test_symbolic_links),
                                        cmocka_unit_test(test_a_file_that_stays),
                                        cmocka_unit_test(test_a_file_removed_before_the_lock),
-                                       cmocka_unit_test(test_a_render_goes_on)};
+                                       cmocka_unit_test(test_a_render_resumes)};
     return cmocka_run_group_tests(tests, set_up, scratch_tear_down);
 }

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""A render that ends early goes on where it was, and its image is that of an undisturbed one: after kill -9, a full disk, an
+"""A render that ends early can be resumed, and its image equals that of an undisturbed one: after kill -9, a full disk, an
 interrupt and a device's failure, on one device and on two. GLINT_LONG_TESTS=1: 200 kills."""
 import os
 import random
@@ -77,7 +77,7 @@ class Checkpoints(TestCase):
 
     def test_counts_of_certified(self):
         """The pixels of saved bands that were re-rendered in double count as in an undisturbed render."""
-        write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # the nearer of two equal ones is in doubt
+        write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # which of two equal ones is nearer is uncertain
         command = f"{RENDER} --precision certified --timing=json"
         self.end_early("--precision certified --device all", TWO)
         whole = self.json(f"{command} -o whole.png", env=TWO)
@@ -105,7 +105,7 @@ class Checkpoints(TestCase):
             os.remove("image.npy")
 
     def test_another_device(self):
-        """At strict any device may go on."""
+        """At strict any device may resume."""
         self.end_early("--lanes 1")
         self.assertTrue(0 < self.go_on("--lanes 4") < 1)
 
@@ -143,7 +143,7 @@ class Checkpoints(TestCase):
         self.assertSameBytes("same.npy", "whole.npy")
 
     def test_kills(self):
-        """kill -9 at any moment; whatever is left, the next run goes on."""
+        """kill -9 at any moment; whatever is left, the next run resumes."""
         command = [PROGRAM, *f"{RENDER.replace('100', '3000')} --device all -o image.npy --checkpoint saved".split()]
         environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"} | TWO
         self.glint(f"{RENDER.replace('100', '3000')} -o whole.npy", env=POCL)

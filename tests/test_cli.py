@@ -168,7 +168,7 @@ def writes_here(process):
 
 
 class Failures(CliTestCase):
-    """What fails leaves an earlier image as it was, and nothing beside it."""
+    """A failure leaves an earlier image unchanged, and nothing next to it."""
 
     def fails(self, arguments, status=1):
         write("old.png", "an earlier image")

@@ -1,4 +1,4 @@
-// What a command prints, writes and exits with where an OpenCL call fails or its driver crashes.
+// Tests what a command prints, writes and exits with if an OpenCL call fails or its driver crashes.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
@@ -89,8 +89,8 @@ static void assert_same_bytes(const char *one, const char *other)
     text_free(&second);
 }
 
-// One of two devices fails, or has no room for the scene: a warning, and the same image. Both fail, or the
-// one without room is named: an error.
+// If one of two devices fails, or the scene does not fit it, there is a warning and the same image. If both
+// fail, or the scene does not fit a device that was named, there is an error.
 static void test_several_devices(void **state)
 {
     (void)state;
@@ -197,7 +197,7 @@ static void test_crashes(void **state)
 
 int main(void)
 {
-    // each command is a process of its own, and forks before this one has opened a device
+    // each command is a separate process, which forks before this one has opened a device
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_commands), cmocka_unit_test(test_several_devices),
         cmocka_unit_test(test_release_after_the_output), cmocka_unit_test(test_crashes)};

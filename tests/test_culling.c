@@ -56,8 +56,8 @@ static Vector3 trial_vector_rounded(const Trial *trial, Vector3 v)
     return (Vector3){trial_rounded(trial, v.x), trial_rounded(trial, v.y), trial_rounded(trial, v.z)};
 }
 
-// A line through the common origin, and a sphere that it just meets or just misses, on either side of the
-// origin.
+// Makes a line through the common origin, and a sphere that it barely hits or barely misses, on either side
+// of the origin.
 static void line_make(Trial *trial, size_t index, bool from_eye)
 {
     Random *random = &trial->random;
@@ -151,8 +151,8 @@ static long double dot(const long double *a, const long double *b)
 // The enlargement of the squared radius, 256 + 128 (CULL_SPHERE_SLACK, CULL_DIRECTION_SLACK), and as much
 // again for roundings.
 #define CLEAR_MISS 800
-// Of the square of the distance that bounds of directions must tell from the radius: 2^-13 in each component
-// are up to 3^(1/2) 2^-12 of the square, and as much again.
+// The part of the squared distance that bounds of directions must tell from the radius. 2^-13 in each
+// component are up to 3^(1/2) 2^-12 of the square; the limit is about twice that.
 #define CLEAR_MISS_BY_BOUNDS 0x1p-10L
 
 // Judges one answer by the line's distance from the center, in long double.

@@ -1,5 +1,5 @@
-// Of two devices that render one image one fails, at each call of its first band in turn, and both: the image
-// is whole where one is left, and the failure is reported.
+// Two devices render one image, and one or both fail, at each call of the first band in turn. The image is
+// whole if one device is left, and the failure is reported.
 #include "tests/failing/calls.h"
 #include "tests/failing/work.h"
 #include <pthread.h>
@@ -40,7 +40,7 @@ static void pair_dropped(void *context, size_t index)
     sem_post(&pair.second_goes_on);
 }
 
-// Whether the image is whole; the computes are left open.
+// Returns whether the image is whole. The computes are left open.
 static bool pair_work(Compute computes[2], Answer *answer)
 {
     call_counts_clear();
@@ -75,7 +75,7 @@ static void pair_close(Compute computes[2])
     compute_close_checked(&computes[1]);
 }
 
-// Of two devices one fails, at each call of its first band in turn: the other renders the whole image.
+// One of two devices fails, at each call of its first band in turn. The other renders the whole image.
 static void test_one_of_two_devices(void **state)
 {
     (void)state;

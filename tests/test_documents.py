@@ -132,7 +132,7 @@ def budget_pilots():
 
 
 def budget_long(seconds):
-    """Of rows that take longer at double: how many end at a faster precision, how many there are, and the median times over that of double."""
+    """The number of rows that take longer at double, how many of them end at a faster precision, and their median times divided by that of double."""
     rows = [row for row in measured("budgets")["rows"] if row["double_ms"] > 1000 * seconds]
     ratio = {"double": [], "faster": []}
     for row in rows:
@@ -188,7 +188,7 @@ def perturbed_others():
 
 
 def scaling_cell(image, ranks):
-    """Of the table that tools/scaling --check tests, what is built."""
+    """The value in the table that tools/scaling --check tests."""
     row = next(line for line in read(ROOT / "docs/measurements/README.md").splitlines() if line.startswith(f"| {image} | {ranks} |"))
     return float(row.split("|")[3])
 

@@ -93,7 +93,7 @@ class Html(TestCase):
         return page, report
 
     def check_axis(self, ticks, points):
-        """Ticks and points, value and position, lie as on a logarithmic axis; 0 has a tick of its own."""
+        """Ticks and points, value and position, lie as on a logarithmic axis; 0 has a separate tick."""
         position = {tick["value"]: tick["position"] for tick in ticks}
         first, last = min(filter(None, position), default=1), max(position)
         for value, found in [*position.items(), *points]:

@@ -1,5 +1,7 @@
-// Random scenes of every shape, light and kind of material: settings that must not change any bit of an image
-// or its AOVs (hard cases R6, R7, P7, M6 of docs/verify.md). test_variants has a scene made by hand.
+// Renders random scenes of every shape, light and type of material with settings that must not change any bit
+// of an image or its AOVs (hard cases R6, R7, P7, M6 of docs/verify.md). test_variants has a scene made by
+// hand.
+//
 // run_tests: sanitize-long-only
 #include "host/compile/transform.h"
 #include "tests/film.h"
@@ -86,8 +88,8 @@ static void lanes_change_nothing(const Case *c)
     }
 }
 
-// Hard case R6 (docs/verify.md): nothing in the kernels has a length of its own; beyond what its squares can
-// take a scene is scaled.
+// Hard case R6 (docs/verify.md): nothing in the kernels depends on an absolute length. A scene whose squares
+// would overflow is scaled.
 static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
 {
     static const int exponents[] = {-90, -60, -10, 3, 10, 60, 90};

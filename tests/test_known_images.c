@@ -165,8 +165,8 @@ static void contact_shadow(Precision precision)
     scene_free(&scene);
 }
 
-// A spot straight down on a plane from height 5: the cone of 30 degrees meets it in a circle of radius 5 tan
-// 30, full within 5 tan 20 where the penumbra is 10 degrees wide.
+// A spot straight down on a plane from height 5: the cone of 30 degrees intersects it in a circle of radius 5
+// tan 30, full within 5 tan 20 if the penumbra is 10 degrees wide.
 static void spot_cone(Precision precision)
 {
     Scene scene =
@@ -196,7 +196,7 @@ static void spot_cone(Precision precision)
     scene_free(&scene);
 }
 
-// What Phong's term is at the surface that the film says lies behind a pixel.
+// Returns Phong's term at the surface that the film shows behind a pixel.
 static long double highlight_of(const Film *film, const Scene *scene, size_t pixel, double shininess)
 {
     const double *p = film->position + 3 * pixel, *n = film->normal + 3 * pixel;
@@ -329,7 +329,7 @@ static void inside(Precision precision)
     }
 }
 
-// Whether a ray from the eye at (0, 1, 0) meets the surface y = -1e6 + sqrt((1e6 + slope x)^2 - z^2).
+// Returns whether a ray from the eye at (0, 1, 0) hits the surface y = -1e6 + sqrt((1e6 + slope x)^2 - z^2).
 static bool meets_ground(const double *direction, double slope)
 {
     const long double radius = 1e6L, above = 1e6L + 1;
@@ -384,7 +384,7 @@ static double basis_error(const Camera *camera)
 }
 
 // Between two parallel panes that reflect and transmit all light each hit adds the ambient light, 1/512, and
-// leaves one pending ray to the background, 1/512 too.
+// leaves one pending ray to the background, which is also 1/512.
 #define PANES                                                                                                \
     "camera: {position: [0, 0, 0], look_at: [0, 0, 1], up: [0, 1, 0], fov: 0.001}\n"                         \
     "background: [0.001953125, 0.001953125, 0.001953125]\n"                                                  \
@@ -418,7 +418,7 @@ static uint64_t panes_render(bool transparent, Precision precision, uint32_t lan
     return hash;
 }
 
-// A kernel has room for as many pending rays as the scene's depth asks for, and for none between mirrors.
+// A kernel keeps as many pending rays as the scene's depth needs, and none between mirrors.
 static void depth_of_facing_panes(Precision precision)
 {
     const uint64_t plain = panes_render(true, precision, 0, 5);

@@ -22,7 +22,7 @@ typedef struct {
 } HostTriangleBlock;
 
 // Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
-// member. REALS are scalar4, INTEGERS uint4. Of a shape the last, its id, is enough.
+// member. REALS are scalar4, INTEGERS uint4. In a shape only the last member, its id, is listed.
 // clang-format off
 #define MEMBER_LIST(REALS, INTEGERS)                                             \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, background)                     \
@@ -134,8 +134,8 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
     scene_free(&scene);
 }
 
-// The test's own kernels behind lanes.h and types.h: what the device thinks of each member, and its value in
-// the second struct of an array.
+// Writes kernels that follow lanes.h and types.h and return the device's layout of each member, and its value
+// in the second struct of an array.
 static void kernels_write(Text *text)
 {
     text_appendf(text, "#include \"lanes.h\"\n#include \"types.h\"\n"

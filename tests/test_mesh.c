@@ -530,7 +530,7 @@ static void ids_count_the_triangles(void **state)
 
 enum { GRID = 64 };
 
-// Down on the unit square, from a little outside of it too, every other ray through a point of the line from
+// Makes rays down on the unit square and slightly around it, every other one through a point of the line from
 // (0.1, 0.1, 1) to (0.7, 0.7, 1).
 static void rays_down(TraceRay *rays)
 {
@@ -607,7 +607,7 @@ static void too_many_triangles_are_refused(void **state)
     assert_refused(&probe_compute, &scene, "268435457 objects and triangles, more than 268435456");
 }
 
-// The first mesh of a file is no copy; the third, of two triangles, is one too many, by whatever name.
+// The first mesh of a file is not a copy. The third, of two triangles, is one too many, whatever its name.
 static void copies_are_limited(void **state)
 {
     (void)state;

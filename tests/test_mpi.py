@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
 """glint-mpi: the image of several ranks has the bytes of one process's; errors of any rank end the job with a message; a killed
-rank ends it, and its checkpoint goes on. A rank whose device fails, or that sends nonsense, is left out.
+rank ends it, and its checkpoint can be resumed. A rank whose device fails, or that sends nonsense, is left out.
 
 run_tests: sanitize-long-only
 run_tests: first"""
@@ -125,8 +125,8 @@ class Mpi(TestCase):
                 self.assertAlmostEqual(sum(part["share"] for part in report["by_device"] + report["by_rank"]), 1)
 
     def test_certified(self):
-        """The pixels that any rank repeats in double count. The other rank has no file of the scene's."""
-        write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # the nearer of two equal ones is in doubt
+        """The pixels that any rank re-renders in double count. The other rank has no file of the scene's."""
+        write("sphere.yaml", SPHERE + SPHERE.splitlines()[-1])  # which of two equal ones is nearer is uncertain
         command = f"{RENDER} --precision certified --timing=json"
         one = self.json(f"{command} -o one.npy", env=POCL)
         ranks = json.loads(self.mpirun_each(f"{RANKS} {command} -o ranks.npy", f"env -C / {RANKS} {command} -o ranks.npy").stdout)
@@ -136,7 +136,7 @@ class Mpi(TestCase):
             self.assertEqual(ranks[key], one[key])
 
     def test_mixed_lanes(self):
-        """Each rank gets the BVH of its own lanes."""
+        """Each rank gets the BVH for its lanes."""
         scene = ROOT / "scenes/spheres16.yaml"
         for lanes in 1, 4:
             command = f"render {scene} --size 64x48 --bvh on --lanes {lanes} --precision strict --quiet"
@@ -290,10 +290,10 @@ class Mpi(TestCase):
         return ranks
 
     def test_interrupts(self):
-        """Of mpirun, which then exits with a status of its own, and of the first rank alone."""
+        """An interrupt of mpirun, which then exits with a different status, and of the first rank alone."""
         command = f"{RENDER.replace('20', '100000').replace('64x96', '64x4096')} --precision strict"  # minutes
         for interrupted, signal_number, status in ("mpirun", signal.SIGINT, None), ("rank", signal.SIGTERM, 130):
-            process = self.start(command, patience=4)  # beside other tests a second is too short
+            process = self.start(command, patience=4)  # a second is too short while other tests run
             self.assertIsNone(process.poll(), "it was done before the interrupt")
             os.kill(process.pid if interrupted == "mpirun" else self.ranks_of(process)[0], signal_number)
             process.wait(timeout=60)

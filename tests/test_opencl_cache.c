@@ -102,7 +102,8 @@ static void load_without_rights(void *result)
     if (geteuid() != 0 || setuid(65534) == 0) load_twice(result);
 }
 
-// Loads nothing, and warns once: in a process of its own, as this one must not have warned yet.
+// Expects that nothing is loaded, with one warning. It runs in a separate process, since this one must not
+// have warned yet.
 static void assert_load_refused(void (*load)(void *result), const char *reason)
 {
     bool loaded = true;
@@ -136,7 +137,7 @@ static void test_entry_others_may_access(void **state)
     free(path);
 }
 
-// Nothing is loaded from a folder that is not the user's own, or stored in it.
+// Nothing is loaded from a folder that belongs to another user, or stored in it.
 static void test_folder_of_others(void **state)
 {
     (void)state;
@@ -174,7 +175,7 @@ static void test_folder_of_others(void **state)
     free(moved);
 }
 
-// Entries are worth nothing without the key of their hash; a key that others may know is replaced.
+// Entries are useless without the key of their hash. A key that others may know is replaced.
 static void test_key_of_the_hash(void **state)
 {
     (void)state;
@@ -257,7 +258,7 @@ static void test_list(void **state)
     store(described);
     entry_set_used(described, 1000);
     char *path = cache_entry_path(key);
-    // an entry of another version is no fault
+    // an entry of another version is not a fault
     Text content = {0};
     assert_true(text_read_file(&content, path, &messages));
     content.items[FORMAT_OFFSET]++;
@@ -463,7 +464,7 @@ static void test_no_place(void **state)
     free(home);
 }
 
-// A file where the folder should be stops root, too.
+// A file in place of the folder stops even root.
 static void test_unwritable(void **state)
 {
     (void)state;
@@ -518,7 +519,7 @@ static void test_many_processes(void **state)
     assert_true(loads(key));
 }
 
-// What was used last stays, whenever it was stored.
+// The entries that were used last stay, whenever they were stored.
 static void test_trim(void **state)
 {
     (void)state;

@@ -116,8 +116,8 @@ static void test_empty_build_log(void **state)
     assert_work_is_right();
 }
 
-// A cached program that the driver refuses, or from which it creates no kernel, is built from source, without
-// a cache every program is. A failed build is repeated with functions out of line.
+// A cached program that the driver refuses, or from which it creates no kernel, is built from source, and
+// without a cache every program is. After a failed build, functions are built out of line.
 static void test_builds(void **state)
 {
     (void)state;
@@ -176,7 +176,7 @@ static void test_discovery(void **state)
     injected.call = NULL;
 }
 
-// A device whose memory is unknown has room until a buffer cannot be created.
+// A device whose memory is unknown is used until a buffer cannot be created.
 static void test_unknown_memory(void **state)
 {
     (void)state;

@@ -1,5 +1,6 @@
-// Programs on the device of this machine: built, launched, cached. Each step is a process of its own, as
-// users run them: what the first one leaves, the next one finds.
+// Builds, launches and caches programs on the device of this machine. Each step is a separate process, as
+// users run them, and the next step finds what the first one left.
+//
 // run_tests: first
 #include "host/base/fault.h"
 #include "host/opencl/cache.h"

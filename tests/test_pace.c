@@ -1,5 +1,5 @@
-// How long launches get when parts of an image cost very different times: the pace alone, without a device
-// or a clock.
+// Tests how long launches take if parts of an image have very different costs: the pace alone, without a
+// device or a clock.
 #include "host/render/band.h"
 #include <setjmp.h>
 #include <stdarg.h>
@@ -135,7 +135,7 @@ static void busy_device_grows_by_four(void **state)
         assert_int_equal(pace_launch_samples(&pace), expected[i]);
         pace_note_launch(&pace, expected[i], (double)expected[i] * dear);
     }
-    // a smaller launch than the first is no reason to start below it
+    // a launch that is smaller than the first does not reduce the next start
     pace_note_launch(&pace, 1, 1e-9);
     assert_int_equal(pace_launch_samples(&pace), FIRST_LAUNCH);
 }

@@ -139,8 +139,8 @@ static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
     check_moved_renderer(true);
 }
 
-// A preview shows the arrays of the last eye from where the eye is now: the image of a renderer that moved
-// them, but for their roundings. Returns the number of pixels where these show.
+// A preview shows the arrays of the last eye from the present eye: the image of a renderer that moved them,
+// except for their roundings. Returns the number of pixels where these show.
 static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
 {
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
@@ -190,8 +190,8 @@ static void preview_differs_by_roundings(void **state)
     assert_true(preview_check(scene, BVH_AUTO, 0.996) > 0);
 }
 
-// Next to a sphere it is defined by its power, in a kernel of its own: an eye that goes to and fro builds
-// each once.
+// An eye next to a sphere needs the sphere's power, and so a second kernel. An eye that alternates between
+// two places builds each kernel once.
 static void eye_next_to_a_sphere_builds_two_kernels(void **state)
 {
     (void)state;

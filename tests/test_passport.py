@@ -238,7 +238,7 @@ class PassportTest(TestCase):
                     self.assertEqual(named, expected, (what, found))
                     for mode in named:
                         self.assertRegex(found[mode]["finding"], f"^({finding})$", (what, found[mode]))
-                # what is computed from it may break, too
+                # properties that are computed from it may also break
                 allowed = {"fma that rounds twice": {"two-product"}, "rounding": {"inf and NaN"},
                            "subnormals flushed": {"conversions"}}.get(group[0], set())
                 names = {name for mode, name in self.abnormal(device).keys() - usual.keys()}

@@ -74,9 +74,9 @@ static double whole(Random *random, int bits, bool odd)
     return 2 * floor(random_between(random, half, 2 * half)) + odd;
 }
 
-// A quarter of the pairs are any; of a quarter the quotient is near a float or near the middle between two,
-// of a quarter the root; a quarter is near a power of two. Of either sign, from the smallest normal float to
-// the largest.
+// Makes pairs of either sign, from the smallest normal float to the largest: a quarter are any; in a quarter
+// the quotient, and in a quarter the root, is near a float or near the middle between two; a quarter is near
+// a power of two.
 static void operands_make(float *a, float *b)
 {
     Random random = {38};
@@ -151,10 +151,10 @@ static void multiply_add(unsigned lanes, const float *a, const float *b, const f
     clReleaseProgram(program);
 }
 
-// Of a quarter c is any; of a quarter within a few ulp of the product; of a quarter some 24 bits larger or
-// smaller than it, where it decides how the other is rounded; of a quarter a power of two, or something of
-// that is 0 or infinite. Factors have few bits as often as many, so that sums lie in the middle between
-// floats.
+// Makes a, b and c. In a quarter c is any; in a quarter it is within a few ulp of the product; in a quarter
+// it is about 24 bits larger or smaller than the product, where it decides how the other is rounded; in a
+// quarter one of them is a power of two, 0 or infinite. Factors have few bits as often as many, so that sums
+// lie in the middle between floats.
 static void terms_make(float *a, float *b, float *c)
 {
     static const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, FLT_MAX, -FLT_MAX, INFINITY, -INFINITY};

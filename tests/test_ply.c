@@ -118,8 +118,8 @@ static void number_append(Text *text, double number, const Type *type, bool big)
     }
 }
 
-// With numbers of this type beside the coordinates and as lengths of lists, and elements that no
-// mesh has.
+// Returns a square with numbers of this type in its coordinates and as lengths of lists, and with elements
+// that no mesh has.
 static Text binary_square(const Type *type, bool big, const char *line_end)
 {
     const Type *single = &types[6], *whole = &types[4];

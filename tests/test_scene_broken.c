@@ -1,4 +1,5 @@
-// Every scene in tests/broken gets exactly the messages beside it, and every message has such a scene.
+// Every scene in tests/broken gets exactly the messages in the file next to it, and every message has such a
+// scene.
 #include "host/base/array.h"
 #include "host/import/load.h"
 #include "tests/scene_reading.h"

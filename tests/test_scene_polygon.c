@@ -61,7 +61,8 @@ static size_t triangles_holding(const Outline *outline, double x, double y)
 
 static Random generator = {1};
 
-// Of an outline that turns left. Every corner is used, no triangle is turned over, none overlap.
+// Checks the cut of an outline that turns left: every corner is used, no triangle is turned over, none
+// overlap.
 static void check_cut(const Outline *outline)
 {
     assert_int_equal(polygon_triangulate(outline->items, outline->count, &triangles), POLYGON_CUT);

@@ -127,7 +127,7 @@ static void test_cylinders(void **state)
     assert_false(infinite->as.cylinder.caps);
     assert_vector(infinite->as.cylinder.from, 3, 0, 0);
     assert_vector(infinite->as.cylinder.axis, 0, 0, 5);
-    assert_int_equal(infinite->material, 4); // an alias of an inline material is a material of its own
+    assert_int_equal(infinite->material, 4); // an alias of an inline material is a separate material
     assert_number(complete.materials.items[4].shininess, 64);
 }
 

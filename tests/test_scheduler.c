@@ -1,5 +1,5 @@
-// Rows handed out to workers: the bands reach the sink in order from the top whatever the order they end in,
-// sizes follow the paces, and what a failed worker leaves goes to the others.
+// Hands out rows to workers: the bands reach the sink in order from the top whatever the order they end in,
+// sizes follow the paces, and the rows of a failed worker go to the others.
 #include "host/base/memory.h"
 #include "host/render/scheduler.h"
 #include <pthread.h>
@@ -224,7 +224,7 @@ static void test_nobody_is_left(void **state)
     scheduler_drop(scheduler, 0);
     take(scheduler, 1);
     scheduler_drop(scheduler, 1);
-    assert_int_equal(sink.dropped_count, 1); // the last has nobody to go on
+    assert_int_equal(sink.dropped_count, 1); // nobody could continue after the last
     assert_false(scheduler_close(scheduler, NULL));
 }
 
@@ -317,7 +317,7 @@ static void test_idle_workers_wait_for_lost_rows(void **state)
     assert_int_equal(pthread_create(&thread, NULL, thread_work, &other), 0);
     while (other.given_rows < ROWS - lost.row_count)
         usleep(1000);
-    usleep(20000); // so that it waits already; right without, too
+    usleep(20000); // so that it is already waiting; the test would also pass if it were not
     bool waits;
     assert_int_equal(scheduler_try(scheduler, 1, ROWS_MAX, STEP, &waits).row_count, 0);
     assert_true(waits);

@@ -69,7 +69,7 @@ static void darkens_an_eclipse_in_meters(void **state)
     scene_free(&scene);
 }
 
-// As the reference has it, but for pixels at an edge.
+// Compares the image with the reference, except for pixels at an edge.
 static void compare_with_reference(const Scene *scene, const RenderSettings *settings, double error,
                                    const char *what)
 {
@@ -120,8 +120,8 @@ static const Ground grounds[] = {
      COLOR_ERROR},
 };
 
-// Marbles of a centimeter keep their shadows, and the ground has none of its own under a sun a twentieth of a
-// degree high.
+// Marbles of a centimeter keep their shadows, and the ground does not shadow itself under a sun a twentieth
+// of a degree high.
 static void keeps_small_shadows_on(const Ground *ground)
 {
     Text text = {0};

@@ -59,9 +59,9 @@ static Vector3 vector_from(const double parts[3])
     return (Vector3){parts[0], parts[1], parts[2]};
 }
 
-// How far a cone's side moves at a point where its radius is r when the numbers that define it beside the
-// eye's power C are rounded once: C, the axis' point F nearest to the eye, which is the origin, and the
-// radius there.
+// Returns how far a cone's side moves at a point where its radius is r when the numbers that define it in
+// addition to the eye's power C are rounded once: C, the axis' point F nearest to the eye, which is the
+// origin, and the radius there.
 static double cone_moved_by_power(const Object *cone, Vector3 point, double r, double u)
 {
     const double *radii = cone->as.cone.radius, length = vector_length(cone->as.cone.axis);
@@ -131,7 +131,8 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
 
 // A ray from next to where one meets the scene, off it to either side by a hundredth to a hundred thousandth
 // of the radius, to anywhere.
-static RandomRay move_beside(const RandomRay *given, const Scene *scene, double radius, Random *random)
+static RandomRay move_next_to_surface(const RandomRay *given, const Scene *scene, double radius,
+                                      Random *random)
 {
     ReferenceRay ray = reference_ray(given->origin, given->direction);
     ReferenceHit hit = reference_hit(scene, &ray);
@@ -144,19 +145,19 @@ static RandomRay move_beside(const RandomRay *given, const Scene *scene, double 
     return (RandomRay){vector_add(place, vector_scale(normal, height)), random_in_sphere(random)};
 }
 
-// Rays and what they should hit; `is_double`: taken in double, else what a float holds of them; `beside`:
-// from next to the surface.
+// Prepares rays and what they should hit. With `is_double` the rays are used in double, else rounded to
+// float. With `next_to_surface` they start next to the surface.
 static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, size_t aim_count,
-                    bool is_double, bool beside, Random *random)
+                    bool is_double, bool next_to_surface, Random *random)
 {
     for (size_t i = 0; !is_double && i < scene->objects.count; i++)
         scene->objects.items[i] = reference_round_object(&scene->objects.items[i]);
     for (size_t i = 0; i < RAYS_PER_SHAPE; i++) {
         RandomRay given = random_ray(&aims[aim_count > 0 ? i % aim_count : 0], random);
-        if (beside) given = move_beside(&given, scene, trial->radius, random);
+        if (next_to_surface) given = move_next_to_surface(&given, scene, trial->radius, random);
         ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
                                      : reference_ray_rounded(given.origin, given.direction);
-        // one in three looks behind its start, too
+        // one in three also looks behind its start
         if (i % 3 == 2) ray.tmin = -0x1p10;
         trial->rays[i] = (TraceRay){
             {(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
@@ -198,8 +199,8 @@ static void check_at(const Trial *trial, const Scene *scene, Precision precision
     assert_true(right);
 }
 
-static void check(const RandomShape *shapes, size_t count, Vector3 center, double radius, bool beside,
-                  const char *what, Random *random)
+static void check(const RandomShape *shapes, size_t count, Vector3 center, double radius,
+                  bool next_to_surface, const char *what, Random *random)
 {
     static Trial trial;
     Object objects[SHAPES_IN_SCENE];
@@ -210,7 +211,7 @@ static void check(const RandomShape *shapes, size_t count, Vector3 center, doubl
     for (int is_double = 0; is_double < 2; is_double++) {
         for (size_t i = 0; i < count; i++)
             objects[i] = shapes[i].object;
-        prepare(&trial, &scene, shapes, count, is_double, beside, random);
+        prepare(&trial, &scene, shapes, count, is_double, next_to_surface, random);
         for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (is_double != (precision == PRECISION_DOUBLE)) continue;
             check_at(&trial, &scene, precision, 1, what);
@@ -262,7 +263,7 @@ static void make_steep(RandomShape *cone)
 }
 
 // There c cancels, and some rays are taken to leave without being looked at closely.
-static void hits_from_beside_the_side(void **state)
+static void hits_from_next_to_the_side(void **state)
 {
     (void)state;
     const uint64_t seed_count = tests_are_long() ? SEEDS_BESIDE : 1;
@@ -321,6 +322,6 @@ int main(void)
         tests[i] = (struct CMUnitTest){forms[i].name, hits_each_shape, NULL, NULL, &forms[i]};
     tests[form_count] = (struct CMUnitTest)cmocka_unit_test(hits_the_nearest_of_many);
     tests[form_count + 1] = (struct CMUnitTest)cmocka_unit_test(gives_the_same_bits_at_every_width);
-    tests[form_count + 2] = (struct CMUnitTest)cmocka_unit_test(hits_from_beside_the_side);
+    tests[form_count + 2] = (struct CMUnitTest)cmocka_unit_test(hits_from_next_to_the_side);
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

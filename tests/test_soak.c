@@ -166,8 +166,8 @@ static Renderer *moved_renderer(Scene *scene, RenderSettings settings)
     return renderer;
 }
 
-// A renderer takes over from the last scene of its precision: it keeps its kernels, of which drivers keep
-// some memory each time that they load one. Where there are no renderers this is a process of its own.
+// Renders a scene. A renderer is moved from the last scene of its precision and keeps its kernels, since
+// drivers keep some memory each time that they load a kernel. Without renderers this is a separate process.
 static uint64_t soak_render(uint64_t seed, Renderer *renderers[PRECISION_COUNT])
 {
     Random random = {seed};

@@ -36,7 +36,7 @@ typedef struct {
     float colors[64][3]; // rows from the top
 } TestTexture;
 
-// Every texel has a color of its own, of eighths.
+// Returns a texture whose texels all have different colors, in eighths.
 static TestTexture texture_make(uint32_t width, uint32_t height)
 {
     TestTexture texture = {width, height, {{0}}};
@@ -316,7 +316,7 @@ static void between_levels_it_blends(void **state)
 }
 
 // A mirror's texture of a texture is filtered for the whole path to the eye.
-static void mirrors_filter_it_too(void **state)
+static void mirrors_filter_textures(void **state)
 {
     (void)state;
     TestTexture texture = texture_make(8, 8);
@@ -478,7 +478,7 @@ int main(void)
         cmocka_unit_test(meshes_wrap_it),
         cmocka_unit_test(far_away_it_is_its_mean),
         cmocka_unit_test(between_levels_it_blends),
-        cmocka_unit_test(mirrors_filter_it_too),
+        cmocka_unit_test(mirrors_filter_textures),
         cmocka_unit_test(every_build_gives_the_same_bits),
         cmocka_unit_test(jpeg_is_read),
         cmocka_unit_test(scene_faults_are_reported),

@@ -47,7 +47,7 @@ static void same_and_freed(Film *film, const Film *expected, const char *what)
 static void scene_has_every_feature(void **state)
 {
     (void)state;
-    // test_textures has textures: a mirror image would have to mirror them too
+    // test_textures has textures, which a mirror image would have to mirror
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES,
                      FEATURE_ALL);
 }
@@ -170,7 +170,7 @@ static void features_alone_and_all_together_agree(void **state)
         film_free(&general);
         scene_free(&scene);
     }
-    // these depend on numbers and settings, and have tests of their own
+    // these depend on numbers and settings, and have separate tests
     assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS, FEATURE_ALL);
 
     // No scene needs checkers alone: built in without need, on an empty scene.
@@ -204,7 +204,7 @@ static void bands_agree(void **state)
     film_free(&expected);
 }
 
-// With bands as short as they get, each sample of a pixel has a launch of its own.
+// With bands as short as they can be, each sample of a pixel has a separate launch.
 static void launches_of_samples_agree(void **state)
 {
     (void)state;

@@ -99,7 +99,7 @@ class Verify(VerifyTestCase):
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers handle crashes themselves")
     def test_a_crash_fails_its_case_alone(self):
-        """Of the driver, in building or running one kernel; the other cases keep their bits."""
+        """The driver crashes in building or running one kernel; the other cases keep their bits."""
         cases = ["S2", "S5", "P4"]
         whole = self.verify(cases, "--precision single")["cases"]
         env = {"LD_PRELOAD": shim_build("crashing.so", CRASHING, "-ldl")}
@@ -154,7 +154,7 @@ class PerturbedDevice(VerifyTestCase):
         self.assertRegex(text, "(?m)^  S1 .*FAIL.* wrong")
 
     def test_strict_and_double_keep_their_bits(self):
-        """Strict corrects what a device does wrong, and at double no ray meets anything that may be wrong."""
+        """Strict corrects what a device does wrong, and at double no ray hits anything that may be wrong."""
         cases = ["S1", "P4", "C5", "C7", "T2", "M4", "R4"] + (["S6"] if IS_LONG else [])
         for precision in PRECISIONS[1:] if IS_LONG else ["strict"]:
             hashes = self.hashes(cases, f"--precision {precision}")
@@ -163,7 +163,7 @@ class PerturbedDevice(VerifyTestCase):
         self.assertTrue(all(one != other for one, other in pairs))
 
     def test_images(self):
-        """Each seed has an image of its own, the same every time and at every number of lanes."""
+        """Each seed has a different image, the same every time and at every number of lanes."""
         scene = self.scene()
 
         def pixels(arguments):

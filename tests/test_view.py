@@ -35,7 +35,7 @@ f 1 2 3
 f 1 3 4
 f 4 2 1
 """
-# Launches fail as long as there is a file `fails`; files cannot be watched if there is one `unwatched`, folders if `folders`.
+# Launches fail while a file `fails` exists; files cannot be watched if there is one `unwatched`, folders if `folders`.
 FAILING_CALLS = """\
 #define _GNU_SOURCE
 #include <dlfcn.h>

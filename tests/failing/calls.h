@@ -36,5 +36,5 @@ extern CallCount
     call_counts[CALL_COUNTS]; // of the calls since call_counts_clear, ended by one without a name
 
 void call_counts_clear(void);
-// Of a function, which need not have been called.
+// Returns the count of a function, which need not have been called.
 CallCount *call_count(const char *call);

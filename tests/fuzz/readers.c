@@ -52,7 +52,7 @@ static void mesh_scene_fuzz(const char *path, const Source *source, MessageList 
     if (scene_read_mesh(&scene, path, &(SceneOptions){0}, messages)) scene_free(&scene);
 }
 
-// The file is the one that a mesh names, which stands beside it.
+// The path of the mesh's file. A material library that it names is in the same folder.
 static char obj_path[PATH_MAX];
 
 static void obj_write(void)
@@ -105,7 +105,7 @@ static void reply_fuzz(const char *path, const Source *source, MessageList *mess
     draft_fuzz(path, reply_read, messages);
 }
 
-// assimp itself, in this process. Its own faults are found, too.
+// Runs assimp in this process. Its faults are found like glint's.
 static void assimp_fuzz(const char *path, const Source *source, MessageList *messages)
 {
     (void)source;

@@ -10,8 +10,8 @@ decides: a solid grown or shrunk by less answers the same. Nor may it always be 
 much most solids answer otherwise.
 
 Prints what was compared and the worst errors as parts of their bounds; exit status 1 if one is beyond its bound or too
-little was compared. Of large families of rays the first 200 are checked, with --long all that are checked. --spoil: each
-answer is changed by this part of itself first, to show that it is noticed. --set: of these rays alone."""
+little was compared. In large families the first 200 rays are checked, with --long all of them. --spoil first changes each
+answer by this part of itself, to show that it is noticed. --set selects one set of rays."""
 
 import argparse
 import json

@@ -278,8 +278,8 @@ class Torus(Shape):
 
 
 class Paraboloid(Shape):
-    """Of points whose squared distance from the axis is at most 4 f times the height above the apex; without ends or
-    caps as Revolution. The axis' length is rounded to 300 bits."""
+    """The points whose squared distance from the axis is at most 4 f times the height above the apex. Ends and caps are
+    optional, as in Revolution. The axis' length is rounded to 300 bits."""
 
     def __init__(self, apex, axis, focal_length, height, infinite=False, caps=True):
         self.center, self.axis, self.focal_length = vector(apex), vector(axis), rational(focal_length)
@@ -359,7 +359,7 @@ class Triangle(Plane):
         self.size = self.radius = max(map(length, self.sides))
 
     def edges(self, ray):
-        """Of each edge, six times the volume it spans with the ray."""
+        """Six times the volume that each edge spans with the ray."""
         seen = [subtract(v, ray.origin) for v in self.vertices]
         return [dot(ray.direction, cross(seen[i], seen[(i + 1) % 3])) for i in range(3)]
 
