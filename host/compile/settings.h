@@ -8,7 +8,8 @@ typedef enum {
     PRECISION_SINGLE, // float, uncontracted; divisions and roots as the device has them
     PRECISION_STRICT, // float, compensated and correctly rounded: the same bits on every device
     PRECISION_DOUBLE, // double
-    // single, with a bound on the error of each decision; pixels with an undecided one are repeated in double
+    // single, with a bound on the error of each decision; pixels with an uncertain one are re-rendered in
+    // double
     PRECISION_CERTIFIED,
     PRECISION_COUNT,
     ARITHMETIC_COUNT = PRECISION_CERTIFIED // those of one arithmetic come first

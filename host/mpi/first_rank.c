@@ -174,7 +174,7 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
     if (is_right || state->is_rejected) return;
     state->is_rejected = true;
     rank_drop(ranks, scheduler, worker, rank,
-              "it sent what is not a band of its rows; the others go on without it");
+              "it sent data that is not a band of its rows; the others continue without it");
 }
 
 // Answers a rank that wants rows, and reports the end to each once. False: there is nothing to do.

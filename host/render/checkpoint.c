@@ -27,13 +27,13 @@ enum { HASH_BYTES = 16, KEY_BYTES_MAX = 1 << 16, CHUNK_BYTES = 1 << 20 };
 typedef struct {
     char magic[16];
     uint64_t format, key_length;
-    unsigned char hash[HASH_BYTES]; // of the key
+    unsigned char hash[HASH_BYTES]; // the key's hash
 } FileHeader;
 
 typedef struct {
     FilmHeader film;
-    uint64_t size;                  // of the layers
-    unsigned char hash[HASH_BYTES]; // of everything above and the layers
+    uint64_t size;                  // the size of the layers
+    unsigned char hash[HASH_BYTES]; // the hash of everything above and of the layers
 } RecordHeader;
 
 typedef enum { RECORD_WHOLE, RECORD_TORN, RECORD_FAILED } RecordState;
@@ -51,7 +51,7 @@ struct Checkpoint {
         size_t count, capacity;
     } bands;
     struct {
-        off_t *items; // of the same records
+        off_t *items; // in the order of `bands`
         size_t count, capacity;
     } offsets;
 };
