@@ -15,7 +15,7 @@
 #define WITH_FMA __attribute__((noinline))
 #endif
 
-// Compiled for processors with fma, as -march=native would.
+// This is compiled for processors with fma, as -march=native would.
 WITH_FMA static double multiply_add(double a, double b, double c)
 {
     return a * b + c;

@@ -1,4 +1,4 @@
-// JSON out: every text and number must read back as it was, with its type.
+// Tests that every text and number of written JSON reads back as it was, with its type.
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "tests/child.h"

@@ -1,5 +1,5 @@
-// What glint bench makes of times, worked out by hand: quantiles, which clock is believed, when runs suffice,
-// and the rows of an earlier report.
+// Checks by hand what glint bench makes of times: quantiles, which clock is trusted, when runs suffice, and
+// the rows of an earlier report.
 #include "host/base/fault.h"
 #include "host/measure/baseline.h"
 #include "host/measure/bench.h"
@@ -35,7 +35,7 @@ static void test_quantiles(void **state)
     series_free(&series);
 }
 
-// A launch on a device's clock that starts at 1000 s and runs `rate` times as fast as the host's.
+// Returns a launch on a device's clock that starts at 1000 s and runs `rate` times as fast as the host's.
 static LaunchTime launch_at(double host_start, double seconds, double rate)
 {
     return (LaunchTime){
@@ -48,7 +48,7 @@ static LaunchTime launch_at(double host_start, double seconds, double rate)
     };
 }
 
-// Runs of two launches of 10 and 20 ms, one each 100 ms.
+// Returns the times of runs with two launches of 10 and 20 ms, one run each 100 ms.
 static BenchTimes times_make(size_t runs, double rate)
 {
     BenchTimes times = {0};
@@ -90,7 +90,7 @@ static void test_clock_that_drifts(void **state)
     bench_times_free(&times);
 }
 
-// Whichever launch the host learns of late, the device's clock is not blamed; one that drifts still is.
+// The device's clock is not blamed if the host learns late of a launch. A clock that drifts is.
 static void test_stalled_launches(void **state)
 {
     (void)state;
@@ -110,7 +110,7 @@ static void test_stalled_launches(void **state)
         }
 }
 
-// One event that cannot be believed, and the whole row goes by the host's clock.
+// One event that cannot be trusted makes the whole row use the host's clock.
 static void test_event_without_times(void **state)
 {
     (void)state;
@@ -193,7 +193,7 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     "\", \"precision\": \"single\", \"lanes\": 16, \"bvh\": \"auto\", \"samples\": 4, \"bounces\": 5, "      \
     "\"size\": [40, 30], \"frame_samples_ms\": " frames ", \"processor_samples_ms\": [7, 8]}"
 #define ROW_HASH "abcdef0123456789"
-// What a report starts with.
+// The start of a report.
 #define BASELINE_HEAD "{\"schema\": 6, \"calibration\": {\"rounds\": 1048576}, "
 
 static void test_baseline(void **state)

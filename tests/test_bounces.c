@@ -140,7 +140,7 @@ static double largest_difference(Color a, Color b)
     return fmax(fabs(a.x - b.x), fmax(fabs(a.y - b.y), fabs(a.z - b.z)));
 }
 
-// How far the pixel's color moves where its rays do.
+// Returns how far the pixel's color moves if its rays move.
 static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Trial *trial, double u,
                           Color color)
 {

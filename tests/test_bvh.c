@@ -1,5 +1,7 @@
-// That no hit depends on the BVH, and that closed meshes do not leak; with GLINT_LONG_TESTS=1 a million rays
-// in place of ten thousand. run_tests: sanitize-long-only
+// Tests that no hit depends on the BVH, and that closed meshes do not leak, with ten thousand rays, or a
+// million with GLINT_LONG_TESTS=1.
+//
+// run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
@@ -43,7 +45,7 @@ static void trace(const Scene *scene, Precision precision, BvhChoice bvh, const 
     trace_lanes(scene, precision, bvh, 0, rays, count, hits);
 }
 
-// Along a world axis, and a box without thickness.
+// Returns a shape along a world axis, or a box without thickness.
 static Object aligned_object(size_t index, Vector3 center, double size)
 {
     const Vector3 up = {0, size, 0};
@@ -83,8 +85,8 @@ static Scene random_scene(size_t count)
     return scene;
 }
 
-// A point where rounding matters: a triangle's vertex or edge; a corner of a box around another shape, or a
-// point where the shape may touch the box.
+// Returns a point where rounding matters: a triangle's vertex or a point of its edge; a corner of a box
+// around another shape, or a point where the shape may touch the box.
 static Vector3 delicate_point(const Scene *scene)
 {
     const Object *object = &scene->objects.items[random_bits(&random_state) % scene->objects.count];
@@ -105,7 +107,8 @@ static TraceRay ray_of(Vector3 origin, Vector3 direction)
     return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
 }
 
-// A quarter each: any, along an axis with components of exactly 0 or -0, at a delicate point, from far away.
+// Makes rays, a quarter each: any, along an axis with components of exactly 0 or -0, at a delicate point,
+// from far away.
 static void rays_fill(TraceRay *rays, size_t count, const Scene *scene)
 {
     for (size_t i = 0; i < count; i++) {
@@ -291,7 +294,7 @@ static void mesh_subdivide(Mesh *mesh)
     free(middles);
 }
 
-// An icosahedron cut four times each way, its vertices' radii changed by up to a fifth.
+// Returns an icosahedron cut four times each way, with its vertices' radii changed by up to a fifth.
 static Scene closed_scene(Vector3 center, double radius)
 {
     const double g = (1 + sqrt(5)) / 2;
@@ -324,7 +327,7 @@ static Scene closed_scene(Vector3 center, double radius)
     return scene;
 }
 
-// From inside, two fifths each at vertices and at edges, as the kernel's precision has them.
+// Makes rays from inside, two fifths each at vertices and at edges as they are at the kernel's precision.
 static void rays_at_seams(TraceRay *rays, size_t count, const Mesh *mesh, Vector3 center, bool wide)
 {
     for (size_t i = 0; i < count; i++) {

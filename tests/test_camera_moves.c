@@ -28,7 +28,7 @@ static Vector3 point_along(const Camera *camera, const double pixel[2], double d
     return vector_add(camera->position, vector_scale(ray, distance));
 }
 
-// That the point is seen in the pixel.
+// Checks that the point is seen in the pixel.
 static void check_pixel(const Camera *camera, Vector3 point, const double pixel[2])
 {
     Vector3 seen = vector_normalize(vector_subtract(point, camera->position));
@@ -152,7 +152,7 @@ static void yaml_gives_the_same_camera(void **state)
 
 #define REST "objects: [] # none\n"
 
-// NULL: refused, with one message.
+// Checks the text that replaces the camera. An `expected` of NULL means a refusal with one message.
 static void check_replaced(const char *text, const char *expected)
 {
     const Camera camera = {.position = {1, 2.5, 3}, .look_at = {0, 0, 1e-3}, .up = {0, 0, 1}};
@@ -187,8 +187,8 @@ static void camera_is_written_into_the_file(void **state)
     check_replaced("camera: {position: [1, 2, 3]\n", NULL);
 }
 
-// A scene that takes this long to move and per pixel: every frame after the first few is in time, the
-// resolution settles, and is the best there is.
+// Checks a scene that takes this long to move and per pixel: every frame after the first few is in time, and
+// the resolution settles at the best there is.
 static void check_pace(double move_seconds, double seconds_of_pixel, uint32_t expected)
 {
     Preview preview = {0};

@@ -1,5 +1,6 @@
-// The statistic of glint bench on synthetic times: how often it reports a difference where there is none,
-// how often it finds one, and that it says so where it cannot know. Seeded, so that each run is the same.
+// Tests the statistic of glint bench on synthetic times: how often it reports a difference where there is
+// none, how often it finds one, and that it reports when it cannot decide. The seeds are fixed, so that each
+// run is the same.
 #include "host/compile/random_shape.h"
 #include "host/measure/comparison.h"
 
@@ -46,7 +47,7 @@ static const Machine busy = {.scatter = 0.03,
 static const Machine hopeless = {
     .scatter = 0.4, .burst_share = 0.5, .burst_slowdown = 3, .drift = 0.05, .placement = 0.1};
 
-// A burst lasts for 30 rounds on average.
+// Advances the machine by a round. A burst lasts for 30 rounds on average.
 static void machine_step(Machine *machine)
 {
     const double ends = 1.0 / 30;
@@ -62,7 +63,7 @@ static double run_seconds(const Machine *machine, double slowdown)
            exp(machine->speed + machine->scatter * (random_normal() + outlier));
 }
 
-// glint bench --against on such a machine, of a build that takes `slowdown` times as long.
+// Simulates glint bench --against on such a machine, for a build that takes `slowdown` times as long.
 static Verdict against_simulate(Machine machine, double slowdown, double tolerance)
 {
     enum { ROWS = 1, LOOKS = 3, ROUNDS = 12 };
@@ -89,7 +90,7 @@ static Verdict against_simulate(Machine machine, double slowdown, double toleran
     return comparison.verdict;
 }
 
-// A report of 200 runs: one process.
+// Simulates a report of 200 runs, which is one process.
 static void report_simulate(Machine machine, double slowdown, Series *frame, Series *calibration)
 {
     double place = slowdown * exp(machine.placement * random_normal());
@@ -112,7 +113,7 @@ static Verdict reports_simulate(Machine old_machine, Machine new_machine, double
     return comparison.verdict;
 }
 
-// Two rows of one process in turn, the second of which takes `slowdown` times as long.
+// Simulates two rows of one process in turn, the second of which takes `slowdown` times as long.
 static Verdict rounds_simulate(Machine machine, double slowdown, int rounds)
 {
     Series times[2] = {{0}, {0}};
@@ -159,7 +160,7 @@ static void counts_print(const char *what, Counts counts)
 
 enum { TRIES = 1000 };
 
-// At most 1 % of false alarms, whatever the machine.
+// False alarms are at most 1 % whatever the machine.
 static void test_same_build_against_itself(void **state)
 {
     (void)state;

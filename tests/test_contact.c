@@ -1,5 +1,6 @@
-// The box around where transparent and opaque objects may touch: a hit outside it is never tested for an
-// opaque surface at the same point, so the box must contain all such points and should contain little else.
+// Tests the box around the points where transparent and opaque objects may touch. A hit outside it is never
+// tested for an opaque surface at the same point, so the box must contain all such points and should contain
+// little else.
 #include "host/compile/compile.h"
 #include "tests/scene_reading.h"
 #include <float.h>
@@ -111,7 +112,7 @@ static Bounds contact_of(const Scene *scene)
     return contact;
 }
 
-// At or beyond, by no more than a 256th.
+// Checks that a value is at a bound or beyond it by no more than a 256th.
 static void check_beyond(const char *name, double value, double bound)
 {
     if (fabs(bound) == UNBOUNDED) {
@@ -141,7 +142,7 @@ static void holds_where_they_touch(void **state)
     text_free(&text);
 }
 
-// Enough pairs that all opaque objects counts as one box, and, where much is unbounded, as everywhere.
+// With enough pairs, all opaque objects count as one box, and if many are unbounded, as everywhere.
 static void many_pairs_hold_as_much(void **state)
 {
     (void)state;

@@ -1,4 +1,4 @@
-// Images out and in: every format's round trip, notes, and failures that leave the old file as it was.
+// Writes and reads images: every format's round trip, notes, and failures that leave the old file unchanged.
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "tests/files.h"
@@ -125,7 +125,7 @@ static void test_float_formats(void **state)
     check_float_round_trip("a.npy", 5);
 }
 
-// The library reads ahead of a header: a file shorter than that is whole all the same.
+// The library reads ahead of a header, so a file shorter than that must be read as whole.
 static void test_small_exr(void **state)
 {
     (void)state;
@@ -332,7 +332,7 @@ static void test_finished_is_yet_to_be_renamed(void **state)
 
 static const char colors_path[] = "colors.png";
 
-// A PNG of one pixel. `profile`, `primaries`: NULL for none; `gamma`: 0 for none.
+// Writes a PNG of one pixel. `profile` and `primaries` may be NULL, and `gamma` may be 0, for none.
 static void colors_write(const char *profile, double gamma, const double *primaries, bool is_srgb)
 {
     FILE *file = fopen(colors_path, "wb");
@@ -451,8 +451,8 @@ static void test_png_of_other_colors(void **state)
     check_warning(colors_path, NULL);
 }
 
-// A JPEG of 32 x 16 pixels, whose quarters have the gray levels 0, 80, 160 and 240 in reading order, with
-// application segments before its image.
+// Writes a JPEG of 32 x 16 pixels, whose quarters have the gray levels 0, 80, 160 and 240 in reading order,
+// with application segments before its image.
 static void jpeg_write(const char *path, const char *segments, size_t length, int pixel_format)
 {
     enum { WIDTH = 32, HEIGHT = 16 };
@@ -597,7 +597,8 @@ static long peak_kibibytes(void)
     return usage.ru_maxrss;
 }
 
-// Refused before anything of the declared size is made: one of its rows alone would be 300 MB.
+// The file is refused before anything of the declared size is allocated. One of its rows alone would be 300
+// MB.
 static void test_png_that_declares_too_much(void **state)
 {
     (void)state;
@@ -610,7 +611,7 @@ static void test_png_that_declares_too_much(void **state)
     assert_true(peak_kibibytes() - before < 64 * 1024);
 }
 
-// Nor is anything made of the size that a note declares, here 1.8 GB.
+// Nothing of the size that a note declares, here 1.8 GB, is allocated.
 static void test_png_with_a_large_note(void **state)
 {
     (void)state;

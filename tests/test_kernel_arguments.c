@@ -84,7 +84,7 @@ static cl_program program_with_arguments(const char *text)
     return program;
 }
 
-// The test's own kernel has arguments of known sizes.
+// The kernel of this test has arguments of known sizes.
 static void arguments_are_counted(void **state)
 {
     (void)state;

@@ -1,5 +1,7 @@
-// The culls of macro-tiles attacked: triangles and spheres within a few ulp of where a cull changes its
-// answer. The image must have the same bits with the BVH and without it. run_tests: sanitize-long-only
+// Attacks the culls of macro-tiles with triangles and spheres within a few ulp of where a cull changes its
+// answer. The image must have the same bits with the BVH and without it.
+//
+// run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
 #include "tests/film.h"
@@ -17,7 +19,8 @@ enum { WIDTH = 48, HEIGHT = 36, OBJECTS = 300, MATERIALS = 7 };
 
 static const double half_tangent = 0.75, floor_y = -3, farthest = 12;
 
-// The camera looks from 0 along -z; all sizes below are in units of the scene's.
+// Returns the direction of a pixel. The camera looks from 0 along -z. All sizes below are in units of the
+// scene's size.
 static Vector3 pixel_direction(uint64_t column, uint64_t row)
 {
     double unit = half_tangent / WIDTH;
@@ -29,14 +32,14 @@ static Vector3 random_pixel_direction(void)
     return pixel_direction(random_bits(&random_state) % WIDTH, random_bits(&random_state) % HEIGHT);
 }
 
-// What a camera ray meets at the latest.
+// Returns the point that a camera ray hits if nothing is in its way.
 static Vector3 point_behind(Vector3 direction)
 {
     double t = direction.y < 0 ? fmin(floor_y / direction.y, farthest) : farthest;
     return vector_scale(direction, t);
 }
 
-// Up to 4 ulp of a float away.
+// Moves a value by up to 4 ulp of a float.
 static double nudge(double value)
 {
     float nudged = (float)value;
@@ -54,7 +57,8 @@ static Vector3 vector_nudge(Vector3 v)
 static const Vector3 origins[] = {{0, 0, 0}, {2, 9, 1}, {0.25, -0.5, -6}, {-7, -3, -5}};
 enum { ORIGINS = sizeof origins / sizeof *origins };
 
-// On the ray of a pixel, or on the way from what it sees to a light: at any distance from there.
+// Returns a point on the ray of a pixel, or on the way from what it sees to a light, at any distance from
+// there.
 static Vector3 point_in_view(size_t origin, Vector3 seen, double along)
 {
     return vector_add(origins[origin], vector_scale(vector_subtract(seen, origins[origin]), along));
@@ -105,7 +109,7 @@ static Object triangle_in_view(size_t index)
                     .as.triangle.vertices = {vector_nudge(a), vector_nudge(b), vector_nudge(c)}};
 }
 
-// Touches the ray of a pixel.
+// Returns a sphere that touches the ray of a pixel.
 static Object sphere_in_view(void)
 {
     size_t origin = random_bits(&random_state) % ORIGINS;
@@ -157,7 +161,7 @@ static Scene scene_attacking(double scale)
     return scene;
 }
 
-// How many pixels see an object, and how many of those are in the shadow of a light.
+// Counts the pixels that see an object, and those of them that are in the shadow of a light.
 static void count_seen(const Film *film, const Scene *scene, size_t *seen, size_t *shadowed)
 {
     const size_t light_count = scene->lights.count;

@@ -1,4 +1,5 @@
-// Meshes: what a file's triangles become, where they stand, what is refused, and which ids they get.
+// Tests meshes: what a file's triangles become, where they are placed, what is refused, and which ids they
+// get.
 #include "host/base/base64.h"
 #include "host/compile/compile.h"
 #include "host/compile/scene_bounds.h"
@@ -32,7 +33,7 @@ static int meshes_close(void **state)
     return probe_close(state) + folder_close(state);
 }
 
-// A scene whose only objects are `objects`, one per line.
+// Returns a scene whose only objects are `objects`, one per line.
 static Scene scene_of_objects(const char *objects)
 {
     Text text = {0};
@@ -112,7 +113,8 @@ static void normals_come_from_the_triangles(void **state)
     scene_free(&scene);
 }
 
-// Four corners of one square, whose two triangles have as much of a say as the others' one.
+// Four corners of one square, whose two triangles together weigh as much as each of the others' single
+// triangle.
 static void normals_do_not_see_the_cut_of_a_polygon(void **state)
 {
     (void)state;
@@ -460,7 +462,7 @@ static void every_format_has_normals_and_texture_coordinates(void **state)
     scene_free(&scene);
 }
 
-// What the process that runs assimp may do (tests/assimp_process.c); its limits are lower here. Who started
+// Checks what the process that runs assimp may do (tests/assimp_process.c), with lower limits. The caller of
 // glint may ignore the signals that end it.
 static void child_is_limited(void **state)
 {
@@ -586,7 +588,7 @@ static void triangles_without_area_are_never_hit(void **state)
     }
 }
 
-// The only message, an error, of a renderer that is not opened.
+// Checks that a renderer is not opened, with this error as the only message.
 static void assert_refused(Compute *compute, const Scene *scene, const char *expected)
 {
     MessageList messages = {0};

@@ -1,5 +1,5 @@
-// Image metrics: expected values are computed by hand, or by the authors' own FLIP (flip-evaluator 1.7 of
-// PyPI); tests/test_diff_metrics.py checks more of them.
+// Tests image metrics. Expected values are computed by hand, or by the FLIP of its authors (flip-evaluator
+// 1.7 of PyPI). tests/test_diff_metrics.py checks more of them.
 #include "host/image/heatmap.h"
 #include "host/measure/flip.h"
 #include "host/measure/image_metrics.h"

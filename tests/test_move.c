@@ -67,7 +67,7 @@ static void check_array(const CompiledScene *moved, const CompiledScene *expecte
     assert_memory_equal(got->items, wanted->items, got->count * got->layout.size);
 }
 
-// Everything but the order of primitives, and the BVH.
+// Compares everything except the order of primitives and the BVH.
 static void check_numbers(const CompiledScene *moved, const CompiledScene *expected)
 {
     assert_int_equal(moved->features, expected->features);
@@ -117,7 +117,7 @@ static size_t check_block(const CompiledScene *compiled, size_t index, size_t co
     return first;
 }
 
-// The box of all below a node, after checks that its children's boxes are exact.
+// Returns the box of everything below a node, after checks that its children's boxes are exact.
 static Bounds check_node(const CompiledScene *compiled, size_t index, const Bounds *empty)
 {
     const Node node = node_at(compiled, index);
@@ -230,7 +230,7 @@ static void turned_camera_changes_the_header_alone(void **state)
     scene_free(&scene);
 }
 
-// A kernel may be built for a BVH that the scene has not: its one node stays empty.
+// A kernel may be built for a BVH that the scene does not have. Its one node stays empty.
 static void missing_bvh_stays_empty(void **state)
 {
     (void)state;
@@ -248,7 +248,7 @@ static void missing_bvh_stays_empty(void **state)
     scene_free(&scene);
 }
 
-// Where the device's unit changes, or the eye does not fit, and afterwards.
+// Moves to eyes at which the device's unit changes or which do not fit, and back.
 static void far_eyes(void **state)
 {
     (void)state;
@@ -294,7 +294,7 @@ static void check_move_after_failure(const char *text, const Camera *failing, co
     scene_free(&scene);
 }
 
-// A move that failed has changed some arrays: the next one, to whichever eye, sets all of them.
+// A move that failed has changed some arrays. The next one, to whichever eye, must set all of them.
 static void moves_after_a_failure(void **state)
 {
     (void)state;

@@ -1,5 +1,5 @@
-// What rounding would move next to the eye is defined relative to it, and nothing else is: kernels of other
-// scenes pay nothing.
+// Tests that shapes next to the eye, which rounding would move, are defined relative to it, and others are
+// not: kernels of other scenes pay nothing.
 #include "host/compile/compile.h"
 #include "host/compile/shapes.h"
 #include "tests/scene_reading.h"
@@ -112,8 +112,8 @@ static void a_plane_goes_through_its_nearest_point(void **state)
     compiled_scene_free(&compiled);
 }
 
-// Explicit rays may start next to its own point. In double that is exact; the one nearest to the origin would
-// be off by rounding, 4e5 ulp of a t of 1 in this plane.
+// Explicit rays may start next to the plane's stored point. In double that point is exact. The point nearest
+// to the origin would be off by rounding, 4e5 ulp of a t of 1 in this plane.
 static void explicit_rays_see_a_plane_through_its_own_point(void **state)
 {
     (void)state;

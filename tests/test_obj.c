@@ -18,7 +18,7 @@
 #define CORNERS "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 #define FACE    CORNERS "f 1 2 3\n"
 
-// Reads the scene of the mesh; all messages with their files, a line each, must be `expected`.
+// Reads the scene of the mesh. All messages with their files, one per line, must equal `expected`.
 static bool scene_read(Scene *scene, const char *text, const char *expected)
 {
     MessageList messages = {0};
@@ -383,7 +383,7 @@ static void what_is_not_used_is_reported_once(void **state)
     scene_free(&scene);
 }
 
-// Faces do without texture coordinates and normals that the file lacks.
+// Faces are read without texture coordinates and normals that the file lacks.
 static void missing_parts_are_dropped(void **state)
 {
     (void)state;
@@ -418,7 +418,7 @@ static void missing_parts_are_dropped(void **state)
     }
 }
 
-// Whatever a file is warned of, however often a scene names it.
+// Each warning about a file is printed once, however often a scene names the file.
 static void files_have_each_message_once(void **state)
 {
     (void)state;

@@ -15,14 +15,14 @@
 
 enum { WIDTH = 71, HEIGHT = 50, CELL = 5 };
 
-// Where in its cell of the whole image a pixel of the sample is; fails if it is none of them.
+// Returns where in its cell of the whole image a pixel of the sample is. Fails if it is not in the cell.
 static unsigned place_in_cell(const Film *whole, const double *color, uint32_t x, uint32_t y)
 {
     for (uint32_t i = 0; i < CELL * CELL; i++) {
         const size_t pixel = (size_t)(y * CELL + i / CELL) * WIDTH + x * CELL + i % CELL;
         if (memcmp(whole->color + 3 * pixel, color, 3 * sizeof *color) == 0) return i;
     }
-    fail_msg("the sample of cell %u,%u is no pixel of it", x, y);
+    fail_msg("the sample of cell %u,%u is not a pixel of it", x, y);
     return 0;
 }
 
@@ -67,8 +67,8 @@ static void bound_of_zeros_and_ones(void **state)
     assert_true(mean_upper_bound(values, 1, 0.05) == 1);
 }
 
-// Rare values, as wrong pixels are, of strata that differ: the bound misses the mean no more often than it
-// may, and is not idle: 400 zeros alone give 0.006.
+// Rare values, as of wrong pixels, in strata that differ: the bound misses the mean no more often than it
+// may, and is not useless (400 zeros alone give 0.006).
 static void bound_covers_the_mean(void **state)
 {
     (void)state;
@@ -157,7 +157,7 @@ static void verdicts_of_a_sample(void **state)
     film_free(&turned_reference);
 }
 
-// By hand, per channel: the larger square, in all lights, and half of that again in each of two mirrors.
+// Calculated by hand, per channel: the larger square, in all lights, and half of that in each of two mirrors.
 static void scene_bounds_its_colors(void **state)
 {
     (void)state;

@@ -77,7 +77,7 @@ static double cone_moved_by_power(const Object *cone, Vector3 point, double r, d
            (2 * r * hypot(1, slope));
 }
 
-// What a surface may move by beyond the slack (Tolerance).
+// Returns how far a surface may move beyond the slack (Tolerance).
 static double moved_beyond(const Object *object, const ReferenceHit *hit, Vector3 point, bool has_eye_powers,
                            bool compensated, double u, double size)
 {
@@ -255,14 +255,14 @@ static void hits_the_nearest_of_many(void **state)
     }
 }
 
-// A cone of 32 times the slope; its axis ends on a float still.
+// Changes a cone to 32 times the slope. Its axis still ends on a float.
 static void make_steep(RandomShape *cone)
 {
     cone->object.as.cone.slope *= 32;
     cone->object.as.cone.axis = vector_scale(cone->object.as.cone.axis, 0x1p-5);
 }
 
-// There c cancels, and some rays are taken to leave without being looked at closely.
+// There c cancels, and some rays are classified as leaving without a closer test.
 static void hits_from_next_to_the_side(void **state)
 {
     (void)state;

@@ -74,7 +74,7 @@ static Scene scene_make(const char *camera, const char *object)
     return scene;
 }
 
-// One ray along the camera's axis.
+// Checks the color along the camera's axis by one ray.
 static void check_seen(const char *camera, const char *object, double red, double green, double blue)
 {
     Scene scene = scene_make(camera, object);
@@ -161,7 +161,7 @@ static void map_sphere(Vector3 position, Vector3 normal, double *u, double *v)
     *v = asin(fmin(fmax(normal.y, -1), 1)) / M_PI + 0.5;
 }
 
-// Twice as wide as tall, size 2.
+// Maps a texture that is twice as wide as tall and has size 2.
 static void map_wall(Vector3 position, Vector3 normal, double *u, double *v)
 {
     (void)normal;
@@ -195,7 +195,7 @@ static Vector3 vector_at(const double *values, size_t pixel)
     return (Vector3){values[3 * pixel], values[3 * pixel + 1], values[3 * pixel + 2]};
 }
 
-// Each pixel against its place in the texture, where texels are larger than pixels.
+// Checks each pixel against its place in the texture, where texels are larger than pixels.
 static void check_places(const char *camera, const char *object, TextureMap map, const TextureWrap wraps[2])
 {
     TestTexture texture = texture_make(4, 2);
@@ -278,8 +278,8 @@ static void meshes_wrap_it(void **state)
                      map_wide, wraps[i]);
 }
 
-// Far away, where a pixel sees the whole texture and more, the mean of all texels. 5 x 3 is nowhere a half of
-// anything.
+// Far away, where a pixel sees more than the whole texture, its color is the mean of all texels. No dimension
+// of 5 x 3 is a power of two.
 static void far_away_it_is_its_mean(void **state)
 {
     (void)state;
@@ -420,7 +420,7 @@ static void scene_faults_are_reported(void **state)
                     "5:60: error: the mesh has no uv for the material's image\n");
 }
 
-// What renderer_open says about the texture, at its place in the scene file.
+// Checks the message of renderer_open about the texture, at its place in the scene file.
 static void check_refused(const char *expected)
 {
     Scene scene = scene_make(FROM(0, 0, 5), BALL);

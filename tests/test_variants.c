@@ -1,5 +1,7 @@
-// What must not change an image, bit for bit: lanes, features built in without need, bands, the region, a
-// repeated run; and what must change it in a known way: the scene's scale, its mirror image.
+// Tests settings that must not change any bit of an image: lanes, features built in without need, bands, the
+// region, a second run. Also tests those that must change it in a known way: the scene's scale, and its
+// mirror image.
+//
 // run_tests: sanitize-long-only
 #include "host/compile/transform.h"
 #include "host/import/load.h"
@@ -32,7 +34,7 @@ static int variants_close(void **state)
     return probe_close(state);
 }
 
-// A rendering with the settings' features as they are.
+// Renders with the settings' features unchanged.
 static Film render(const Scene *scene, const RenderSettings *settings)
 {
     return film_render(&probe_compute, scene, settings, 0);
