@@ -139,7 +139,7 @@ for line in worker.stdout:
         self.refuses(f"{command} ./none", "cannot run './none'")
         self.refuses(f"{command} /bin/true", "does not answer")
         self.refuses("bench - --against ./other", "it cannot be '-'")
-        self.refuses(f"{command} ./other --compare report", "exclude")
+        self.refuses(f"{command} ./other --compare report", "cannot be combined")
         self.refuses(f"{command} ./other --device none-such", "none-such")
         write("other", "#!/bin/sh\nkill -INT $PPID\necho 'glint: interrupted' >&2\nexit 130\n")
         self.assertEqual(self.glint(f"{command} ./other", status=130).stderr, "glint: interrupted\n")
