@@ -1,4 +1,5 @@
 #!/bin/bash
+# run_tests: sanitize-long-only
 # Tests libglint as a C program finds it: installed, with nothing else of the tree. The example builds against the shared and the
 # static library, as C and as C++, and both have the symbols of glint.h alone.
 . "$(dirname "$0")/support.bash"

@@ -1,8 +1,9 @@
-#!/usr/bin/env python3
-"""The Python package over libglint: scenes, images, rays with bounds, the drop-in for trimesh, errors and threads."""
+#!/usr/bin/env -S python3 -B
+"""The Python package over libglint: scenes, images, rays with bounds, the drop-in for trimesh, errors and threads.
+
+run_tests: sanitize-long-only"""
 import ctypes
 import os
-import pathlib
 import subprocess
 import sys
 import tempfile
@@ -10,8 +11,13 @@ import threading
 import unittest
 import warnings
 from fractions import Fraction
+from pathlib import Path
 
-ROOT = pathlib.Path(__file__).resolve().parents[1]
+from glint import need_modules
+
+need_modules("numpy=numpy==2.4.6")
+del sys.modules["glint"]  # the tests' own module, not the package
+ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / os.environ.get("BUILD", "build")
 if BUILD.name.endswith("-sanitize"):
     print("skipped: Python does not start with a sanitizer's runtime")
