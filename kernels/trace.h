@@ -7,8 +7,10 @@
 
 // The bounds are derived for coordinates in this range (host/compile/certified_range.c).
 #if IS_DOUBLE
+#define ORIGIN_MIN 0x1p-440
 #define ORIGIN_MAX 0x1p220
 #else
+#define ORIGIN_MIN 0x1p-60f
 #define ORIGIN_MAX 0x1p48f
 #endif
 
@@ -46,7 +48,12 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
         ray.direction_error = (real)(2 * UNIT_ROUNDOFF);
     }
     Hit hit = closest_hit(scene, &ray);
-    if (IS_CERTIFIED) hit.doubt = hit.doubt | !(ray.active & (vector_norm1(origin) < (real)(ORIGIN_MAX)));
+    if (IS_CERTIFIED) {
+        const real size = vector_norm1(origin);
+        const mask in_range =
+            (size == (real)(0)) | ((size >= (real)(ORIGIN_MIN)) & (size < (real)(ORIGIN_MAX)));
+        hit.doubt = hit.doubt | !(ray.active & in_range);
+    }
     Surface surface = surface_interaction(scene, &ray, &hit);
     RealLanes result[RESULTS];
     result[RESULT_T].all = hit.t;

@@ -5,6 +5,7 @@
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/random_scene.h"
+#include <float.h>
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -31,7 +32,7 @@ static void hit_check(const ReferenceScene *reference, const TraceRay *ray, cons
     const double *o = ray->origin, *d = ray->direction;
     const ReferenceRay exact_ray = reference_ray((Vector3){o[0], o[1], o[2]}, (Vector3){d[0], d[1], d[2]});
     ReferenceRay endless = exact_ray;
-    endless.tmax = (Quad)1e300;
+    endless.tmax = isfinite(ray->tmax) ? (Quad)ray->tmax : (Quad)LDBL_MAX;
     const ReferenceHit exact = reference_scene_hit(reference, &endless, UINT32_MAX);
     counts->certain += hit->certainty == TRACE_CERTAIN;
     counts->in_double += hit->certainty == TRACE_CERTAIN_IN_DOUBLE;
@@ -125,8 +126,50 @@ static void mesh_edges_are_certain(void **state)
     assert_true(counts.certain > 0 && counts.in_double > RAYS / 10 && counts.uncertain > 0);
 }
 
-// A tangent of a sphere, a start on one, and two spheres that coincide, which no arithmetic of this kind
-// decides; and what is behind a start, or a direction as small as floats are.
+// A plane through the origin and one across it. Rays start next to the origin, down to the least numbers, and
+// have directions of every length and ends next to their hits.
+static void least_and_largest_numbers(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {.normal = {0, 1, 0}}},
+                        {.kind = SHAPE_PLANE, .as.plane = {.normal = {1, 0, 0}}},
+                        {.kind = SHAPE_PLANE, .as.plane = {.point = {0, 0, 1}, .normal = {0, 0, 1}}}};
+    Material material;
+    Scene scene = scene_of_shapes(objects, 3, &material);
+    enum { RAYS = 6000 };
+    TraceRay *rays = memory_allocate(RAYS, sizeof *rays), *scaled = memory_allocate(RAYS, sizeof *scaled);
+    TraceHit *hits = memory_allocate(RAYS, sizeof *hits);
+    int *exponents = memory_allocate(RAYS, sizeof *exponents);
+    Random random = {11};
+    for (size_t i = 0; i < RAYS; i++) {
+        const double size = exp2(floor(random_between(&random, i % 2 ? -1074 : -160, i % 3 ? 40 : 1000)));
+        const Vector3 direction =
+            vector_scale(random_in_sphere(&random), exp2(random_between(&random, -1000, 1000)));
+        ray_set(&rays[i], vector_scale(random_in_sphere(&random), size), direction);
+        if (i % 4 == 0) // about the distance of the plane y = 0
+            rays[i].tmax = -rays[i].origin[1] / direction.y * (1 + random_between(&random, -1e-15, 1e-15));
+        if (!(rays[i].tmax > 0)) rays[i].tmax = INFINITY;
+        scaled[i] = trace_ray_scaled(rays[i], DBL_MAX, &exponents[i]);
+    }
+    assert_true(probe_trace(&scene, PRECISION_CERTIFIED, 0, scaled, RAYS, hits));
+    ReferenceScene reference = reference_scene_open(&scene);
+    Counts counts = {0};
+    for (size_t i = 0; i < RAYS; i++) {
+        trace_hit_unscale(&hits[i], exponents[i]);
+        hit_check(&reference, &rays[i], &hits[i], &counts);
+    }
+    printf("%zu certain, %zu in double, %zu uncertain\n", counts.certain, counts.in_double, counts.uncertain);
+    assert_true(counts.certain > RAYS / 8 && counts.uncertain > 0);
+    reference_scene_close(&reference);
+    free(exponents);
+    free(hits);
+    free(scaled);
+    free(rays);
+}
+
+// A sphere's tangent, a start on a sphere, and two coincident spheres are uncertain. Rays whose targets lie
+// behind them, and tiny directions, are certain.
 static void open_questions_are_uncertain(void **state)
 {
     (void)state;
@@ -168,6 +211,7 @@ int main(void)
         cmocka_unit_test(every_shape_is_certain),
         cmocka_unit_test(mesh_edges_are_certain),
         cmocka_unit_test(open_questions_are_uncertain),
+        cmocka_unit_test(least_and_largest_numbers),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

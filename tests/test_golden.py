@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
 """glint golden: the golden images of tests/golden keep their bits, and lines find what changes, where, and in which layer first."""
+import pathlib
 import re
 import shutil
 import unittest
@@ -46,7 +47,7 @@ class Golden(TestCase):
                 self.assertIn(change[0], SPHERE)
                 write("s.yaml", SPHERE.replace(*change))
                 out = self.glint("golden check", status=3).stdout
-                found = re.fullmatch(r"s\.yaml: different, first in (\w+); the scene is another one; (\d+) of 96 tiles, within pixels "
+                found = re.fullmatch(r"s\.yaml: different, first in (\w+); the scene has changed; (\d+) of 96 tiles, within pixels "
                                      r"(\d+) to (\d+), (\d+) to (\d+): s\.yaml-golden\.png\n", out)
                 self.assertIsNotNone(found, out)
                 self.assertRegex(found[1], f"^({layer})$")
@@ -61,6 +62,23 @@ class Golden(TestCase):
         for layer in "object", "t", "normal", "shadow", "path", "color":
             write("golden.txt", re.sub(rf"( {layer}=)(.)", lambda found: found[1] + "0123456789abcdef"[(int(found[2], 16) + 1) % 16], line))
             self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: different, first in {layer}\n")
+
+    def test_comments_and_line_ends(self):
+        write("golden.txt", "# mine\n")
+        self.assertEqual(self.written().count("# mine\n"), 1)
+        self.assertEqual(self.written().count("# mine\n"), 1)
+        write("golden.txt", read("golden.txt").replace("\n", "\r\n"))
+        self.assertEqual(self.glint("golden check").stdout, "s.yaml: same\n")
+
+    def test_scenes_of_one_name(self):
+        for folder in "a", "b":
+            pathlib.Path(folder).mkdir()
+            write(f"{folder}/s.yaml", SPHERE)
+        self.glint("golden write a/s.yaml b/s.yaml --size 24x18")
+        for folder in "a", "b":
+            write(f"{folder}/s.yaml", SPHERE.replace("radius: 1", "radius: 0.5"))
+        out = self.glint("golden check", status=3).stdout
+        self.assertRegex(out, r"(?s)a/s\.yaml.*: a-s\.yaml-golden\.png\nb/s\.yaml.*: b-s\.yaml-golden\.png\n")
 
     def test_reports(self):
         self.written()
@@ -77,6 +95,11 @@ class Golden(TestCase):
         for wrong in "size=0x18" + line.split("size=24x18")[1], line.replace("tiles=", "tiles=g"), line.replace(" path=", " paths="), "x\n":
             write("golden.txt", wrong)
             self.refuses("golden check", r"golden\.txt:\d+:1: error: expected a line of glint golden write")
+        write("golden.txt", line + line.splitlines()[-1] + "\n")
+        self.refuses("golden check", r'golden\.txt:4:1: error: a second line for "s\.yaml"')
+        write("golden.txt", "# nothing\n")
+        self.refuses("golden check", "'golden.txt' has no lines")
+        self.refuses("golden check --size 8x6", "are for write")
         self.refuses("golden check --file missing.txt", "missing.txt")
         self.refuses("golden", "expected write or check")
         self.refuses("golden write", "no scene given")

@@ -2,8 +2,10 @@
 """The Python package over libglint: scenes, images, rays with bounds, the drop-in for trimesh, errors and threads.
 
 run_tests: sanitize-long-only"""
+import copy
 import ctypes
 import os
+import pickle
 import subprocess
 import sys
 import tempfile
@@ -96,6 +98,11 @@ class Rays(unittest.TestCase):
                 self.assertTrue(np.all((hits.low <= hits.t) & (hits.t <= hits.high)))
         hits = scene.trace([[0, 0, -4]] * 3, [0, 0, 1], "double", tmin=[0, 3, 3.5], tmax=[2.5, np.inf, np.inf])
         np.testing.assert_allclose(hits.t, [np.inf, 5, 5])
+        # an end that float32 would round to beyond the hit
+        origins, directions = np.float32([[0, 0, -4]]), np.float32([[0, 0, 10]])
+        self.assertEqual(scene.trace(origins, directions, "certified", tmax=0.3 - 1e-10).hit.tolist(), [False])
+        self.assertEqual(scene.trace(np.zeros((0, 3)), np.zeros((0, 3)), "certified").t.shape, (0,))
+        self.assertEqual(scene.trace(np.array([[0, 0, -4.0]] * 4)[::2], [0, 0, 1]).object.tolist(), [0, 0])
 
     def test_bounds_hold(self):
         """Nothing that is certain differs from exact rational arithmetic on the rays' doubles: a cube's faces at 0 and 1, in
@@ -171,7 +178,9 @@ class Errors(unittest.TestCase):
                 (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES + 1), "no vertex 8 of 8"),
                 (lambda: glint.load_mesh(CUBE_VERTICES * np.nan, CUBE_FACES), "vertex 0"),
                 (lambda: glint.load_mesh(CUBE_VERTICES, CUBE_FACES[:0]), "1 to"),
-                (lambda: glint.load_mesh(CUBE_VERTICES, -CUBE_FACES), "negative"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, -CUBE_FACES), "no vertex -7"),
+                (lambda: glint.load_mesh(CUBE_VERTICES, [[1 << 32, (1 << 32) + 1, 2]]), "no vertex 4294967297"),
+                (lambda: glint.Scene(SPHERE).render(640), "both width and height"),
                 (lambda: glint.Scene(SPHERE).render(8, 6, device="toaster"), "toaster"),
                 (lambda: glint.Scene(SPHERE).render(8, 6, lanes=3), "lanes"),
                 (lambda: glint.Scene(SPHERE).render(1 << 21, 6), "pixels per side"),
@@ -183,6 +192,29 @@ class Errors(unittest.TestCase):
                      lambda: glint.Scene(SPHERE).render(8, 6, precision="fast"), lambda: glint.Scene(SPHERE).render_layers(["depth"])):
             with self.assertRaises(ValueError):
                 make()
+
+    def test_callbacks_and_lifetimes(self):
+        """An exception of progress arrives, also where it frees or uses a scene of the same device; handles are not shared."""
+        scene, other = glint.Scene(SPHERE), glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
+        other.trace([[3, 3, 3]], [[1, 0, 0]])
+
+        def progress(fraction):
+            nonlocal other
+            other.trace([[3, 3, 3]], [[1, 0, 0]])
+            other = None
+            raise KeyError("mine")
+        with self.assertRaisesRegex(KeyError, "mine"):
+            scene.render(640, 360, progress=progress)
+        for wrong in copy.copy, pickle.dumps:
+            with self.assertRaisesRegex(TypeError, "copied or pickled"):
+                wrong(scene)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with self.assertRaises(glint.GlintWarning):
+                glint.Scene({**SPHERE, "lights": []})
+        for wrong in ({"samples": (1 << 32) + 1}, {"lanes": (1 << 32) + 4}):
+            with self.assertRaisesRegex(ValueError, "expected 0 to 4294967295"):
+                scene.render(8, 6, **wrong)
 
     def test_warnings(self):
         with warnings.catch_warnings(record=True) as caught:

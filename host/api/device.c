@@ -17,7 +17,9 @@ static void info_set(GlintDeviceInfo *info, const Device *device)
     snprintf(own.name, sizeof own.name, "%s", device->name);
     snprintf(own.platform, sizeof own.platform, "%s", device->platform_name);
     snprintf(own.driver, sizeof own.driver, "%s", device->driver);
-    memcpy(info, &own, info->size < sizeof own ? info->size : sizeof own);
+    const size_t size = info->size;
+    memset(info, 0, size);
+    memcpy(info, &own, size < sizeof own ? size : sizeof own);
 }
 
 GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *count, char **messages)
@@ -51,7 +53,12 @@ GlintStatus glint_device_open(const char *selector, GlintDevice **device, char *
     if (chosen) compute_open(&opened->compute, chosen);
     const GlintStatus status =
         call_end(&list, &opened->compute, chosen ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
-    pthread_mutex_init(&opened->mutex, NULL);
+    // a progress function may trace, and free what it holds, on the device that renders
+    pthread_mutexattr_t recursive;
+    pthread_mutexattr_init(&recursive);
+    pthread_mutexattr_settype(&recursive, PTHREAD_MUTEX_RECURSIVE);
+    pthread_mutex_init(&opened->mutex, &recursive);
+    pthread_mutexattr_destroy(&recursive);
     *device = status == GLINT_DONE ? opened : NULL;
     if (!*device) glint_device_close(opened);
     return status;

@@ -53,8 +53,10 @@ static bool settings_read(RenderSettings *settings, const GlintRenderSettings *g
                           MessageList *messages)
 {
     uint32_t width = given->width, height = given->height;
-    if (width == 0 || height == 0) {
-        width = height = 0;
+    if ((width == 0) != (height == 0))
+        return message_error(messages, "an image needs both width and height, or neither, not %u x %u", width,
+                             height);
+    if (width == 0) {
         scene_choose_image_size(scene, &width, &height);
     }
     if (width > IMAGE_SIDE_MAX || height > IMAGE_SIDE_MAX)

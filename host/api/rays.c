@@ -56,7 +56,7 @@ static bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t
 {
     const double farthest =
         precision == GLINT_DOUBLE || precision == GLINT_CERTIFIED ? DBL_MAX : (double)FLT_MAX;
-    *ray = (TraceRay){.tmax = farthest};
+    *ray = (TraceRay){.tmax = INFINITY};
     reals_read(ray->origin, 3, rays->real, rays->origins, 3 * index);
     reals_read(ray->direction, 3, rays->real, rays->directions, 3 * index);
     if (rays->tmin) reals_read(&ray->tmin, 1, rays->real, rays->tmin, index);

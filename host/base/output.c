@@ -9,6 +9,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -26,32 +27,44 @@ static struct {
     size_t count, capacity;
 } pending;
 
+static pthread_mutex_t pending_mutex = PTHREAD_MUTEX_INITIALIZER; // of `pending`, which threads share
+
 static void pending_remove_all(void)
 {
+    pthread_mutex_lock(&pending_mutex);
     for (size_t i = 0; i < pending.count; i++)
         unlinkat(pending.items[i].folder, pending.items[i].name, 0);
     free(pending.items);
+    pending.items = NULL;
+    pending.count = pending.capacity = 0;
+    pthread_mutex_unlock(&pending_mutex);
 }
 
 // Registers a temporary before it has its name, so that nothing can fail afterwards.
 static void pending_prepare(void)
 {
     static bool is_registered;
+    pthread_mutex_lock(&pending_mutex);
     if (!is_registered && atexit(pending_remove_all) != 0) fault("atexit failed");
     is_registered = true;
     array_reserve(pending, 1);
+    pthread_mutex_unlock(&pending_mutex);
 }
 
 static void pending_add(int folder, const char *name)
 {
+    pthread_mutex_lock(&pending_mutex);
     array_push(pending, ((Pending){folder, name}));
+    pthread_mutex_unlock(&pending_mutex);
 }
 
 static void pending_drop(const char *name)
 {
+    pthread_mutex_lock(&pending_mutex);
     for (size_t i = 0; i < pending.count; i++) {
         if (pending.items[i].name == name) pending.items[i--] = pending.items[--pending.count];
     }
+    pthread_mutex_unlock(&pending_mutex);
 }
 
 static bool output_failed(OutputFile *output, const char *doing, MessageList *messages)

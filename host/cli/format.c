@@ -192,7 +192,11 @@ static const char *xml_replace(char character)
 
 static const char *markdown_replace(char character)
 {
-    return character == '|' ? "\\|" : character == '\n' ? " " : NULL;
+    return character == '|'                 ? "\\|"
+           : character == '\\'              ? "\\\\"
+           : character == '<'               ? "&lt;"
+           : (unsigned char)character < ' ' ? " "
+                                            : NULL;
 }
 
 static const char *csv_replace(char character)

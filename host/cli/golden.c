@@ -47,6 +47,7 @@ typedef struct {
 typedef struct {
     Golden *items;
     size_t count, capacity;
+    Text comments; // the user's
 } GoldenList;
 
 typedef struct {
@@ -54,7 +55,7 @@ typedef struct {
     ReportOptions report;
     const char *file;
     uint32_t width, height, samples, bounces;
-    bool writes;
+    bool writes, has_size; // or samples, or bounces
 } GoldenOptions;
 
 // The comparison of a scene. `first` is the first layer that differs, or HASHED_COUNT. The rectangle contains
@@ -114,6 +115,7 @@ static void golden_list_free(GoldenList *list)
     for (size_t i = 0; i < list->count; i++)
         free(list->items[i].scene);
     free(list->items);
+    text_free(&list->comments);
     *list = (GoldenList){0};
 }
 
@@ -205,9 +207,16 @@ static bool golden_list_read(GoldenList *list, const char *path, MessageList *me
         end = newline ? (size_t)(newline - text.items) : text.count;
         char *line = text_format("%.*s", (int)(end - start), text.items + start);
         Golden golden = {0};
-        if (golden_read(&golden, line)) {
+        if (end > start && text.items[end - 1] == '\r') line[end - start - 1] = '\0';
+        if (golden_read(&golden, line) && golden_find(list, golden.scene)) {
+            message_add_at(messages, MESSAGE_ERROR, &source, start, "a second line for \"%s\"", golden.scene);
+            is_sound = false;
+            free(golden.scene);
+        } else if (golden.scene) {
             array_push(*list, golden);
-        } else if (*line != '#' && *line != '\0') {
+        } else if (*line == '#') {
+            if (!strstr(file_head, line)) text_appendf(&list->comments, "%s\n", line);
+        } else if (*line != '\0') {
             message_add_at(messages, MESSAGE_ERROR, &source, start, "expected a line of glint golden write");
             is_sound = false;
         }
@@ -257,8 +266,9 @@ static void tiles_hash(const Film *film, uint16_t tiles[TILES])
 static char *crop_write(const Film *film, const Finding *finding)
 {
     const uint32_t width = finding->right - finding->left, height = finding->bottom - finding->top;
-    const char *slash = strrchr(finding->scene, '/');
-    char *path = text_format("%s-golden.png", slash ? slash + 1 : finding->scene);
+    char *path = text_format("%s-golden.png", finding->scene + strspn(finding->scene, "./"));
+    for (char *at = path; *at; at++)
+        if (*at == '/') *at = '-'; // scenes of one name lie in several folders
     float *pixels = memory_allocate(memory_product(3 * (size_t)width, height), sizeof *pixels);
     for (size_t i = 0; i < 3 * (size_t)width * height; i++) {
         const size_t y = finding->top + i / (3 * (size_t)width), in_row = i % (3 * (size_t)width);
@@ -380,7 +390,7 @@ static void finding_print(const Finding *finding)
         return;
     }
     printf("%s: different, first in %s", finding->scene, hashed[finding->first].name);
-    if (finding->scene_differs) fputs("; the scene is another one", stdout);
+    if (finding->scene_differs) fputs("; the scene has changed", stdout);
     if (finding->tile_count > 0)
         printf("; %zu of %d tiles, within pixels %u to %u, %u to %u", finding->tile_count, TILES,
                finding->left, finding->right - 1, finding->top, finding->bottom - 1);
@@ -390,7 +400,7 @@ static void finding_print(const Finding *finding)
 static bool golden_list_write(const GoldenList *list, const char *path)
 {
     Text text = {0};
-    text_appendf(&text, "%s", file_head);
+    text_appendf(&text, "%s%s", file_head, text_c(&list->comments));
     for (size_t i = 0; i < list->count; i++)
         golden_append(&text, &list->items[i]);
     MessageList messages = {0};
@@ -443,6 +453,10 @@ static int scenes_check(const GoldenList *list, GoldenOptions *options, char **s
                         Compute *compute)
 {
     const size_t checked = count > 0 ? count : list->count;
+    if (checked == 0) {
+        fprintf(stderr, "glint golden: '%s' has no lines\n", options->file);
+        return EXIT_USER;
+    }
     Finding *findings = memory_allocate_zeroed(checked + 1, sizeof *findings);
     int status = EXIT_DONE, differing = 0;
     for (size_t i = 0; i < checked && status == EXIT_DONE; i++) {
@@ -483,6 +497,7 @@ static int options_read(GoldenOptions *options, int argument_count, char **argum
         else if (!option_report(&options->report, option, optarg, &valid))
             option_common(&options->common, option, optarg, &valid);
         if (!valid) return EXIT_USER;
+        options->has_size = options->has_size || (option >= OPTION_SIZE && option <= OPTION_BOUNCES);
     }
     const char *verb = optind < argument_count ? arguments[optind++] : "";
     options->writes = strcmp(verb, "write") == 0;
@@ -492,6 +507,12 @@ static int options_read(GoldenOptions *options, int argument_count, char **argum
         return option_usage_fault(
             "golden", "images are rendered at strict: at other precisions bits differ between devices");
     if (options->writes && optind == argument_count) return option_usage_fault("golden", "no scene given");
+    for (int i = optind; i < argument_count; i++)
+        if (strpbrk(arguments[i], "\r\n"))
+            return option_usage_fault("golden", "a scene's name has a line break");
+    if (!options->writes && options->has_size)
+        return option_usage_fault(
+            "golden", "--size, --samples and --bounces are for write; check takes those of the lines");
     if (options->writes && options->report.format != FORMAT_TEXT)
         return option_usage_fault("golden", "--format is for check");
     return options->writes || report_options_check(&options->report, &golden_table) ? OPTIONS_READ

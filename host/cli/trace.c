@@ -79,7 +79,7 @@ static int line_numbers(Report *report, size_t start, size_t end, double numbers
 
 static double farthest_of(Precision precision)
 {
-    return precision == PRECISION_DOUBLE ? DBL_MAX : (double)FLT_MAX;
+    return precision < PRECISION_DOUBLE ? (double)FLT_MAX : DBL_MAX;
 }
 
 // Returns whether the numbers of a line are a ray at the precision, and reports an error if not.
@@ -89,7 +89,7 @@ static bool ray_check(Report *report, size_t line, const double numbers[8], int 
     for (int i = 0; i < 7; i++)
         beyond |= fabs(numbers[i]) > farthest_of(precision);
     for (int i = 3; i < 6 && !beyond; i++)
-        has_direction |= precision == PRECISION_DOUBLE ? numbers[i] != 0 : (float)numbers[i] != 0;
+        has_direction |= precision < PRECISION_DOUBLE ? (float)numbers[i] != 0 : numbers[i] != 0;
     if (count != 6 && count != 8)
         return report_error(report, line, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d",
                             count);
@@ -103,10 +103,9 @@ static bool ray_check(Report *report, size_t line, const double numbers[8], int 
     return true;
 }
 
-static TraceRay ray_make(const double n[8], int count, double farthest)
+static TraceRay ray_make(const double n[8], int count)
 {
-    return (TraceRay){
-        {n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? fmin(n[7], farthest) : farthest};
+    return (TraceRay){{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? n[7] : (double)INFINITY};
 }
 
 static bool rays_read(RayList *rays, const Source *source, const CommonOptions *common, MessageList *messages)
@@ -118,7 +117,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
         double numbers[8] = {0};
         int count = line_numbers(&report, start, end, numbers);
         if (count > 0 && ray_check(&report, start, numbers, count, common->precision))
-            array_push(*rays, ray_make(numbers, count, farthest_of(common->precision)));
+            array_push(*rays, ray_make(numbers, count));
         start = end + 1;
     }
     return report_close(&report);

@@ -81,6 +81,11 @@ static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t 
             direction[1],     direction[2],     rays[i].tmin / unit, fmin(tmax / unit, farthest)};
         for (size_t k = 0; k < RAY_SCALARS; k++)
             scalar_set(scalars, i * RAY_SCALARS + k, is_double, ray[k]);
+        // a coordinate that underflows must not seem to be exactly 0: the kernel flags origins below its
+        // range
+        for (size_t axis = 0; axis < 3 && renderer_certifies(renderer); axis++)
+            if (origin[axis] != 0 && scalar_at(scalars, i * RAY_SCALARS + axis, is_double) == 0)
+                scalar_set(scalars, i * RAY_SCALARS + axis, is_double, is_double ? DBL_MIN : (double)FLT_MIN);
     }
     return scalars;
 }
@@ -182,10 +187,11 @@ static void ends_apply(const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
     for (size_t i = 0; i < ray_count; i++) {
         TraceHit *hit = &hits[i];
-        if (hit->certainty == TRACE_UNCERTAIN || hit->object == UINT32_MAX || hit->high < rays[i].tmax)
-            continue;
-        if (hit->low < rays[i].tmax) hit->certainty = TRACE_UNCERTAIN;
-        if (!(hit->t < rays[i].tmax)) hit->object = UINT32_MAX;
+        // trace_ray_scaled may have rounded the end
+        const double end = rays[i].tmax, before = nextafter(end, -INFINITY), after = nextafter(end, INFINITY);
+        if (hit->certainty == TRACE_UNCERTAIN || hit->object == UINT32_MAX || hit->high < before) continue;
+        if (hit->low <= after) hit->certainty = TRACE_UNCERTAIN;
+        if (!(hit->t < end)) hit->object = UINT32_MAX;
     }
 }
 
@@ -220,9 +226,16 @@ TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent)
     return ray;
 }
 
+// Returns a bound times 2^exponent, rounded towards `outward` where that is not exact.
+static double bound_scaled(double bound, int exponent, double outward)
+{
+    const double scaled = ldexp(bound, exponent);
+    return ldexp(scaled, -exponent) == bound ? scaled : nextafter(scaled, outward);
+}
+
 void trace_hit_unscale(TraceHit *hit, int exponent)
 {
     hit->t = ldexp(hit->t, -exponent);
-    hit->low = ldexp(hit->low, -exponent);
-    hit->high = ldexp(hit->high, -exponent);
+    hit->low = bound_scaled(hit->low, -exponent, -INFINITY);
+    hit->high = bound_scaled(hit->high, -exponent, INFINITY);
 }

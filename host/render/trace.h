@@ -34,8 +34,8 @@ typedef struct {
 
 // Returns the ray with its direction divided by 2^*exponent, and its tmin and tmax multiplied by that, so
 // that the direction's largest component lies in 0.5 to 1 and its squared length neither underflows nor
-// overflows. The scaling is exact. `farthest` limits tmax. A t of the scaled ray is ldexp(t, *exponent) for
-// the original t.
+// overflows. The scaling is exact, except of a tmin or tmax that underflows. `farthest` limits tmax. A t of
+// the scaled ray is ldexp(t, *exponent) for the original t.
 TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent);
 // Scales the hit's numbers back to lengths of the original direction.
 void trace_hit_unscale(TraceHit *hit, int exponent);

@@ -23,8 +23,8 @@ import numpy as np
 
 from . import _library as _c
 
-__all__ = ["Device", "DeviceError", "GlintWarning", "Hits", "MISS", "Scene", "SceneError", "devices", "load", "load_mesh",
-           "version"]
+__all__ = ["Device", "DeviceError", "GlintWarning", "Hits", "LAYERS", "MISS", "PRECISIONS", "Scene", "SceneError", "Stopped", "devices",
+           "load", "load_mesh", "version"]
 
 MISS = 0xFFFFFFFF  #: the object of a miss
 PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
@@ -49,7 +49,7 @@ class GlintWarning(UserWarning):
     """What glint warns of."""
 
 
-def _check(status: int, messages: ctypes.c_char_p) -> None:
+def _check(status: int, messages: ctypes.c_void_p) -> None:
     """Raises what a call's status and messages say."""
     text = ctypes.string_at(messages).decode("utf-8", "replace").rstrip() if messages else ""
     if messages:
@@ -101,17 +101,27 @@ class _OpenDevice:
     _lock = threading.Lock()
 
     def __init__(self, selector: Optional[str]):
-        self.handle, messages = ctypes.c_void_p(), ctypes.c_void_p()
+        self.handle, self.messages = ctypes.c_void_p(), ctypes.c_void_p()
         encoded = None if selector is None else selector.encode()
-        _check(_c.library.glint_device_open(encoded, ctypes.byref(self.handle), ctypes.byref(messages)), messages)
+        self.status = _c.library.glint_device_open(encoded, ctypes.byref(self.handle), ctypes.byref(self.messages))
 
     @classmethod
     def get(cls, selector: Union[None, int, str]) -> "_OpenDevice":
         key = None if selector is None else str(selector)
         with cls._lock:
-            if key not in cls._opened:
-                cls._opened[key] = cls(key)
-            return cls._opened[key]
+            if key in cls._opened:
+                return cls._opened[key]
+            opened = cls(key)
+            if opened.handle:
+                cls._opened[key] = opened
+        _check(opened.status, opened.messages)
+        return opened
+
+    @classmethod
+    def forget(cls, selector: Union[None, int, str]) -> None:
+        """Opens the device again at its next use, after it has failed."""
+        with cls._lock:
+            cls._opened.pop(None if selector is None else str(selector), None)
 
 
 class Hits(NamedTuple):
@@ -159,6 +169,13 @@ def _pointer(array: Optional[np.ndarray]) -> Optional[int]:
     return None if array is None else array.ctypes.data
 
 
+def _count(name: str, value: int) -> int:
+    """A number that fits 32 bits, to which ctypes would cut a larger one."""
+    if not 0 <= value < 1 << 32:
+        raise ValueError(f"{name}: expected 0 to {(1 << 32) - 1}, not {value}")
+    return value
+
+
 def _precision(name: str) -> int:
     if name not in PRECISIONS:
         raise ValueError(f"precision: expected one of {', '.join(PRECISIONS)}, not {name!r}")
@@ -169,7 +186,7 @@ class Scene:
     """A scene, from a dict or text in glint's YAML format; glint.load and glint.load_mesh make others."""
 
     def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml"):
-        text = description if isinstance(description, str) else json.dumps(description)
+        text = description if isinstance(description, str) else json.dumps(description, default=lambda array: array.tolist())
         encoded = text.encode()
         self._take(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), scene, messages))
 
@@ -177,8 +194,12 @@ class Scene:
         self._tracers: dict[tuple[Optional[str], str, int], ctypes.c_void_p] = {}
         self._lock = threading.Lock()
         self._handle, messages = ctypes.c_void_p(), ctypes.c_void_p()
+        # not at exit, while other threads may still trace
+        weakref.finalize(self, _scene_free, self._handle, self._tracers).atexit = False
         _check(make(ctypes.byref(self._handle), ctypes.byref(messages)), messages)
-        weakref.finalize(self, _scene_free, self._handle, self._tracers)
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a Scene cannot be copied or pickled")
 
     @property
     def object_count(self) -> int:
@@ -203,16 +224,27 @@ class Scene:
         precision: single, strict, double or certified. device: as `glint render --device`. lanes: rays per work-item,
         0: as suits the device. progress: called with the fraction that is done; Stopped is raised where it returns True.
         """
+        if isinstance(layers, str):
+            raise ValueError("layers: expected a sequence of names, not one text")
         unknown = set(layers) - set(LAYERS)
         if unknown:
             raise ValueError(f"layers: expected some of {', '.join(LAYERS)}, not {', '.join(sorted(unknown))}")
-        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), width, height, samples, bounces, _precision(precision), lanes)
-        if not (width and height):
+        counts = (_count(name, value) for name, value in (("width", width), ("height", height), ("samples", samples), ("bounces", bounces)))
+        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), *counts, _precision(precision), _count("lanes", lanes))
+        if not width and not height:
             sides = ctypes.c_uint32(), ctypes.c_uint32()
             _c.library.glint_scene_image_size(self._handle, *map(ctypes.byref, sides))
             settings.width, settings.height = width, height = sides[0].value, sides[1].value
+        raised: list[BaseException] = []
+
+        def report(_: Any, fraction: float) -> int:
+            try:
+                return 1 if progress(fraction) else 0
+            except BaseException as exception:  # ctypes would print and drop it
+                raised.append(exception)
+                return 1
         if progress:
-            settings.progress = _c.Progress(lambda _, fraction: 1 if progress(fraction) else 0)
+            settings.progress = _c.Progress(report)
         arrays = {}
         for name in {"color", *layers}:
             values, kind = LAYERS[name]
@@ -222,6 +254,11 @@ class Scene:
         messages = ctypes.c_void_p()
         status = _c.library.glint_render(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings), ctypes.byref(image),
                                          ctypes.byref(messages))
+        if raised:
+            _c.library.glint_text_free(messages)
+            raise raised[0]
+        if status == 2:
+            _OpenDevice.forget(device)
         _check(status, messages)
         return {name: arrays[name] for name in layers}
 
@@ -229,10 +266,11 @@ class Scene:
               device: Union[None, int, str] = None, lanes: int = 0) -> Hits:
         """Finds the nearest hit of each ray strictly between tmin and tmax, in lengths of the direction.
 
-        origins, directions: (n, 3); directions may have any length but 0. Arrays of float32 are taken as they are, others
-        as float64. At "certified" rays start at their origins. tmin, tmax: one number or n.
+        origins, directions: (n, 3); directions may have any length but 0. Where all arrays are of float32 they
+        are taken as they are, else as float64. At "certified" rays start at their origins. tmin, tmax: one number or n.
         """
-        is_float = all(getattr(array, "dtype", None) == np.float32 for array in (origins, directions))
+        given = [array for array in (origins, directions, tmin, tmax) if array is not None]
+        is_float = all(getattr(array, "dtype", None) == np.float32 for array in given)
         dtype = np.float32 if is_float else np.float64
         origins = _reals(origins, 3, None, "origins", dtype)
         count = len(origins)
@@ -244,21 +282,30 @@ class Scene:
                     np.empty(count, np.uint8))
         found = _c.Hits(ctypes.sizeof(_c.Hits), *map(_pointer, hits))
         messages = ctypes.c_void_p()
-        tracer = self._tracer(device, precision, lanes)
-        _check(_c.library.glint_trace(tracer, ctypes.byref(rays), ctypes.byref(found), ctypes.byref(messages)), messages)
+        key, tracer = self._tracer(device, precision, _count("lanes", lanes))
+        status = _c.library.glint_trace(tracer, ctypes.byref(rays), ctypes.byref(found), ctypes.byref(messages))
+        if status == 2:
+            _OpenDevice.forget(device)
+            with self._lock:
+                self._tracers.pop(key, None)
+        _check(status, messages)
         return hits
 
-    def _tracer(self, device: Union[None, int, str], precision: str, lanes: int) -> ctypes.c_void_p:
+    def _tracer(self, device: Union[None, int, str], precision: str, lanes: int) -> tuple[Any, ctypes.c_void_p]:
         key = None if device is None else str(device), precision, lanes
         with self._lock:
-            if key not in self._tracers:
-                settings = _c.TraceSettings(ctypes.sizeof(_c.TraceSettings), _precision(precision), lanes)
-                tracer, messages = ctypes.c_void_p(), ctypes.c_void_p()
-                status = _c.library.glint_tracer_open(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings),
-                                                      ctypes.byref(tracer), ctypes.byref(messages))
-                _check(status, messages)
+            if key in self._tracers:
+                return key, self._tracers[key]
+            settings = _c.TraceSettings(ctypes.sizeof(_c.TraceSettings), _precision(precision), lanes)
+            tracer, messages = ctypes.c_void_p(), ctypes.c_void_p()
+            status = _c.library.glint_tracer_open(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings),
+                                                  ctypes.byref(tracer), ctypes.byref(messages))
+            if tracer:
                 self._tracers[key] = tracer
-            return self._tracers[key]
+        if status == 2:
+            _OpenDevice.forget(device)
+        _check(status, messages)
+        return key, tracer
 
 
 def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) -> None:
@@ -282,8 +329,9 @@ def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
     indices = np.asarray(faces)
     if indices.ndim != 2 or indices.shape[1] != 3 or not np.issubdtype(indices.dtype, np.integer):
         raise ValueError(f"faces: expected integers of shape (m, 3), not {indices.dtype} of shape {indices.shape}")
-    if len(indices) and indices.min() < 0:
-        raise SceneError("faces: an index is negative")
+    if len(indices) and not 0 <= indices.min() <= indices.max() < len(points):
+        wrong = indices.min() if indices.min() < 0 else indices.max()
+        raise SceneError(f"faces: there is no vertex {wrong} of {len(points)}")
     triangles = np.ascontiguousarray(indices, np.uint32)
     mesh = _c.Mesh(ctypes.sizeof(_c.Mesh), 0 if points.dtype == np.float32 else 1, _pointer(points), _pointer(directions), len(points),
                    _pointer(triangles), len(triangles))
