@@ -258,7 +258,7 @@ class Mpi(TestCase):
         self.faults_build()
         for fault in FAULTY:
             with self.subTest(fault=fault):
-                self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: it sent what is not a band")
+                self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: it sent data that is not a band")
 
     def start(self, command, patience=1):
         """A job with a checkpoint, whose ranks write their errors to `errors`: an interrupted mpirun of Open MPI 5 prints none.
