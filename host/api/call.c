@@ -1,4 +1,4 @@
-// What begins and ends the calls of glint.h.
+// Begins and ends the calls of glint.h.
 #include "host/api/handles.h"
 #include <stdlib.h>
 #include <string.h>
@@ -26,14 +26,7 @@ GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus stat
         free(failure);
         status = GLINT_DEVICE_FAILED;
     }
-    char *text = NULL;
-    size_t size = 0;
-    FILE *stream = messages && list->count > 0 ? open_memstream(&text, &size) : NULL;
-    if (stream) {
-        message_list_print(list, stream);
-        fclose(stream);
-    }
-    if (messages) *messages = text;
+    if (messages) *messages = message_list_text(list);
     message_list_free(list);
     return status;
 }

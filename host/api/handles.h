@@ -1,4 +1,4 @@
-// What the handles of glint.h are, and what its functions share.
+// Defines the handles of glint.h and declares the functions that its implementation shares.
 #pragma once
 
 #include "host/api/glint.h"
@@ -20,21 +20,26 @@ struct GlintTracer {
     GlintDevice *device;
     Renderer *renderer;
     GlintPrecision precision;
-    size_t object_count;
 };
 
-// Copies a caller's struct, which may be of another version of the interface. False with a message: its size
-// cannot be, or it has members that are not known and not 0.
+// Copies a caller's struct, which may be of another version of the interface. Returns false with a message if
+// its size is invalid or if a member that this version does not know is not 0.
 bool struct_read(void *own, size_t own_size, const void *given, MessageList *messages);
 
-// Ends a call: hands its messages over, with the failure of the Compute (NULL: none is used) if it has one.
-// Returns `status`, or that of the failure.
+// Ends a call: passes its messages to the caller, with the failure of the Compute if it has one; the Compute
+// may be NULL. Returns `status`, or the status of the failure.
 GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages);
 
-// False with a message: there is no such precision.
+// Returns a number of a caller's array.
+static inline double real_at(GlintReal real, const void *reals, size_t index)
+{
+    return real == GLINT_FLOAT32 ? (double)((const float *)reals)[index] : ((const double *)reals)[index];
+}
+
+// Converts a precision. Returns false with a message if it is invalid.
 bool precision_read(Precision *precision, GlintPrecision given, MessageList *messages);
 
-// Opens a renderer, with the reference device that `certified` may need. NULL with a message, or if the
-// device failed.
+// Opens a renderer, with the reference device that `certified` may need. Returns NULL with a message, or
+// without one if the device failed.
 Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
                           MessageList *messages);

@@ -26,7 +26,7 @@ GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
         call_end(&list, &device->compute, renderer ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     if (status == GLINT_DONE) {
         *tracer = memory_allocate_zeroed(1, sizeof **tracer);
-        **tracer = (GlintTracer){device, renderer, given.precision, scene_primitive_count(&scene->scene)};
+        **tracer = (GlintTracer){device, renderer, given.precision};
     } else {
         renderer_close(renderer);
     }
@@ -46,8 +46,7 @@ void glint_tracer_close(GlintTracer *tracer)
 static void reals_read(double *values, size_t count, GlintReal real, const void *reals, size_t first)
 {
     for (size_t i = 0; i < count; i++)
-        values[i] = real == GLINT_FLOAT32 ? (double)((const float *)reals)[first + i]
-                                          : ((const double *)reals)[first + i];
+        values[i] = real_at(real, reals, first + i);
 }
 
 // Reads a ray and scales it. False with a message.

@@ -38,12 +38,7 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
     return scene_give(scene, &read, is_read, &list, messages);
 }
 
-static double real_at(GlintReal real, const void *reals, size_t index)
-{
-    return real == GLINT_FLOAT32 ? (double)((const float *)reals)[index] : ((const double *)reals)[index];
-}
-
-// Copies vectors; false with a message: one is not finite, or too far away.
+// Copies vectors. Returns false with a message if one is not finite or is too far away.
 static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, size_t count,
                          MessageList *messages)
 {

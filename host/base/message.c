@@ -157,6 +157,17 @@ void message_list_print(const MessageList *list, FILE *stream)
         message_print(&list->items[i], stream);
 }
 
+char *message_list_text(const MessageList *list)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *stream = list->count > 0 ? open_memstream(&text, &size) : NULL;
+    if (!stream) return NULL;
+    message_list_print(list, stream);
+    fclose(stream);
+    return text;
+}
+
 void message_list_free(MessageList *list)
 {
     for (size_t i = 0; i < list->count; i++)

@@ -44,6 +44,8 @@ size_t message_count(const MessageList *list, MessageSeverity severity);
 
 // Prints `file:line:column: error: text`, then the line and a caret where they are known.
 void message_list_print(const MessageList *list, FILE *stream);
+// Returns what message_list_print prints, or NULL if the list is empty. The caller frees it.
+char *message_list_text(const MessageList *list);
 void message_free(Message *message);
 void message_list_free(MessageList *list);
 // Appends all messages of `from`, which is then empty.

@@ -18,12 +18,8 @@ static const char *page_file(const char *name, size_t length)
 // comment.
 static void json_embed(Text *page, Json *json)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *stream = open_memstream(&text, &size);
-    if (stream) json_print(json, stream);
-    if (!stream || fclose(stream) != 0) fault("out of memory: the HTML report");
-    for (const char *from = text; *from;) {
+    Text text = json_close(json);
+    for (const char *from = text_c(&text); *from;) {
         size_t safe = strcspn(from, "<");
         text_append(page, from, safe);
         from += safe;
@@ -32,7 +28,7 @@ static void json_embed(Text *page, Json *json)
             from++;
         }
     }
-    free(text);
+    text_free(&text);
 }
 
 void page_append(Text *page, Json *report, Json *extras)

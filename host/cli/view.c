@@ -113,7 +113,6 @@ static int scene_view(ViewOptions *options, const Device *device)
                    .scene_path = options->scene,
                    .scene_options = {.lenient = options->common.lenient},
                    .settings = settings_whole(&options->common, options->width, options->height),
-                   .choose_size = scene_choose_image_size,
                    .save = image_save,
                    .save_context = options},
         .size = {options->width, options->height},

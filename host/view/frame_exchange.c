@@ -27,18 +27,9 @@ void message_publish(FrameLoop *loop, char *message)
 
 void messages_publish(FrameLoop *loop, MessageList *messages)
 {
-    char *text = NULL;
-    size_t size;
-    FILE *stream = open_memstream(&text, &size);
-    if (stream) {
-        message_list_print(messages, stream);
-        fclose(stream);
-    }
+    char *text = message_list_text(messages);
     message_list_free(messages);
-    if (text && size > 0)
-        message_publish(loop, text);
-    else
-        free(text);
+    if (text) message_publish(loop, text);
 }
 
 void frame_publish(FrameLoop *loop, uint32_t samples)
@@ -66,7 +57,7 @@ void scene_publish(FrameLoop *loop)
 {
     const Camera *camera = &loop->scene.camera;
     ImageSize size = {0};
-    loop->options.choose_size(&loop->scene, &size.width, &size.height);
+    scene_choose_image_size(&loop->scene, &size.width, &size.height);
     pthread_mutex_lock(&loop->mutex);
     loop->has_camera |= loop->scene_state == SCENE_LOADING || !cameras_equal(&loop->file_camera, camera);
     loop->file_camera = *camera;

@@ -14,8 +14,6 @@ typedef struct {
     const char *scene_path;
     SceneOptions scene_options;
     RenderSettings settings; // all but the size
-    // Sets a size whose `width` is 0 to that of the scene's image.
-    void (*choose_size)(const Scene *scene, uint32_t *width, uint32_t *height);
     // Called on the loop's thread when there is something to take.
     void (*notify)(void *context);
     void *notify_context;
