@@ -1,13 +1,15 @@
 // libglint: renders scenes and traces rays on OpenCL devices.
 //
-// Functions that can fail return a GlintStatus. Where they take `messages` (NULL: not wanted), they set
-// *messages to their warnings and errors, one or more lines each, which glint_text_free frees, or to NULL if
-// there are none.
+// Functions that can fail return a GlintStatus. Functions with a `messages` parameter, which may be NULL, set
+// *messages to their warnings and errors, one or more lines each, or to NULL if there are none. The caller
+// frees it with glint_text_free.
 //
-// A struct begins with its size, which the caller sets to sizeof, so that later versions of the library may
-// add members: those beyond the caller's size count as 0. There is no global state. Handles of one kind do
-// not depend on each other; a device serves one call at a time, and lets those of other threads wait. A scene
-// is only read, and may be used by several threads at once. Lack of memory ends the process.
+// Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
+// can add members. Members beyond the caller's size are read as 0.
+//
+// Handles are independent of each other. A device serves one call at a time, and calls from other threads
+// wait. Calls only read a scene, so several threads may use it at once. Listing devices sets the environment
+// variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If memory runs out, the process exits.
 #ifndef GLINT_H
 #define GLINT_H
 
@@ -22,21 +24,21 @@ extern "C" {
 #pragma GCC visibility push(default)
 #endif
 
-// Rises with each version of the interface that is not compatible with the one before.
+// Incremented with each incompatible version of the interface.
 #define GLINT_API_VERSION 1
 
 typedef enum {
     GLINT_DONE = 0,
-    GLINT_WRONG_INPUT = 1,   // a scene, setting or name of a device is wrong: see the messages
+    GLINT_WRONG_INPUT = 1,   // a scene, a setting or a device's name is wrong, as the messages say
     GLINT_DEVICE_FAILED = 2, // an OpenCL call failed: close the device
-    GLINT_STOPPED = 3        // the caller's progress function ended it
+    GLINT_STOPPED = 3        // the caller's progress function stopped the render
 } GlintStatus;
 
 typedef enum {
     GLINT_SINGLE,   // float
     GLINT_STRICT,   // float, with the same bits on every device
     GLINT_DOUBLE,   // double
-    GLINT_CERTIFIED // float with error bounds, then double where these leave a decision open
+    GLINT_CERTIFIED // float with error bounds, then double where those leave a decision uncertain
 } GlintPrecision;
 
 typedef enum { GLINT_FLOAT32, GLINT_FLOAT64 } GlintReal;
@@ -55,31 +57,32 @@ typedef struct {
     size_t size;
     uint32_t index; // as a selector of glint_device_open
     uint32_t compute_units;
-    uint64_t memory_bytes; // 0: unknown
+    uint64_t memory_bytes; // 0 if unknown
     int is_gpu, is_cpu;
     int has_double;
-    int is_usable; // glint can render with it
+    int is_usable; // whether glint can render with it
     char name[128], platform[128], driver[64];
 } GlintDeviceInfo;
 
 // Lists the devices of all platforms. Sets *count to their number, which may exceed `capacity`, the number of
-// elements of `infos`; each of these has its size set. `infos` may be NULL if capacity is 0.
+// elements of `infos`. infos[0].size is the distance between elements. `infos` may be NULL if capacity is 0.
 GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *count, char **messages);
 
 // Opens the device that `selector` names: an index, a part of its name, its place on the PCI bus, its UUID,
-// "cpu" or "gpu"; NULL: the one that the environment variable GLINT_DEVICE names, else a GPU, else a CPU.
-// *device is NULL on failure.
+// "cpu" or "gpu". NULL selects the one that the environment variable GLINT_DEVICE names, otherwise a GPU if
+// there is one, otherwise a CPU. Sets *device to NULL on failure.
 GlintStatus glint_device_open(const char *selector, GlintDevice **device, char **messages);
-void glint_device_close(GlintDevice *device); // its tracers are closed before; accepts NULL
+void glint_device_close(GlintDevice *device); // close its tracers first; accepts NULL
+// Fills *info, whose size the caller has set.
 void glint_device_info(const GlintDevice *device, GlintDeviceInfo *info);
 
 // Scenes
 
-// Reads a scene, mesh or glTF file. *scene is NULL on failure. Formats that assimp reads, such as FBX, need
-// the program glint in PATH.
+// Reads a scene, mesh or glTF file. Sets *scene to NULL on failure. Formats that assimp reads, such as FBX,
+// need the program glint in PATH.
 GlintStatus glint_scene_load(const char *path, GlintScene **scene, char **messages);
-// Reads a scene in glint's YAML format from memory. `name` heads messages, and files that the scene names are
-// relative to its folder.
+// Reads a scene in glint's YAML format from memory. Messages begin with `name`, which must not be NULL, and
+// files that the scene names are relative to its folder.
 GlintStatus glint_scene_parse(const char *text, size_t length, const char *name, GlintScene **scene,
                               char **messages);
 
@@ -88,9 +91,9 @@ typedef struct {
     size_t size;
     GlintReal real;            // of vertices and normals
     const void *vertices;      // 3 per vertex
-    const void *normals;       // 3 per vertex, for smooth shading, zero: flat there; NULL: flat
+    const void *normals;       // 3 per vertex, for smooth shading, or NULL; a zero normal is flat there
     size_t vertex_count;       // at most 4294967295
-    const uint32_t *triangles; // 3 indices of vertices each
+    const uint32_t *triangles; // 3 vertex indices each
     size_t triangle_count;     // 1 to 16777216
 } GlintMesh;
 
@@ -98,31 +101,33 @@ typedef struct {
 GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char **messages);
 void glint_scene_free(GlintScene *scene); // accepts NULL
 
-// Objects, with each triangle of a mesh as one.
+// Returns the number of objects; each triangle of a mesh counts as one.
 size_t glint_scene_object_count(const GlintScene *scene);
 size_t glint_scene_light_count(const GlintScene *scene);
-// The size that the scene's file asks for, else one of 1280 pixels' width with its camera's aspect ratio.
+// Sets the size that the scene's file asks for, otherwise one that is 1280 pixels wide and has the camera's
+// aspect ratio.
 void glint_scene_image_size(const GlintScene *scene, uint32_t *width, uint32_t *height);
 
 // Images
 
-// Called by glint_render now and then with the fraction that is done; not 0 ends the render.
+// glint_render calls this repeatedly, from the thread that renders, with the fraction that is done. A nonzero
+// result stops the render.
 typedef int (*GlintProgress)(void *context, double fraction_done);
 
 typedef struct {
     size_t size;
-    uint32_t width, height; // 0: glint_scene_image_size
-    uint32_t samples;       // per pixel; 0: 1
-    uint32_t bounces;       // of a ray, at most
+    uint32_t width, height; // both 0 select glint_scene_image_size
+    uint32_t samples;       // per pixel; 0 means 1
+    uint32_t bounces;       // at most this many per ray
     GlintPrecision precision;
-    uint32_t lanes;         // rays per work-item: 1, 4, 8 or 16; 0: as suits the device
-    GlintProgress progress; // NULL: none
-    void *context;          // of progress
+    uint32_t lanes;         // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
+    GlintProgress progress; // or NULL
+    void *context;          // passed to progress
 } GlintRenderSettings;
 
-// Arrays of height x width pixels from the top left, which the caller owns; NULL: not wanted. Colors are
-// linear light. AOVs are of the ray through a pixel's center; where it misses, t is infinite, normal and
-// position are 0, and object is 4294967295.
+// Arrays of height x width pixels from the top left, which the caller owns, or NULL for layers that are not
+// wanted. Colors are linear light. The other layers describe the ray through a pixel's center. Where it
+// misses, t is infinite, normal and position are 0, and object is 4294967295.
 typedef struct {
     size_t size;
     double *color;    // 3 per pixel; required
@@ -131,7 +136,7 @@ typedef struct {
     double *position; // 3 per pixel: the hit point, in the scene's coordinates
     uint32_t *object;
     uint32_t *shadow; // glint_scene_light_count per pixel: 1 where that light is occluded, 0 elsewhere
-    uint32_t *doubt;  // at GLINT_CERTIFIED: 1 where re-rendered in double, 2 where uncertain, else 0
+    uint32_t *doubt;  // at GLINT_CERTIFIED 1 where re-rendered in double, 2 where uncertified, otherwise 0
 } GlintImage;
 
 // Renders the scene. A failure leaves the arrays undefined.
@@ -146,22 +151,23 @@ typedef struct {
     uint32_t lanes; // as in GlintRenderSettings
 } GlintTraceSettings;
 
-// Prepares a scene for many calls of glint_trace. The scene may be freed afterwards; the device must outlive
-// the tracer. *tracer is NULL on failure.
+// Prepares a scene for many calls of glint_trace. The scene may be freed afterwards, but the device must
+// outlive the tracer. Sets *tracer to NULL on failure.
 GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
                               const GlintTraceSettings *settings, GlintTracer **tracer, char **messages);
 void glint_tracer_close(GlintTracer *tracer); // accepts NULL
 
-// Rays in memory that the caller owns. Directions may have any length but 0. Hits lie strictly between tmin
-// and tmax, in lengths of the direction.
+// Rays in memory that the caller owns. Numbers are finite, except that tmax may be infinite, and directions
+// have any length but 0. At GLINT_SINGLE and GLINT_STRICT each number is rounded to float. Hits lie strictly
+// between tmin and tmax, in lengths of the direction.
 typedef struct {
     size_t size;
     size_t count;
     GlintReal real;         // of the arrays
     const void *origins;    // 3 per ray
     const void *directions; // 3 per ray
-    const void *tmin;       // 1 per ray; NULL: 0, as it must be at GLINT_CERTIFIED
-    const void *tmax;       // 1 per ray; NULL: no end
+    const void *tmin;       // 1 per ray; NULL means 0; at GLINT_CERTIFIED every tmin must be 0
+    const void *tmax;       // 1 per ray; NULL means no end
 } GlintRays;
 
 typedef enum {
@@ -170,20 +176,22 @@ typedef enum {
     GLINT_CERTAIN_IN_DOUBLE = 2, // by double with bounds
 } GlintCertainty;
 
-// Arrays of one value per ray, which the caller owns; NULL: not wanted. On a miss object is 4294967295, t,
-// low and high are infinite, and normal and position 0.
+// Arrays of one value per ray, which the caller owns, or NULL where not wanted. On a miss object is
+// 4294967295, t, low and high are infinite, and normal and position are 0.
 typedef struct {
     size_t size;
     uint32_t *object;
     double *t;          // of the nearest hit, in lengths of the direction
-    double *low, *high; // bounds of the exact t where certain, else t
+    double *low, *high; // bounds on the exact t where certain, otherwise t
     double *normal;     // 3 per ray: geometric, unit, facing the ray
     double *position;   // 3 per ray: the hit point, moved onto the surface
-    uint8_t *certainty; // GlintCertainty: what is certain has the object, or miss, that exact arithmetic on
-                        // the rays' and the scene's numbers finds; below GLINT_CERTIFIED nothing is
+    // GlintCertainty. Unless it is GLINT_UNCERTAIN, exact arithmetic on the rays' and the scene's numbers
+    // gives the same object or miss. It is always GLINT_UNCERTAIN below GLINT_CERTIFIED.
+    uint8_t *certainty;
 } GlintHits;
 
-// Finds the nearest hit of each ray.
+// Finds the nearest hit of each ray. A failure, such as a ray that is not as stated above, leaves the arrays
+// undefined.
 GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages);
 
 #ifdef __GNUC__
