@@ -1,4 +1,4 @@
-// Renders a scene to a PPM file and asks what lies in front of the camera's axis:
+// Renders a scene to a PPM file and traces one ray along z:
 //     cc example.c $(pkg-config --cflags --libs glint) -o example
 //     ./example scene.yaml image.ppm
 #include <glint.h>
@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// Prints a call's warnings and errors; ends the program where it failed.
+// Prints a call's warnings and errors; exits if it failed.
 static void check(GlintStatus status, char **messages)
 {
     if (*messages) fputs(*messages, stderr);
@@ -20,7 +20,7 @@ static int show_progress(void *context, double fraction_done)
     return 0;
 }
 
-// An sRGB value for a display.
+// Returns the sRGB value of a linear one.
 static unsigned char encode(double light)
 {
     const double clamped = fmin(fmax(light, 0), 1);

@@ -31,9 +31,9 @@ static void hit_check(const ReferenceScene *reference, const TraceRay *ray, cons
     }
     const double *o = ray->origin, *d = ray->direction;
     const ReferenceRay exact_ray = reference_ray((Vector3){o[0], o[1], o[2]}, (Vector3){d[0], d[1], d[2]});
-    ReferenceRay endless = exact_ray;
-    endless.tmax = isfinite(ray->tmax) ? (Quad)ray->tmax : (Quad)LDBL_MAX;
-    const ReferenceHit exact = reference_scene_hit(reference, &endless, UINT32_MAX);
+    ReferenceRay traced = exact_ray;
+    traced.tmax = isfinite(ray->tmax) ? (Quad)ray->tmax : (Quad)LDBL_MAX;
+    const ReferenceHit exact = reference_scene_hit(reference, &traced, UINT32_MAX);
     counts->certain += hit->certainty == TRACE_CERTAIN;
     counts->in_double += hit->certainty == TRACE_CERTAIN_IN_DOUBLE;
     counts->hits += exact.found;

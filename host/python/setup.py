@@ -1,4 +1,4 @@
-"""The package has a library for one kind of machine, and no extension module for one version of Python."""
+"""The wheel contains a library for one machine type and no extension module, so it fits every Python version."""
 from setuptools import setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.dist import Distribution

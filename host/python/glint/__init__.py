@@ -4,10 +4,10 @@
     scene = glint.load("scene.yaml")            # or a mesh or glTF file, glint.Scene(dict), glint.load_mesh(…)
     image = scene.render(640, 360)              # (360, 640, 3), linear light
     hits = scene.trace(origins, directions, precision="certified")
-    hits.object[hits.certain]                   # proven equal to exact arithmetic's
+    hits.object[hits.certain]                   # proven equal to the result of exact arithmetic
 
 Every call that computes releases Python's lock. A wrong scene or argument raises SceneError, a device that fails
-DeviceError; what glint warns of is a GlintWarning.
+DeviceError. Warnings have the category GlintWarning.
 """
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ class Stopped(Exception):
 
 
 class GlintWarning(UserWarning):
-    """What glint warns of."""
+    """A warning from glint."""
 
 
 def _check(status: int, messages: ctypes.c_void_p) -> None:
-    """Raises what a call's status and messages say."""
+    """Raises an exception or a warning for a call's status and messages."""
     text = ctypes.string_at(messages).decode("utf-8", "replace").rstrip() if messages else ""
     if messages:
         _c.library.glint_text_free(messages)
@@ -96,7 +96,7 @@ def devices() -> list[Device]:
 
 
 class _OpenDevice:
-    """A device that stays open for the process, since its compiler takes long to start."""
+    """A device that stays open until the process exits, because its compiler is slow to start."""
     _opened: dict[Optional[str], "_OpenDevice"] = {}
     _lock = threading.Lock()
 
@@ -127,10 +127,10 @@ class _OpenDevice:
 class Hits(NamedTuple):
     """The nearest hits of rays: arrays with one row per ray.
 
-    object: its number, MISS where nothing is hit; of glint.load_mesh, the face's.
-    t: in lengths of the direction, inf on a miss. low, high: bounds of the exact t where certain, else t.
+    object: the object's number, or MISS. For glint.load_mesh it is the index of the face.
+    t: in lengths of the direction, inf on a miss. low, high: bounds on the exact t where certain, otherwise t.
     normal: geometric, unit, facing the ray; position: the hit point. Both are 0 on a miss.
-    certainty: 0 uncertain, 1 certain by float, 2 certain by double; 0 below precision "certified".
+    certainty: 0 uncertain, 1 certain by float, 2 certain by double; always 0 below precision "certified".
     """
     object: np.ndarray
     t: np.ndarray
@@ -142,17 +142,17 @@ class Hits(NamedTuple):
 
     @property
     def hit(self) -> np.ndarray:
-        """Where something is hit."""
+        """True where a ray hits something."""
         return self.object != MISS
 
     @property
     def certain(self) -> np.ndarray:
-        """Where object, or miss, and the bounds of t are proven."""
+        """True where the object (or miss) and the bounds on t are proven."""
         return self.certainty != 0
 
 
 def _reals(array: Any, columns: int, count: Optional[int], name: str, dtype: Any) -> np.ndarray:
-    """A contiguous array of rows; a single row or number serves all rays."""
+    """Returns a contiguous array of rows. A single row or number is repeated for all rays."""
     array = np.asarray(array, dtype)
     shape = (count, columns) if columns > 1 else (count,)
     if count is not None:
@@ -170,7 +170,7 @@ def _pointer(array: Optional[np.ndarray]) -> Optional[int]:
 
 
 def _count(name: str, value: int) -> int:
-    """A number that fits 32 bits, to which ctypes would cut a larger one."""
+    """Returns the value if it fits 32 bits, to which ctypes would truncate it."""
     if not 0 <= value < 1 << 32:
         raise ValueError(f"{name}: expected 0 to {(1 << 32) - 1}, not {value}")
     return value
@@ -203,7 +203,7 @@ class Scene:
 
     @property
     def object_count(self) -> int:
-        """Objects, with each triangle of a mesh as one."""
+        """The number of objects; each triangle of a mesh counts as one."""
         return _c.library.glint_scene_object_count(self._handle)
 
     @property
@@ -220,9 +220,9 @@ class Scene:
                       progress: Optional[Callable[[float], Any]] = None) -> dict[str, np.ndarray]:
         """Renders the layers named, of glint.LAYERS, and returns their arrays, (height, width[, values]).
 
-        width, height: 0: those of the scene's file, else 1280 wide. samples: per pixel. bounces: of a ray, at most.
-        precision: single, strict, double or certified. device: as `glint render --device`. lanes: rays per work-item,
-        0: as suits the device. progress: called with the fraction that is done; Stopped is raised where it returns True.
+        width, height: both 0 select the size of the scene's file, else 1280 wide. bounces: at most this many per ray.
+        precision: single, strict, double or certified. device: as for `glint render --device`. lanes: rays per
+        work-item; 0 lets glint choose. progress: called with the fraction done; if it returns True, Stopped is raised.
         """
         if isinstance(layers, str):
             raise ValueError("layers: expected a sequence of names, not one text")
@@ -267,7 +267,7 @@ class Scene:
         """Finds the nearest hit of each ray strictly between tmin and tmax, in lengths of the direction.
 
         origins, directions: (n, 3); directions may have any length but 0. Where all arrays are of float32 they
-        are taken as they are, else as float64. At "certified" rays start at their origins. tmin, tmax: one number or n.
+        are taken as they are, else as float64. At "certified" tmin must be 0. tmin, tmax: one number or n.
         """
         given = [array for array in (origins, directions, tmin, tmax) if array is not None]
         is_float = all(getattr(array, "dtype", None) == np.float32 for array in given)
@@ -323,7 +323,7 @@ def load(path: Union[str, os.PathLike[str]]) -> Scene:
 
 def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
     """Makes a scene of triangles: vertices (n, 3), faces (m, 3), and normals (n, 3) for smooth shading. A face's index is
-    its object. A camera frames the mesh, and two lights shine on it."""
+    its object. A camera frames the mesh, and two lights illuminate it."""
     points = _reals(vertices, 3, None, "vertices", np.float32 if getattr(vertices, "dtype", None) == np.float32 else np.float64)
     directions = None if normals is None else _reals(normals, 3, len(points), "normals", points.dtype)
     indices = np.asarray(faces)

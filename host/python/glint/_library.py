@@ -47,9 +47,9 @@ _FUNCTIONS = {
 
 
 def _open():
-    """The library of GLINT_LIBRARY, else that of the wheel, else the system's."""
-    beside = pathlib.Path(__file__).with_name(NAME)
-    opened = ctypes.CDLL(os.environ.get("GLINT_LIBRARY") or (str(beside) if beside.exists() else NAME))
+    """Loads the library that GLINT_LIBRARY names, else the wheel's, else the system's."""
+    bundled = pathlib.Path(__file__).with_name(NAME)
+    opened = ctypes.CDLL(os.environ.get("GLINT_LIBRARY") or (str(bundled) if bundled.exists() else NAME))
     for name, (result, *arguments) in _FUNCTIONS.items():
         function = getattr(opened, name)
         function.restype, function.argtypes = result, arguments

@@ -11,8 +11,8 @@ from . import MISS, Hits, load_mesh
 class RayMeshIntersector:
     """Ray queries on a trimesh.Trimesh, with the methods of trimesh.ray's classes.
 
-    First and any hits are traced at `precision`; `certified` proves each, and `hits` tells which it cannot. Rays that
-    pass through the mesh are traced in double from hit to hit.
+    First and any hits are traced at `precision`. At `certified`, `hits` reports which of them are proven. Queries for all
+    hits are traced in double, from hit to hit, and are not certified. After the mesh has changed, make another intersector.
     """
 
     def __init__(self, mesh: Any, precision: str = "certified", device: Union[None, int, str] = None):
@@ -36,14 +36,14 @@ class RayMeshIntersector:
 
     def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True) \
             -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Returns the hit points (n, 3), and of each the index of its ray and of its triangle."""
+        """Returns the hit points (n, 3), the index of each point's ray, and the index of its triangle."""
         triangles, rays, locations = self.intersects_id(ray_origins, ray_directions, multiple_hits, return_locations=True)
         return locations, rays, triangles
 
     def intersects_id(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True, max_hits: int = 20,
                       return_locations: bool = False) -> tuple[np.ndarray, ...]:
         """Returns the triangles that rays hit and the indices of these rays, and with `return_locations` the hit points.
-        Hits of a ray are in order. Of triangles that a ray hits at the same t the first counts."""
+        A ray's hits are sorted by t. Of triangles hit at the same t only the first is returned."""
         origins, directions = (np.asarray(array, np.float64) for array in (ray_origins, ray_directions))
         alive, tmin = np.arange(len(origins)), np.zeros(len(origins))
         triangles, rays, locations = [], [], []
@@ -68,8 +68,8 @@ class RayMeshIntersector:
         return tuple(result)
 
     def contains_points(self, points: Any) -> np.ndarray:
-        """Returns whether points lie inside the mesh, if it is watertight: rays leave it through an odd number of
-        triangles. Ask for a direction that is not along edges of usual models."""
+        """Returns whether each point lies inside the mesh, which must be watertight: a ray from an inside point leaves through
+        an odd number of triangles. The direction avoids the edges of common models."""
         points = np.asarray(points, np.float64)
         directions = np.broadcast_to([0.4395064455, 0.617598629942, 0.652231566745], points.shape)
         _, rays = self.intersects_id(points, directions, max_hits=1 << 20)
