@@ -75,13 +75,15 @@ static inline real repaired_root(real a)
     return lanes_select(rises, up, lanes_select(falls, down, root)) * float_power_of_two(half_exponent);
 }
 
-// Returns a / b, correctly rounded at `strict` on every device, except for subnormal numbers.
+// Returns a / b, correctly rounded at `strict` on every device, except for subnormal numbers. The repaired
+// quotient decides whether a / b overflows, since an inexact device's may be infinite an ulp too early.
 static inline real real_divide(real a, real b)
 {
     real quotient = device_divide(a, b);
     if (!REPAIRS_DIVIDE) return quotient;
-    mask ordinary = float_is_normal(a) & float_is_normal(b) & float_is_normal(quotient);
-    return lanes_select(ordinary, repaired_quotient(a, b), quotient);
+    real repaired = repaired_quotient(a, b);
+    mask ordinary = float_is_normal(a) & float_is_normal(b) & (fabs(repaired) >= (real)(0x1p-126f));
+    return lanes_select(ordinary, repaired, quotient);
 }
 
 // Returns 1 / a within 2.5 ulp, as devices may divide, for tests with slack. a must be finite, and a and the
