@@ -1,5 +1,7 @@
 #include "host/render/band.h"
 
+#include "host/base/array.h"
+
 enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
 
 // Returns the size of a work-item's macro-tile in pixels.
@@ -40,9 +42,37 @@ Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_cou
                   .real_size = renderer_scalar_size(renderer)};
 }
 
+static size_t buffer_size(cl_mem buffer)
+{
+    size_t size = 0;
+    return clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL) == CL_SUCCESS ? size : 0;
+}
+
+// Returns the smallest spare buffer of at least `size` bytes. Creates one if there is none, in place of the
+// largest spare, so that a renderer never has more buffers than it once used together.
 static cl_mem film_buffer(Renderer *renderer, size_t size)
 {
+    SpareBuffers *spares = &renderer->spares;
+    size_t best = spares->count, largest = 0;
+    for (size_t i = 0; i < spares->count; i++) {
+        const size_t spare = buffer_size(spares->items[i]);
+        if (spare >= size && (best == spares->count || spare < buffer_size(spares->items[best]))) best = i;
+        if (spare > buffer_size(spares->items[largest])) largest = i;
+    }
+    const size_t taken = best < spares->count ? best : largest;
+    cl_mem buffer = NULL;
+    if (taken < spares->count) {
+        buffer = spares->items[taken];
+        spares->items[taken] = spares->items[--spares->count];
+        if (taken == best) return buffer;
+        buffer_release(buffer);
+    }
     return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
+}
+
+static void buffer_spare(Renderer *renderer, cl_mem buffer)
+{
+    if (buffer) array_push(renderer->spares, buffer);
 }
 
 static size_t divide_up(uint32_t count, uint32_t by)
@@ -87,13 +117,13 @@ void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, 
     buffers->pixels = film_buffer(renderer, is_list ? 2 * pixel_count * sizeof(uint32_t) : 0);
 }
 
-void band_buffers_close(BandBuffers *buffers)
+void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
 {
-    buffer_release(buffers->film);
-    buffer_release(buffers->ray_counts);
-    buffer_release(buffers->doubts);
-    buffer_release(buffers->center_doubts);
-    buffer_release(buffers->pixels);
+    buffer_spare(renderer, buffers->film);
+    buffer_spare(renderer, buffers->ray_counts);
+    buffer_spare(renderer, buffers->doubts);
+    buffer_spare(renderer, buffers->center_doubts);
+    buffer_spare(renderer, buffers->pixels);
     *buffers = (BandBuffers){0};
 }
 

@@ -21,9 +21,9 @@ typedef struct {
 // Unless `buffers` is NULL, its `layers` and `layer_begins` are set.
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 
-// Creates the buffers for as many pixels as the film has.
+// Provides the buffers for as many pixels as the film has. band_buffers_close keeps them for later bands.
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film);
-void band_buffers_close(BandBuffers *buffers);
+void band_buffers_close(BandBuffers *buffers, Renderer *renderer);
 
 // The size of a work-item's or a work-group's tile in pixels.
 typedef struct {

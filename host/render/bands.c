@@ -173,7 +173,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
                 band_fill_aovs(renderer, &buffers, aovs, rows) &&
                 band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
     }
-    band_buffers_close(&buffers);
+    band_buffers_close(&buffers, renderer);
     return go_on && compute_ok(compute);
 }
 
@@ -240,7 +240,7 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
         seconds_of_sample = (clock_seconds() - start) / (delivery.samples - first);
     }
     for (size_t i = 0; i < bands.count; i++)
-        band_buffers_close(&bands.items[i].buffers);
+        band_buffers_close(&bands.items[i].buffers, renderer);
     free(bands.items);
     return go_on && compute_ok(renderer->compute);
 }

@@ -431,6 +431,8 @@ void renderer_release_scene(Renderer *renderer)
         }
         buffer_release(renderer->sample_offsets);
         renderer->sample_offsets = NULL;
+        while (renderer->spares.count > 0)
+            buffer_release(renderer->spares.items[--renderer->spares.count]);
         compiled_scene_free(&renderer->compiled);
     }
 }
@@ -443,6 +445,7 @@ void renderer_close(Renderer *renderer)
     renderer_kernels_close(renderer);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
+    free(renderer->spares.items);
     free(renderer);
 }
 

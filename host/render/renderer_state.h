@@ -43,6 +43,13 @@ typedef struct {
     uint64_t begins[FLAT_COUNT], array_sizes[FLAT_COUNT], buffer_sizes[SCENE_BUFFER_COUNT];
 } SceneLayout;
 
+// Buffers of finished bands. A driver for a GPU takes milliseconds to create such a buffer, because it pins
+// memory of the host, and often less than a tenth of that for the band.
+typedef struct {
+    cl_mem *items;
+    size_t count, capacity;
+} SpareBuffers;
+
 struct Renderer {
     Compute *compute;
     RenderSettings settings;
@@ -55,6 +62,7 @@ struct Renderer {
     SceneLayout layout;
     cl_mem sample_offsets; // positions in the pixel
     size_t light_count;
+    SpareBuffers spares;
     // The variant in use and the one before it. Near a shape a moving camera alternates between two variants.
     KernelVariant variant, other_variant;
     Pace paces[KERNEL_COUNT]; // for the variant in use

@@ -153,7 +153,7 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
         buffer_read(repeat->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
                     list->index.count * sizeof *undecided, undecided);
     repeat_launches_take(&renderer->report, &repeat->report);
-    band_buffers_close(&repeated);
+    band_buffers_close(&repeated, repeat);
     return compute_check_reference(renderer->compute) && whole;
 }
 

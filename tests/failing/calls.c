@@ -126,6 +126,8 @@ RELEASE(clReleaseKernel, (cl_kernel kernel), (kernel))
 RELEASE(clReleaseEvent, (cl_event event), (event))
 
 STATUS(clSetMemObjectDestructorCallback, (cl_mem buffer, MemoryNotify notify, void *data), (buffer, notify, data))
+STATUS(clGetMemObjectInfo, (cl_mem buffer, cl_mem_info what, size_t size, void *value, size_t *needed),
+       (buffer, what, size, value, needed))
 STATUS(clBuildProgram, (cl_program program, cl_uint n, const cl_device_id *ids, const char *options,
        ProgramNotify notify, void *data), (program, n, ids, options, notify, data))
 STATUS(clGetProgramBuildInfo, (cl_program program, cl_device_id id, cl_program_build_info what, size_t size,
