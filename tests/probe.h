@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/opencl/compose.h"
+#include "host/render/arithmetic.h"
 #include "host/render/renderer.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -37,6 +38,17 @@ static inline int probe_close(void **state)
     compute_close(&probe_compute);
     device_list_close(&probe_devices);
     return ok ? 0 : -1;
+}
+
+// Returns the least precision at which every build of a kernel must give the same bits: `single`, unless the
+// device's quotients or roots are inexact. Then a compiler may choose another approximation in another build:
+// at `single` an NVIDIA H100 gives other bits at one lane than at four.
+static inline Precision probe_same_bits_from(void)
+{
+    const Passport *passport = arithmetic_passport(&probe_compute, PRECISION_SINGLE,
+                                                   device_lanes(probe_compute.device, false), false);
+    const bool is_exact = passport && passport->quotients.wrong_count + passport->roots.wrong_count == 0;
+    return is_exact ? PRECISION_SINGLE : PRECISION_STRICT;
 }
 
 static inline bool probe_has(Precision precision)

@@ -302,7 +302,7 @@ static void gives_the_same_bits_at_every_width(void **state)
     Material material;
     Scene scene = scene_of_shapes(objects, form_count, &material);
     prepare(&trial, &scene, shapes, form_count, false, false, &random);
-    for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
+    for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             TraceHit *seen = hits[*lanes > 1];
             assert_true(probe_trace(&scene, precision, *lanes, trial.rays, RAYS_PER_SHAPE, seen));

@@ -18,8 +18,6 @@
 // Neither is a whole number of tiles of any width.
 enum { WIDTH = 71, HEIGHT = 41 };
 
-static const Precision exact_precisions[] = {PRECISION_SINGLE, PRECISION_STRICT};
-
 static Scene every_shape;
 
 static int variants_open(void **state)
@@ -57,8 +55,8 @@ static void scene_has_every_feature(void **state)
 static void lanes_agree(void **state)
 {
     (void)state;
-    for (size_t p = 0; p < 2; p++) {
-        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
+    for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
         Film expected = {0};
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
             settings.lanes = *lanes;
@@ -79,8 +77,9 @@ static void lanes_agree_on_aovs(void **state)
 {
     (void)state;
     const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
-    for (size_t p = 0; p < (tests_are_long() ? 2 : 1); p++) {
-        RenderSettings settings = film_settings(WIDTH, HEIGHT, exact_precisions[p]);
+    const Precision from = probe_same_bits_from();
+    for (Precision precision = from; precision <= (tests_are_long() ? PRECISION_STRICT : from); precision++) {
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
         settings.lanes = 1;
         Film expected = film_render(&probe_compute, &every_shape, &settings, aovs);
         assert_int_equal(film_count_faulty(&expected), 0);
@@ -157,7 +156,7 @@ static void features_alone_and_all_together_agree(void **state)
 {
     (void)state;
     FeatureSet seen = 0;
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     const size_t count = sizeof feature_scenes / sizeof *feature_scenes;
     for (size_t i = 0; i < count - (tests_are_long() ? 0 : LONG_SCENES); i++) {
         Scene scene = scene_of_text("feature.yaml", feature_scenes[i].text);
@@ -190,7 +189,7 @@ static void bands_agree(void **state)
 {
     (void)state;
     static const uint32_t band_rows[] = {1, 7, 32};
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     Film expected = render(&every_shape, &settings);
     for (size_t i = 0; i < 3; i++) {
         settings.band_rows = band_rows[i];
@@ -210,7 +209,7 @@ static void bands_agree(void **state)
 static void launches_of_samples_agree(void **state)
 {
     (void)state;
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     Film one = render(&every_shape, &settings);
     settings.sample_count = 5;
     settings.band_seconds = 100;
@@ -239,7 +238,7 @@ static void regions_are_cuts_of_the_whole(void **state)
         {0, 0, 1, 1},      {WIDTH - 1, HEIGHT - 1, 1, 1}, {3, 5, 37, 19}, {WIDTH - 18, 0, 18, HEIGHT},
         {0, 13, WIDTH, 1},
     };
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     Film whole = render(&every_shape, &settings);
     for (size_t i = 0; i < sizeof regions / sizeof *regions; i++) {
         const uint32_t *r = regions[i];
@@ -262,9 +261,9 @@ static void mirror_gives_the_mirrored_image(void **state)
     (void)state;
     Scene mirrored = scene_of_file("tests/scenes/every_shape.yaml");
     scene_mirror(&mirrored);
-    for (size_t p = 0; p < 2; p++) {
+    for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         for (uint32_t width = WIDTH; width <= WIDTH + 1; width++) {
-            RenderSettings settings = film_settings(width, HEIGHT, exact_precisions[p]);
+            RenderSettings settings = film_settings(width, HEIGHT, precision);
             Film film = render(&every_shape, &settings), flipped = film_flipped(&film);
             Film mirror = render(&mirrored, &settings);
             char what[64];

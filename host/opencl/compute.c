@@ -127,13 +127,16 @@ char *compute_unmap_failure_text(const Compute *compute)
 static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags)
 {
     if (!compute_ok(compute)) return NULL;
-    cl_int status;
-    fault_note_call("clCreateBuffer");
-    cl_mem buffer =
-        clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);
-    fault_note_call(NULL);
+    const Device *device = compute->device;
+    cl_int status = CL_MEM_OBJECT_ALLOCATION_FAILURE;
+    cl_mem buffer = NULL;
+    // NVIDIA's driver allocates at the first use, and would fail only there
+    if (device->memory_bytes == 0 || size <= device->memory_bytes) {
+        fault_note_call("clCreateBuffer");
+        buffer = clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);
+        fault_note_call(NULL);
+    }
     if (status != CL_SUCCESS || !buffer) {
-        const Device *device = compute->device;
         if (device->memory_bytes > 0 && device->largest_buffer_bytes > 0)
             compute_fail(compute, "clCreateBuffer", status,
                          "%s requested; the device has %s, at most %s in one buffer",
