@@ -182,7 +182,7 @@ static bool mesh_read(const char *format, const char *bytes, size_t length)
     MessageList messages = {0};
     Report report = report_open(&source, &messages);
     const MeshImport import = {
-        .path = path, .transform.scale = {1, 1, 1}, .own_materials = random_below(2), .report = &report};
+        .path = path, .transform = affine_identity, .own_materials = random_below(2), .report = &report};
     Scene scene = {0};
     uint32_t index;
     const bool read = mesh_import(&scene, &import, &index);

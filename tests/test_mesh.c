@@ -620,7 +620,7 @@ static void copies_are_limited(void **state)
     Scene scene = {.copied_triangle_count = (1 << 24) - 2};
     static const char *const paths[] = {"a.obj", "./a.obj", "a.obj"};
     for (size_t i = 0; i < 3; i++) {
-        const MeshImport import = {.path = paths[i], .transform.scale = {1, 1, 1}, .report = &report};
+        const MeshImport import = {.path = paths[i], .transform = affine_identity, .report = &report};
         uint32_t index;
         assert_int_equal(mesh_import(&scene, &import, &index), i < 2);
         assert_int_equal(messages.count, i < 2 ? 0 : 1);

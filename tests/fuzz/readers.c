@@ -37,7 +37,7 @@ static void mesh_fuzz(const char *path, const Source *source, MessageList *messa
     const Source scene_source = {.file = "scene.yaml", .bytes = "", .length = 0};
     Report report = report_open(&scene_source, messages);
     const MeshImport import = {
-        .path = path, .transform.scale = {1, 1, 1}, .own_materials = true, .report = &report};
+        .path = path, .transform = affine_identity, .own_materials = true, .report = &report};
     Scene scene = {0};
     uint32_t index;
     mesh_import(&scene, &import, &index);
@@ -77,7 +77,7 @@ static void draft_fuzz(const char *path, bool (*read)(MeshDraft *draft), Message
     const Source scene_source = {.file = "scene.yaml", .bytes = "", .length = 0};
     Report report = report_open(&scene_source, messages);
     const MeshImport import = {
-        .path = path, .transform.scale = {1, 1, 1}, .own_materials = true, .report = &report};
+        .path = path, .transform = affine_identity, .own_materials = true, .report = &report};
     Scene scene = {0};
     MeshDraft draft = {.import = &import, .scene = &scene, .source = scene_source, .places = DRAFT_NO_PLACES};
     Mesh mesh = {0};

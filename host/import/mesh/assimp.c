@@ -4,9 +4,9 @@
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
-#include "host/import/mesh/affine.h"
 #include "host/import/mesh/assimp_process.h"
 #include "host/import/number.h"
+#include "host/scene/affine.h"
 #include "host/scene/polygon.h"
 
 #include <assimp/cimport.h>
@@ -364,7 +364,6 @@ static bool node_add(Importer *importer, const struct aiNode *node, const Affine
 
 static bool file_add(Importer *importer)
 {
-    static const Affine identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     const size_t material_count = importer->file->mNumMaterials;
     if (importer->draft->import->own_materials) {
         importer->materials = memory_allocate(material_count + 1, sizeof *importer->materials);
@@ -375,7 +374,8 @@ static bool file_add(Importer *importer)
         draft_warn(importer->draft, "animations are not played: nodes stand as the file has them");
     if (!importer->draft->import->view && importer->file->mNumCameras + importer->file->mNumLights > 0)
         draft_warn(importer->draft, "cameras and lights of a mesh are not used: those of the scene are");
-    const bool added = !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &identity);
+    const bool added =
+        !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &affine_identity);
     free(importer->materials);
     for (DraftPart part = DRAFT_UV; part <= DRAFT_NORMAL; part++)
         if (importer->draft->is_shared[part])

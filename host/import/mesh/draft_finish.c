@@ -1,10 +1,10 @@
 // Turns a draft into a mesh: checked, its polygons cut into triangles, placed in the world, with one vertex
 // for each combination of position, normal and texture coordinates.
 #include "host/base/memory.h"
-#include "host/import/mesh/affine.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/scan.h"
 #include "host/import/number.h"
+#include "host/scene/affine.h"
 #include "host/scene/polygon.h"
 
 #include <stdlib.h>
@@ -347,9 +347,9 @@ void draft_finish(MeshDraft *draft, Mesh *mesh)
     *mesh = (Mesh){0};
     parts_repair(draft);
     polygons_cut(draft);
-    const Affine affine = affine_of_transform(&draft->import->transform);
-    triangles_orient(draft, affine_determinant(&affine) < 0);
-    vectors_transform(draft, &affine);
+    const Affine *affine = &draft->import->transform;
+    triangles_orient(draft, affine_determinant(affine) < 0);
+    vectors_transform(draft, affine);
     corners_combine(draft, mesh);
     materials_expand(draft, mesh);
 }

@@ -2,8 +2,8 @@
 // by jansson; what glint makes of each member is written here.
 #pragma once
 
-#include "host/import/mesh/affine.h"
 #include "host/import/mesh/draft.h"
+#include "host/scene/affine.h"
 
 #include <jansson.h>
 

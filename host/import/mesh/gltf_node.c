@@ -309,19 +309,19 @@ static bool roots_add(Gltf *gltf, const Affine *affine)
 
 bool gltf_scene_read(Gltf *gltf)
 {
-    static const Affine identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
     const GltfItem root = {.json = gltf->root};
     MeshDraft *draft = gltf->draft;
     size_t index = 0;
     bool read = true;
     if (gltf_count(gltf, "scenes") == 0) {
-        read = roots_add(gltf, &identity);
+        read = roots_add(gltf, &affine_identity);
     } else if (gltf_index(gltf, &root, "scene", "scenes", &index)) {
         const GltfItem scene = gltf_entry(gltf, "scenes", index), nodes = gltf_member(&scene, "nodes");
         if (gltf_count(gltf, "scenes") > 1) gltf_lose(gltf, GLTF_SCENES, &scene);
         for (size_t i = 0; i < json_array_size(nodes.json) && read; i++) {
             size_t node;
-            read = gltf_element_index(gltf, &nodes, i, "nodes", &node) && node_add(gltf, node, &identity, 0);
+            read = gltf_element_index(gltf, &nodes, i, "nodes", &node) &&
+                   node_add(gltf, node, &affine_identity, 0);
         }
     } else {
         read = false;

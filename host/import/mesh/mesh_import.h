@@ -2,14 +2,8 @@
 #pragma once
 
 #include "host/import/load.h"
+#include "host/scene/affine.h"
 #include "host/scene/mesh.h"
-
-// Scales, then rotates about x, y and z in this order, then translates.
-typedef struct {
-    Vector3 translate;
-    Vector3 rotate; // degrees
-    Vector3 scale;  // no component is 0; may be negative
-} MeshTransform;
 
 // Source of shading normals: the file if it has any; none; the file, else the triangles around each vertex.
 typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
@@ -33,7 +27,7 @@ typedef struct {
 
 typedef struct {
     const char *path; // to open, and in messages
-    MeshTransform transform;
+    Affine transform; // has an inverse
     MeshSmoothing smoothing;
     bool own_materials; // the file's materials join the scene's
     MeshView *view;     // filled where the file is the whole scene; else NULL

@@ -166,7 +166,7 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
     Report report = report_open(&source, messages);
     MeshView view = {0};
     const MeshImport import = {.path = path,
-                               .transform.scale = {1, 1, 1},
+                               .transform = affine_identity,
                                .own_materials = true,
                                .view = &view,
                                .options = options,

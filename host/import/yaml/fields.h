@@ -3,6 +3,7 @@
 
 #include "host/import/load.h"
 #include "host/import/number.h"
+#include "host/import/place.h"
 #include "host/import/yaml/tree.h"
 #include "host/scene/scene.h"
 
@@ -14,6 +15,15 @@ typedef struct {
     size_t offset;
 } MaterialName;
 
+// What `define` gives a name. The objects' meshes are those of the definition.
+typedef struct {
+    const char *name; // in the tree's texts
+    Object *objects;
+    size_t object_count;
+    Mesh *meshes;
+    size_t mesh_count;
+} Definition;
+
 typedef struct {
     YamlTree tree;
     Report report;
@@ -24,6 +34,13 @@ typedef struct {
         size_t count, capacity;
     } names;                   // of materials, sorted
     uint32_t default_material; // UINT32_MAX until an object needs it
+    Places places;             // of objects
+    struct {
+        Definition *items;
+        size_t count, capacity;
+    } definitions;
+    bool has_fixed_pattern; // which a transform does not move; was warned of
+    size_t copy_count;      // of objects and lists that were read or copied more than once, at most
 } YamlReader;
 
 typedef struct Field Field;

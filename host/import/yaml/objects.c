@@ -12,34 +12,41 @@ static const Range range_quarter_turn = {0, 90, true, "greater than 0 and less t
 enum { FORM_FINITE = FORM_FIRST, FORM_INFINITE = FORM_SECOND };
 enum { FORM_FOCAL_LENGTH = FORM_FIRST, FORM_RADIUS = FORM_SECOND };
 
-#define MATERIAL                                                                                             \
+typedef struct {
+    Object object; // first: fields have its offsets
+    Affine transform;
+} PlacedObject;
+
+// The fields of every shape.
+#define MATERIAL_AND_TRANSFORM                                                                               \
+    {"material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL, NULL},                       \
     {                                                                                                        \
-        "material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL, NULL                      \
+        "transform", read_transform, offsetof(PlacedObject, transform), FORM_ANY, OPTIONAL, NULL             \
     }
 
 static const Field sphere_fields[] = {
     {"center", read_vector, offsetof(Object, as.sphere.center), FORM_ANY, REQUIRED, NULL},
     {"radius", read_number, offsetof(Object, as.sphere.radius), FORM_ANY, REQUIRED, &range_positive},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static const Field plane_fields[] = {
     {"point", read_vector, offsetof(Object, as.plane.point), FORM_ANY, REQUIRED, NULL},
     {"normal", read_direction, offsetof(Object, as.plane.normal), FORM_ANY, REQUIRED, NULL},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static const Field disc_fields[] = {
     {"center", read_vector, offsetof(Object, as.disc.center), FORM_ANY, REQUIRED, NULL},
     {"normal", read_direction, offsetof(Object, as.disc.normal), FORM_ANY, REQUIRED, NULL},
     {"radius", read_number, offsetof(Object, as.disc.radius), FORM_ANY, REQUIRED, &range_positive},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static const Field box_fields[] = {
     {"min", read_vector, offsetof(Object, as.box.min), FORM_ANY, REQUIRED, NULL},
     {"max", read_vector, offsetof(Object, as.box.max), FORM_ANY, REQUIRED, NULL},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -60,7 +67,7 @@ static const Field cylinder_fields[] = {
     {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_INFINITE, REQUIRED, NULL},
     {"radius", read_number, offsetof(Object, as.cylinder.radius), FORM_ANY, REQUIRED, &range_positive},
     {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FINITE, OPTIONAL, NULL},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static bool axis_finish(YamlReader *reader, const YamlNode *mapping, Vector3 from, Vector3 *axis)
@@ -93,7 +100,7 @@ static const Field cone_fields[] = {
     {"apex", read_vector, offsetof(Object, as.cone.from), FORM_INFINITE, REQUIRED, NULL},
     {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_INFINITE, REQUIRED, NULL},
     {"angle", read_number, offsetof(Object, as.cone.slope), FORM_INFINITE, REQUIRED, &range_quarter_turn},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -123,7 +130,7 @@ static bool read_three_directions(YamlReader *reader, const Field *field, const 
 static const Field triangle_fields[] = {
     {"vertices", read_three_points, offsetof(Object, as.triangle.vertices), FORM_ANY, REQUIRED, NULL},
     {"normals", read_three_directions, offsetof(Object, as.triangle.normals), FORM_ANY, OPTIONAL, NULL},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -141,7 +148,7 @@ static const Field torus_fields[] = {
     {"axis", read_direction, offsetof(Object, as.torus.axis), FORM_ANY, REQUIRED, NULL},
     {"major", read_number, offsetof(Object, as.torus.major), FORM_ANY, REQUIRED, &range_positive},
     {"minor", read_number, offsetof(Object, as.torus.minor), FORM_ANY, REQUIRED, &range_positive},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 // `radius` is that of the rim: until paraboloid_finish the focal length holds it.
@@ -154,7 +161,7 @@ static const Field paraboloid_fields[] = {
     {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_RADIUS, REQUIRED,
      &range_positive},
     {"caps", read_boolean, offsetof(Object, as.paraboloid.caps), FORM_ANY, OPTIONAL, NULL},
-    MATERIAL,
+    MATERIAL_AND_TRANSFORM,
 };
 
 static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -198,54 +205,71 @@ static const Shape shapes[SHAPE_MESH] = {
      false},
 };
 
+bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *node)
+{
+    if (reader->scene->materials.items[object->material].texture == 0) return true;
+    if (object->kind == SHAPE_MESH)
+        return reader->scene->meshes.items[object->as.mesh.index].uvs ||
+               report_error(&reader->report, node->offset, "the mesh has no uv for the material's image");
+    return shapes[object->kind].takes_texture ||
+           report_error(&reader->report, node->offset,
+                        "an image lies on a sphere, plane, disc or mesh, not on a %s",
+                        shape_names[object->kind]);
+}
+
+static void shape_read(YamlReader *reader, ShapeKind kind, const YamlNode *mapping)
+{
+    const Shape *shape = &shapes[kind];
+    PlacedObject placed = {.object = shape->start, .transform = affine_identity};
+    Object *object = &placed.object;
+    object->material = UINT32_MAX;
+    Form form;
+    if (!fields_read(reader, mapping, shape_names[kind], shape->fields, shape->field_count, &placed, &form))
+        return;
+    if (shape->finish && !shape->finish(reader, mapping, form, object)) return;
+    if (object->material == UINT32_MAX) object->material = material_default_index(reader);
+    if (!yaml_material_fits(reader, object, field_node(reader, mapping, "material"))) return;
+    array_push(reader->scene->objects, *object);
+    const YamlNode *transform = field_node(reader, mapping, "transform");
+    if (transform != mapping)
+        yaml_transform_objects(reader, reader->scene->objects.count - 1, &placed.transform, transform);
+}
+
+#define SHAPE_WORD(NAME, name) name,
+
 static void object_read(YamlReader *reader, const YamlNode *item)
 {
+    static const char *const names[] = {SCENE_SHAPE_LIST(SHAPE_WORD) "group", "instance"};
+    static void (*const others[])(YamlReader *, const YamlNode *) = {yaml_read_mesh, yaml_read_group,
+                                                                     yaml_read_instance};
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
     size_t kind = 0;
-    while (kind < SHAPE_COUNT && strcmp(yaml_text(&reader->tree, key), shape_names[kind]) != 0)
+    while (kind < COUNT_OF(names) && strcmp(yaml_text(&reader->tree, key), names[kind]) != 0)
         kind++;
-    if (kind == SHAPE_COUNT) {
-        unknown_report(reader, key, "shape", shape_names, SHAPE_COUNT);
-        return;
-    }
-    if (kind == SHAPE_MESH) {
-        yaml_read_mesh(reader, mapping);
-        return;
-    }
-    const Shape *shape = &shapes[kind];
-    Object object = shape->start;
-    object.material = UINT32_MAX;
-    Form form;
-    if (!fields_read(reader, mapping, shape_names[kind], shape->fields, shape->field_count, &object, &form))
-        return;
-    if (shape->finish && !shape->finish(reader, mapping, form, &object)) return;
-    if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-    if (reader->scene->materials.items[object.material].texture > 0 && !shape->takes_texture) {
-        report_error(&reader->report, field_node(reader, mapping, "material")->offset,
-                     "an image lies on a sphere, plane, disc or mesh, not on a %s", shape_names[kind]);
-        return;
-    }
-    array_push(reader->scene->objects, object);
+    if (kind == COUNT_OF(names))
+        unknown_report(reader, key, "shape", names, COUNT_OF(names));
+    else if (kind < SHAPE_MESH)
+        shape_read(reader, (ShapeKind)kind, mapping);
+    else
+        others[kind - SHAPE_MESH](reader, mapping);
 }
 
-void yaml_read_objects(YamlReader *reader, const YamlNode *node)
+void yaml_read_object_list(YamlReader *reader, const char *name, const YamlNode *list)
 {
-    if (node->kind != YAML_SEQUENCE) {
-        expected_report(reader, "objects", "a list", node);
+    if (list->kind != YAML_SEQUENCE) {
+        expected_report(reader, name, "a list", list);
         return;
     }
     Stage *stage = reader->options->stage;
     size_t done = 0, mesh_count = SIZE_MAX;
-    Places places = places_open(reader->report.source);
-    for (const YamlNode *item = yaml_first(&reader->tree, node); item && !report_is_full(&reader->report);
+    for (const YamlNode *item = yaml_first(&reader->tree, list); item && !report_is_full(&reader->report);
          item = yaml_next(&reader->tree, item)) {
         if (mesh_count != reader->scene->meshes.count) // the last one had separate stages
-            stage_begin(stage, "reading the objects of", reader->report.source->file, node->child_count);
+            stage_begin(stage, "reading the objects of", reader->report.source->file, list->child_count);
         mesh_count = reader->scene->meshes.count;
         stage_set(stage, done++);
         object_read(reader, item);
-        places_note(&places, reader->scene, item->offset);
+        places_note(&reader->places, reader->scene, item->offset);
     }
-    places_close(&places);
 }

@@ -47,7 +47,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 
 typedef struct {
     Color background, ambient;
-    const YamlNode *camera, *lights, *materials, *objects;
+    const YamlNode *camera, *lights, *materials, *definitions, *objects;
 } Document;
 
 static void document_read(YamlReader *reader)
@@ -58,6 +58,7 @@ static void document_read(YamlReader *reader)
         {"ambient", read_color, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
         {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
         {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL, NULL},
+        {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL, NULL},
         {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL, NULL},
     };
     Document document = {0};
@@ -68,7 +69,11 @@ static void document_read(YamlReader *reader)
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them
         yaml_read_materials(reader, document.materials);
-    if (document.objects) yaml_read_objects(reader, document.objects);
+    reader->places = places_open(reader->report.source);
+    if (document.definitions) yaml_read_definitions(reader, document.definitions);
+    if (document.objects) yaml_read_object_list(reader, "objects", document.objects);
+    yaml_definitions_free(reader);
+    places_close(&reader->places);
 }
 
 bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)

@@ -3,6 +3,7 @@
 
 #include "host/import/load.h"
 #include "host/import/yaml/fields.h"
+#include "host/scene/affine.h"
 
 // Reads the `materials` mapping; read_material then knows their names.
 void yaml_read_materials(YamlReader *reader, const YamlNode *node);
@@ -17,7 +18,26 @@ uint32_t material_default_index(YamlReader *reader);
 // returns NULL if the node is not a name. The caller frees it.
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node);
 
+// Reads a transform, or a list of them that are applied in order, into an Affine that has an inverse.
+FieldReader read_transform;
+
 void yaml_read_camera(YamlReader *reader, const YamlNode *node);
 void yaml_read_lights(YamlReader *reader, const YamlNode *node);
-void yaml_read_objects(YamlReader *reader, const YamlNode *node);
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping); // the value of `mesh:`
+
+// Reads a list of objects, which is the value of the key `name`. Progress is shown for that of the scene.
+void yaml_read_object_list(YamlReader *reader, const char *name, const YamlNode *list);
+
+// Reads the `define` mapping; its names are then known to yaml_read_instance.
+void yaml_read_definitions(YamlReader *reader, const YamlNode *node);
+void yaml_definitions_free(YamlReader *reader);
+void yaml_read_group(YamlReader *reader, const YamlNode *mapping);    // the value of `group:`
+void yaml_read_instance(YamlReader *reader, const YamlNode *mapping); // the value of `instance:`
+
+// Transforms the scene's objects from the index `first` on. Reports an error at the node `transform` if it
+// does not suit one of them.
+void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine,
+                            const YamlNode *transform);
+
+// Reports an error at the node and returns false if the object cannot have the image of its material.
+bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *node);

@@ -1,7 +1,10 @@
-#include "host/import/mesh/affine.h"
+#include "host/scene/affine.h"
 #include "host/scene/portable.h"
 
+#include <math.h>
 #include <string.h>
+
+const Affine affine_identity = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 
 Affine affine_multiply(const Affine *a, const Affine *b)
 {
@@ -67,18 +70,52 @@ static void turn_of(double degrees, double *sine, double *cosine)
     *cosine = turned[(quarters + 1) & 3];
 }
 
-Affine affine_of_transform(const MeshTransform *transform)
+Affine affine_of_steps(Vector3 scale, Vector3 rotate, Vector3 translate)
 {
     double sx, cx, sy, cy, sz, cz;
-    turn_of(transform->rotate.x, &sx, &cx);
-    turn_of(transform->rotate.y, &sy, &cy);
-    turn_of(transform->rotate.z, &sz, &cz);
-    Vector3 move = transform->translate, scale = transform->scale;
+    turn_of(rotate.x, &sx, &cx);
+    turn_of(rotate.y, &sy, &cy);
+    turn_of(rotate.z, &sz, &cz);
     const Affine scaled = {{{scale.x, 0, 0, 0}, {0, scale.y, 0, 0}, {0, 0, scale.z, 0}}};
     const Affine about_x = {{{1, 0, 0, 0}, {0, cx, -sx, 0}, {0, sx, cx, 0}}};
     const Affine about_y = {{{cy, 0, sy, 0}, {0, 1, 0, 0}, {-sy, 0, cy, 0}}};
-    const Affine about_z = {{{cz, -sz, 0, move.x}, {sz, cz, 0, move.y}, {0, 0, 1, move.z}}};
+    const Affine about_z = {{{cz, -sz, 0, translate.x}, {sz, cz, 0, translate.y}, {0, 0, 1, translate.z}}};
     Affine turned = affine_multiply(&about_x, &scaled);
     turned = affine_multiply(&about_y, &turned);
     return affine_multiply(&about_z, &turned);
+}
+
+// Rodrigues' formula.
+Affine affine_about(Vector3 axis, double degrees)
+{
+    double sine, cosine;
+    turn_of(degrees, &sine, &cosine);
+    const Vector3 n = vector_normalize(axis);
+    const double part = 1 - cosine;
+    return (Affine){
+        {{cosine + part * n.x * n.x, part * n.x * n.y - sine * n.z, part * n.x * n.z + sine * n.y, 0},
+         {part * n.y * n.x + sine * n.z, cosine + part * n.y * n.y, part * n.y * n.z - sine * n.x, 0},
+         {part * n.z * n.x - sine * n.y, part * n.z * n.y + sine * n.x, cosine + part * n.z * n.z, 0}}};
+}
+
+static const double tolerance = 1e-6; // of lengths and cosines
+
+bool affine_keeps_circles(const Affine *affine, Vector3 axis, bool is_straight, AxisScale *scale)
+{
+    const Vector3 w = vector_normalize(axis);
+    const Vector3 u = vector_normalize(vector_cross(w, vector_least_aligned_axis(w)));
+    const Vector3 v = vector_cross(w, u);
+    const Vector3 lu = affine_direction(affine, u), lv = affine_direction(affine, v);
+    const double uu = vector_dot(lu, lu), vv = vector_dot(lv, lv);
+    *scale = (AxisScale){sqrt(sqrt(uu) * sqrt(vv)), affine_direction(affine, w)};
+    const double lengths = scale->across * vector_length(scale->along);
+    return fabs(uu - vv) <= tolerance * uu && fabs(vector_dot(lu, lv)) <= tolerance * uu &&
+           (!is_straight || (fabs(vector_dot(lu, scale->along)) <= tolerance * lengths &&
+                             fabs(vector_dot(lv, scale->along)) <= tolerance * lengths));
+}
+
+bool affine_keeps_balls(const Affine *affine, AxisScale *scale)
+{
+    return affine_keeps_circles(affine, (Vector3){0, 1, 0}, true, scale) &&
+           fabs(vector_length(scale->along) - scale->across) <= tolerance * scale->across;
 }

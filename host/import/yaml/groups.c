@@ -1,0 +1,204 @@
+// `define:`, `group:` and `instance:` of YAML scenes.
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/import/yaml/yaml.h"
+#include "host/scene/mesh.h"
+#include "host/scene/object_transform.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// The most objects that instances copy and members of lists that groups read, aliases included; four
+// triangles of a mesh count as one object. Bounds the cost of a hostile file.
+enum { COPIES_MAX = 1 << 22 };
+
+static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
+{
+    if (reader->copy_count > COPIES_MAX) return false; // was reported
+    reader->copy_count += count;
+    return reader->copy_count <= COPIES_MAX ||
+           report_error(&reader->report, node->offset,
+                        "groups and instances make more than %d objects, or four times as many triangles",
+                        COPIES_MAX);
+}
+
+// Returns whether the look of the object depends on where or how it lies in the world, so that a transform
+// leaves it behind: images on spheres have poles along y, other patterns fixed places.
+static bool pattern_stays(const Scene *scene, const Object *object, const Affine *affine)
+{
+    const Material *material = &scene->materials.items[object->material];
+    const double(*m)[4] = affine->rows;
+    if (material->checker) return true;
+    if (material->texture == 0 || object->kind == SHAPE_MESH) return false;
+    const bool turns = m[0][1] != 0 || m[0][2] != 0 || m[1][0] != 0 || m[1][2] != 0 || m[2][0] != 0 ||
+                       m[2][1] != 0 || m[0][0] < 0 || m[1][1] < 0 || m[2][2] < 0;
+    return object->kind != SHAPE_SPHERE || turns;
+}
+
+void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine, const YamlNode *transform)
+{
+    Scene *scene = reader->scene;
+    for (size_t i = first; i < scene->objects.count; i++) {
+        Object *object = &scene->objects.items[i];
+        const ShapeKind kind = object->kind;
+        if (!reader->has_fixed_pattern && pattern_stays(scene, object, affine)) {
+            report_warning(&reader->report, transform->offset,
+                           "checkers and images other than those of meshes do not move with their objects");
+            reader->has_fixed_pattern = true;
+        }
+        const char *why = object_transform(scene, object, affine);
+        if (!why) continue;
+        report_error(&reader->report, transform->offset, "under this transform a %s %s", shape_names[kind],
+                     why);
+        return;
+    }
+}
+
+void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
+{
+    typedef struct {
+        const YamlNode *objects;
+        Affine transform;
+    } Group;
+    static const Field fields[] = {
+        {"objects", read_node, offsetof(Group, objects), FORM_ANY, REQUIRED, NULL},
+        {"transform", read_transform, offsetof(Group, transform), FORM_ANY, OPTIONAL, NULL},
+    };
+    Group group = {.transform = affine_identity};
+    if (!fields_read(reader, mapping, "group", fields, COUNT_OF(fields), &group, NULL) ||
+        !copies_add(reader, 1 + group.objects->child_count, mapping))
+        return;
+    const size_t first = reader->scene->objects.count;
+    yaml_read_object_list(reader, "objects", group.objects);
+    const YamlNode *transform = field_node(reader, mapping, "transform");
+    if (transform != mapping) yaml_transform_objects(reader, first, &group.transform, transform);
+}
+
+// Moves the scene's objects and meshes from the given indices on to a definition.
+static Definition definition_take(YamlReader *reader, const char *name, size_t first_object,
+                                  size_t first_mesh)
+{
+    Scene *scene = reader->scene;
+    Definition definition = {.name = name,
+                             .object_count = scene->objects.count - first_object,
+                             .mesh_count = scene->meshes.count - first_mesh};
+    definition.objects = memory_allocate(definition.object_count, sizeof *definition.objects);
+    definition.meshes = memory_allocate(definition.mesh_count, sizeof *definition.meshes);
+    for (size_t i = 0; i < definition.object_count; i++) {
+        definition.objects[i] = scene->objects.items[first_object + i];
+        if (definition.objects[i].kind == SHAPE_MESH)
+            definition.objects[i].as.mesh.index -= (uint32_t)first_mesh;
+    }
+    for (size_t i = 0; i < definition.mesh_count; i++)
+        definition.meshes[i] = scene->meshes.items[first_mesh + i];
+    scene->objects.count = reader->places.object_count = first_object;
+    scene->meshes.count = first_mesh;
+    return definition;
+}
+
+static const Definition *definition_find(const YamlReader *reader, const char *name)
+{
+    for (size_t i = 0; i < reader->definitions.count; i++)
+        if (strcmp(reader->definitions.items[i].name, name) == 0) return &reader->definitions.items[i];
+    return NULL;
+}
+
+void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
+{
+    static const Field fields[] = {{"objects", read_node, 0, FORM_ANY, REQUIRED, NULL}};
+    if (node->kind != YAML_MAPPING) {
+        expected_report(reader, "define", "a mapping", node);
+        return;
+    }
+    const YamlNode *value;
+    for (const YamlNode *key = yaml_first(&reader->tree, node); key && !report_is_full(&reader->report);
+         key = yaml_next(&reader->tree, value)) {
+        value = yaml_next(&reader->tree, key);
+        if (!key_is_word(reader, key)) continue;
+        const char *name = yaml_text(&reader->tree, key);
+        const size_t first_object = reader->scene->objects.count, first_mesh = reader->scene->meshes.count;
+        const YamlNode *objects = NULL;
+        if (definition_find(reader, name))
+            report_error(&reader->report, key->offset, "'%.*s' is given twice", WORD_SHOWN, name);
+        else if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL))
+            yaml_read_object_list(reader, "objects", objects);
+        const Definition definition = definition_take(reader, name, first_object, first_mesh);
+        array_push(reader->definitions, definition);
+    }
+}
+
+void yaml_definitions_free(YamlReader *reader)
+{
+    for (size_t i = 0; i < reader->definitions.count; i++) {
+        Definition *definition = &reader->definitions.items[i];
+        for (size_t k = 0; k < definition->mesh_count; k++)
+            mesh_free(&definition->meshes[k]);
+        free(definition->meshes);
+        free(definition->objects);
+    }
+    free(reader->definitions.items);
+}
+
+// Returns NULL after an error if nothing before the node defines the name.
+static const Definition *definition_named(YamlReader *reader, const YamlNode *node)
+{
+    if (node->kind != YAML_SCALAR) {
+        expected_report(reader, "of", "a name of 'define'", node);
+        return NULL;
+    }
+    const Definition *definition = definition_find(reader, yaml_text(&reader->tree, node));
+    if (definition) return definition;
+    const size_t count = reader->definitions.count;
+    const char **names = memory_allocate(count, sizeof *names);
+    for (size_t i = 0; i < count; i++)
+        names[i] = reader->definitions.items[i].name;
+    unknown_report(reader, node, "definition", names, count);
+    free(names);
+    return NULL;
+}
+
+static size_t definition_cost(const Definition *definition)
+{
+    size_t triangles = 0;
+    for (size_t i = 0; i < definition->mesh_count; i++)
+        triangles += definition->meshes[i].triangle_count;
+    return 1 + definition->object_count + triangles / 4;
+}
+
+void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)
+{
+    typedef struct {
+        const YamlNode *of;
+        Affine transform;
+        uint32_t material;
+    } Instance;
+    static const Field fields[] = {
+        {"of", read_node, offsetof(Instance, of), FORM_ANY, REQUIRED, NULL},
+        {"transform", read_transform, offsetof(Instance, transform), FORM_ANY, OPTIONAL, NULL},
+        {"material", read_material, offsetof(Instance, material), FORM_ANY, OPTIONAL, NULL},
+    };
+    Instance instance = {.transform = affine_identity, .material = UINT32_MAX};
+    if (!fields_read(reader, mapping, "instance", fields, COUNT_OF(fields), &instance, NULL)) return;
+    const Definition *definition = definition_named(reader, instance.of);
+    if (!definition || !copies_add(reader, definition_cost(definition), mapping)) return;
+    Scene *scene = reader->scene;
+    const size_t first = scene->objects.count;
+    const bool own_material = instance.material != UINT32_MAX;
+    for (size_t i = 0; i < definition->object_count; i++) {
+        Object object = definition->objects[i];
+        if (own_material) object.material = instance.material;
+        if (object.kind == SHAPE_MESH) {
+            Mesh mesh = mesh_copy(&definition->meshes[object.as.mesh.index]);
+            if (own_material) {
+                free(mesh.materials);
+                mesh.materials = NULL;
+            }
+            object.as.mesh.index = (uint32_t)scene->meshes.count;
+            array_push(scene->meshes, mesh);
+        }
+        if (!yaml_material_fits(reader, &object, field_node(reader, mapping, "material"))) return;
+        array_push(scene->objects, object);
+    }
+    const YamlNode *transform = field_node(reader, mapping, "transform");
+    if (transform != mapping) yaml_transform_objects(reader, first, &instance.transform, transform);
+}

@@ -1,0 +1,110 @@
+// `transform:` of YAML scenes.
+#include "host/import/yaml/yaml.h"
+
+#include <math.h>
+
+// The forms of a transform.
+enum { FORM_STEPS = FORM_FIRST, FORM_MATRIX = FORM_SECOND };
+
+typedef struct {
+    Vector3 angles, axis; // degrees about x, y and z; or, unless it is zero, about the axis
+    double angle;
+} Rotation;
+
+typedef struct {
+    Vector3 translate, scale;
+    Rotation rotation;
+    Affine matrix;
+} Steps;
+
+// Takes one number for all axes or three. None may be 0.
+static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Vector3 *scale = target;
+    if (node->kind == YAML_SEQUENCE) {
+        if (!read_vector(reader, field, node, scale)) return false;
+    } else {
+        if (!read_number(reader, field, node, &scale->x)) return false;
+        scale->y = scale->z = scale->x;
+    }
+    if (scale->x != 0 && scale->y != 0 && scale->z != 0) return true;
+    return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
+}
+
+// Takes the angles about x, y and z, or an axis and an angle.
+static bool read_rotation(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    static const Field fields[] = {
+        {"axis", read_direction, offsetof(Rotation, axis), FORM_ANY, REQUIRED, NULL},
+        {"angle", read_number, offsetof(Rotation, angle), FORM_ANY, REQUIRED, NULL},
+    };
+    Rotation *rotation = target;
+    return node->kind == YAML_MAPPING
+               ? fields_read(reader, node, field->name, fields, COUNT_OF(fields), rotation, NULL)
+               : read_vector(reader, field, node, &rotation->angles);
+}
+
+static bool read_row(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 4, "rows of four numbers", read_number, sizeof(double), target);
+}
+
+static bool read_matrix(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 3, "three rows of four numbers", read_row, 4 * sizeof(double),
+                      target);
+}
+
+static bool step_read(YamlReader *reader, const Field *field, const YamlNode *node, Affine *affine)
+{
+    static const Field fields[] = {
+        {"translate", read_vector, offsetof(Steps, translate), FORM_STEPS, OPTIONAL, NULL},
+        {"rotate", read_rotation, offsetof(Steps, rotation), FORM_STEPS, OPTIONAL, NULL},
+        {"scale", read_scale, offsetof(Steps, scale), FORM_STEPS, OPTIONAL, NULL},
+        {"matrix", read_matrix, offsetof(Steps, matrix), FORM_MATRIX, REQUIRED, NULL},
+    };
+    Steps steps = {.scale = {1, 1, 1}};
+    Form form;
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &steps, &form)) return false;
+    *affine = steps.matrix;
+    if (form == FORM_MATRIX) return true;
+    const Rotation *rotation = &steps.rotation;
+    *affine = affine_of_steps(steps.scale, rotation->angles, steps.translate);
+    if (vector_is_zero(rotation->axis)) return true;
+    Affine turn = affine_about(rotation->axis, rotation->angle);
+    *affine = affine_of_steps(steps.scale, rotation->angles, rotation->angles);
+    turn.rows[0][3] = steps.translate.x;
+    turn.rows[1][3] = steps.translate.y;
+    turn.rows[2][3] = steps.translate.z;
+    *affine = affine_multiply(&turn, affine);
+    return true;
+}
+
+// The range lets cofactors and the shapes' numbers be far from underflow and overflow.
+static bool has_inverse(const Affine *affine)
+{
+    double largest = 0;
+    for (int row = 0; row < 3; row++)
+        for (int column = 0; column < 4; column++)
+            largest = fmax(largest, fabs(affine->rows[row][column]));
+    return largest <= NUMBER_MAX && fabs(affine_determinant(affine)) >= 1e-90;
+}
+
+bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Affine *affine = target;
+    if (node->kind != YAML_SEQUENCE) {
+        if (!step_read(reader, field, node, affine)) return false;
+    } else {
+        *affine = affine_identity;
+        for (const YamlNode *item = yaml_first(&reader->tree, node); item;
+             item = yaml_next(&reader->tree, item)) {
+            Affine step;
+            if (!step_read(reader, field, item, &step)) return false;
+            *affine = affine_multiply(&step, affine);
+        }
+    }
+    return has_inverse(affine) ||
+           report_error(&reader->report, node->offset, "'%s' must have an inverse, and numbers up to 1e30",
+                        field->name);
+}

@@ -1,0 +1,36 @@
+// Affine transforms of points, directions and normals.
+#pragma once
+
+#include "host/scene/vector.h"
+#include <stdbool.h>
+
+// Three rows of a matrix, the last column the translation.
+typedef struct {
+    double rows[3][4];
+} Affine;
+
+extern const Affine affine_identity;
+
+// Returns the transform that applies `b`, then `a`.
+Affine affine_multiply(const Affine *a, const Affine *b);
+// Scales, then rotates about x, y and z in this order by degrees, then translates.
+Affine affine_of_steps(Vector3 scale, Vector3 rotate, Vector3 translate);
+// Rotates by degrees, counterclockwise if the axis points to the viewer. The axis is not zero.
+Affine affine_about(Vector3 axis, double degrees);
+Vector3 affine_point(const Affine *affine, Vector3 p);
+Vector3 affine_direction(const Affine *affine, Vector3 v);
+double affine_determinant(const Affine *affine);
+// Transforms normals: the transposed inverse times |determinant|.
+Affine affine_for_normals(const Affine *affine);
+
+// The scales of a transform across an axis and the vector that the unit axis becomes.
+typedef struct {
+    double across;
+    Vector3 along;
+} AxisScale;
+
+// Returns true if a circle about the axis stays a circle, within a millionth of its radius, and false
+// otherwise. With `is_straight` the axis must also stay perpendicular to the circle.
+bool affine_keeps_circles(const Affine *affine, Vector3 axis, bool is_straight, AxisScale *scale);
+// Returns true if all lengths change by the same factor, within a millionth.
+bool affine_keeps_balls(const Affine *affine, AxisScale *scale);
