@@ -14,6 +14,8 @@
     FEATURE(IMAGES, )             \
     FEATURE(REFLECTION, )         \
     FEATURE(TRANSMISSION, )       \
+    FEATURE(TINTS, )              \
+    FEATURE(FRESNEL, )            \
     FEATURE(EYE_POWERS, )         \
     FEATURE(BVH, )
 // clang-format on

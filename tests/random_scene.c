@@ -22,7 +22,10 @@ static Material random_material(Random *random, size_t index)
     material.diffuse = random_color(random);
     material.specular = random_between(random, 0, 1);
     material.shininess = random_between(random, 0, 100);
-    if (index == 1) material.reflection = random_between(random, 0.2, 0.8);
+    if (index == 1) {
+        material.reflection = random_between(random, 0.2, 0.8);
+        material.reflection_tint = (Color){1, random_between(random, 0, 1), random_between(random, 0, 1)};
+    }
     if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
     if (index == 3) {
         material.checker = true;

@@ -464,6 +464,14 @@ class Trace(CliTestCase):
         self.assertEqual(process.stdout, "")
         self.assertEqual(csv_rows(read("hits.csv")), expected)
 
+    def test_certified_refuses_fresnel(self):
+        """Only where a material of an object has it and bounces rays."""
+        for material, refused in ("{fresnel: true, transmission: 1}", True), ("{fresnel: true}", False):
+            write("glass.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [5, 5, 5]}}]\n"
+                  f"objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {material}}}}}]\n")
+            command = f"render glass.yaml {SMALL} --precision certified -o glass.ppm"
+            self.refuses(command, "'fresnel', whose parts have no error bound") if refused else self.glint(command)
+
     def test_certified(self):
         """A hit, a miss, a hit beyond the end and one at it, and a tangent, which nothing decides."""
         write("rays", "0 0 -4 0 0 2\n0 5 -4 0 0 1\n0 0 -4 0 0 1 0 2\n0 0 -4 0 0 1 0 3\n0 1 -4 0 0 1\n")

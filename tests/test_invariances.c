@@ -191,7 +191,8 @@ static void precision_holds(void **state)
         Case c = {.scene = &scene, .settings = film_settings(WIDTH, HEIGHT, precision), .name = name};
         c.settings.bvh = BVH_ON;
         c.settings.extra_features |= features_of(&scene); // also where a changed scene needs fewer
-        assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES,
+        assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
+                             FEATURE_FRESNEL,
                          FEATURE_ALL);
         c.film = render(&scene, &c.settings);
         assert_int_equal(film_count_faulty(&c.film), 0);

@@ -68,6 +68,8 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, other_color)                   \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, grid)                          \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_tint)               \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, specular_tint)                 \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \

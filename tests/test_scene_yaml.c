@@ -93,6 +93,28 @@ static void test_materials(void **state)
     assert_number(defaults.checker_size, 1);
 }
 
+static void test_tints(void **state)
+{
+    (void)state;
+    Scene scene =
+        scene_of_text("a.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
+                                "materials:\n"
+                                "  gold: {reflection: [0.5, 0.4, 0], specular: [1, 2, 4], fresnel: true}\n"
+                                "  gray: {reflection: [0.5, 0.5, 0.5], specular: 2}\n");
+    const Material *gold = &scene.materials.items[0], *gray = gold + 1;
+    assert_number(gold->reflection, 0.5);
+    assert_vector(gold->reflection_tint, 1, 0.8, 0);
+    assert_number(gold->specular, 4);
+    assert_vector(gold->specular_tint, 0.25, 0.5, 1);
+    assert_true(gold->fresnel);
+    assert_number(gray->reflection, 0.5);
+    assert_vector(gray->reflection_tint, 0, 0, 0);
+    assert_vector(tint_factors(gray->reflection_tint), 1, 1, 1);
+    assert_number(gray->specular, 2);
+    assert_false(gray->fresnel);
+    scene_free(&scene);
+}
+
 static void test_round_shapes(void **state)
 {
     (void)state;
@@ -310,6 +332,7 @@ int main(void)
         cmocka_unit_test(test_scene_keys),
         cmocka_unit_test(test_lights),
         cmocka_unit_test(test_materials),
+        cmocka_unit_test(test_tints),
         cmocka_unit_test(test_round_shapes),
         cmocka_unit_test(test_cylinders),
         cmocka_unit_test(test_cones),

@@ -126,6 +126,12 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_TRANSMISSION,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9}}},\n"
                 "  {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
+    {FEATURE_SPHERES | FEATURE_REFLECTION | FEATURE_TINTS, SCENE_HEAD
+     "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {reflection: [0.9, 0.5, 0]}}},\n"
+     "  {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}]\n"},
+    {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_FRESNEL, SCENE_HEAD
+     "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
+     "  material: {transmission: 0.9, fresnel: true}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_DIRECTIONAL_LIGHTS,
      SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" SPHERE},

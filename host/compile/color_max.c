@@ -3,11 +3,6 @@
 // What the rounding of shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
 
-static Color color_product(Color a, Color b)
-{
-    return (Color){a.x * b.x, a.y * b.y, a.z * b.z};
-}
-
 // Returns what a material reflects at most: of the ambient light, and of all lights at once.
 static Color material_color_max(const CompiledScene *compiled, const Scene *scene, const Material *material,
                                 Color light_sum)
@@ -15,9 +10,10 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
     Color color = material->color;
     if (material->checker) color = vector_max(material->checker_colors[0], material->checker_colors[1]);
     if (material->texture > 0) color = vector_all(compiled->textures[material->texture - 1].largest_texel);
-    const Color ambient = vector_scale(color_product(scene->ambient, color), material->ambient);
-    const Color factor = vector_add(color_product(material->diffuse, color), vector_all(material->specular));
-    return vector_add(ambient, color_product(light_sum, factor));
+    const Color ambient = vector_scale(vector_multiply(scene->ambient, color), material->ambient);
+    const Color factor =
+        vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular));
+    return vector_add(ambient, vector_multiply(light_sum, factor));
 }
 
 double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces)

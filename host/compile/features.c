@@ -24,6 +24,11 @@ static FeatureSet material_features(const Material *material)
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
     // which includes reflected rays: total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
+    if (!vector_is_zero(material->reflection_tint) || !vector_is_zero(material->specular_tint))
+        set |= FEATURE_TINTS;
+    // which needs the index of refraction and the side of the surface
+    if (material->fresnel && set & (FEATURE_REFLECTION | FEATURE_TRANSMISSION))
+        set |= FEATURE_FRESNEL | FEATURE_TRANSMISSION;
     return set;
 }
 

@@ -63,6 +63,14 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
         names[0], farthest.size, names[1], smallest.size, precision_names[settings->precision]);
 }
 
+bool materials_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages)
+{
+    if (!settings->certifies || !(features_of(scene) & FEATURE_FRESNEL)) return true;
+    return message_error(messages,
+                         "a material has 'fresnel', whose parts have no error bound: choose a precision "
+                         "other than certified");
+}
+
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages)
 {

@@ -35,6 +35,8 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             .other_color = scalar4_of(material->checker_colors[1], material->shininess),
             .reflection_transmission_ior = {part_of_light(material->reflection),
                                             part_of_light(material->transmission), material->ior, 0},
+            .reflection_tint = scalar4_of(tint_factors(material->reflection_tint), material->fresnel),
+            .specular_tint = scalar4_of(tint_factors(material->specular_tint), 0),
             .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
         };
         if (material->checker) // the remainders are exact, quotients far from the origin are not

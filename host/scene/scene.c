@@ -22,6 +22,18 @@ Material material_default(void)
                       .texture_size = 1};
 }
 
+Color color_tint(Color color)
+{
+    if (color.x == color.y && color.y == color.z) return vector_all(0);
+    const double largest = vector_largest(color);
+    return (Color){color.x / largest, color.y / largest, color.z / largest};
+}
+
+Color tint_factors(Color tint)
+{
+    return vector_is_zero(tint) ? vector_all(1) : tint;
+}
+
 void material_set_opacity(Material *material, double opacity)
 {
     material->ambient *= opacity;

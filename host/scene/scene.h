@@ -38,9 +38,11 @@ typedef struct {
     Color color;
     double ambient;                  // ka
     Color diffuse;                   // kd, per channel
-    double specular;                 // ks; the highlight has the light's color
+    double specular;                 // ks, the largest channel's
     double shininess;                // Phong's power, >= 0
-    double reflection, transmission; // weights of the reflected and the refracted ray
+    double reflection, transmission; // weights of the reflected and the refracted ray, the largest channel's
+    Color reflection_tint, specular_tint; // the channels over the largest, or 0 where they are equal
+    bool fresnel; // the surface reflects a part of `transmission`, or of `reflection` without it
     double ior;
     bool full_shadow; // casts a full shadow even if transparent
     bool checker;
@@ -215,6 +217,10 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
 // Returns a material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0,
 // shininess 32, ior 1.5.
 Material material_default(void);
+// Returns the tint of a color: its channels over the largest, or 0 if they are equal.
+Color color_tint(Color color);
+// Returns the factors of a tint, which are 1 where it is 0.
+Color tint_factors(Color tint);
 // Makes a material pass the fraction 1 - opacity of the light from behind, unbent, and dims what the surface
 // itself shows by the opacity.
 void material_set_opacity(Material *material, double opacity);

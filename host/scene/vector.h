@@ -33,6 +33,12 @@ static inline Vector3 vector_scale(Vector3 a, double factor)
     return (Vector3){a.x * factor, a.y * factor, a.z * factor};
 }
 
+// Multiplies component by component.
+static inline Vector3 vector_multiply(Vector3 a, Vector3 b)
+{
+    return (Vector3){a.x * b.x, a.y * b.y, a.z * b.z};
+}
+
 // Return the lesser, or the greater, of each component.
 static inline Vector3 vector_min(Vector3 a, Vector3 b)
 {

@@ -108,10 +108,11 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     double diffuse = (double)(strength * facing);
     Quad highlight_part =
         reference_highlight(surface->normal, to_light, surface->to_eye, material->shininess);
-    double highlight = (double)(strength * highlight_part) * material->specular;
-    sum->color.x += light->color.x * (material->diffuse.x * base.x * diffuse + highlight);
-    sum->color.y += light->color.y * (material->diffuse.y * base.y * diffuse + highlight);
-    sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight);
+    const Color highlight = vector_scale(tint_factors(material->specular_tint),
+                                         (double)(strength * highlight_part) * material->specular);
+    sum->color.x += light->color.x * (material->diffuse.x * base.x * diffuse + highlight.x);
+    sum->color.y += light->color.y * (material->diffuse.y * base.y * diffuse + highlight.y);
+    sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight.z);
     return strength > 0;
 }
 
@@ -253,14 +254,14 @@ static void signature_add(Tree *tree, uint32_t object, uint32_t events)
     tree->signature = (tree->signature ^ ((object + 1) * PATH_EVENTS + events)) * PATH_FACTOR;
 }
 
-static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double weight, unsigned bounces_left)
+static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color weight, unsigned bounces_left)
 {
     const Scene *scene = &tree->world->scene;
     ReferenceHit hit = reference_scene_hit(tree->world, ray, left);
     if (!hit.found) {
         tree->has_first = true;
         tree->margin = fmin(tree->margin, (double)hit.margin);
-        tree->sum = vector_add(tree->sum, vector_scale(scene->background, weight));
+        tree->sum = vector_add(tree->sum, vector_multiply(scene->background, weight));
         signature_add(tree, UINT32_MAX, 0);
         return;
     }
@@ -275,7 +276,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
     const Material *material = surface.material;
     const ReferenceColor own = surface_color(tree->world, &surface, (double)hit.margin, tree->shadows);
     tree->shadows = NULL;
-    tree->sum = vector_add(tree->sum, vector_scale(own.color, weight));
+    tree->sum = vector_add(tree->sum, vector_multiply(own.color, weight));
     tree->margin = fmin(tree->margin, own.margin);
     tree->has_texture = tree->has_texture || material->texture > 0;
     if (bounces_left == 0) {
@@ -285,6 +286,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
 
     Quad3 direction = quad3_scale(surface.to_eye, -1);
     double reflection = material->reflection, transmission = material->transmission;
+    Color reflected_weight = vector_scale(tint_factors(material->reflection_tint), reflection);
     ReferenceRay refracted = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, reflected = refracted;
     Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
     const bool is_smooth = surface.object->kind == SHAPE_TRIANGLE && surface.object->as.triangle.smooth;
@@ -294,6 +296,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
         if (is_smooth && !is_total && !is_on_side(refracted.direction, surface.geometric, -1, &tree->margin))
             is_total = !refract(direction, surface.geometric, eta, &refracted.direction, &tree->margin);
         reflection += is_total ? transmission : 0;
+        if (is_total) reflected_weight = vector_add(reflected_weight, vector_all(transmission));
         transmission = is_total ? 0 : transmission;
     }
     signature_add(tree, hit.object,
@@ -302,8 +305,10 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, double 
     reflected.direction = reflect(direction, surface.normal);
     if (reflection > 0 && is_smooth && !is_on_side(reflected.direction, surface.geometric, 1, &tree->margin))
         reflected.direction = reflect(direction, surface.geometric);
-    if (reflection > 0) add_path(tree, &reflected, hit.object, weight * reflection, bounces_left - 1);
-    if (transmission > 0) add_path(tree, &refracted, hit.object, weight * transmission, bounces_left - 1);
+    if (reflection > 0)
+        add_path(tree, &reflected, hit.object, vector_multiply(weight, reflected_weight), bounces_left - 1);
+    if (transmission > 0)
+        add_path(tree, &refracted, hit.object, vector_scale(weight, transmission), bounces_left - 1);
 }
 
 bool reference_is_undecided(const ReferencePixel *pixel)
@@ -324,7 +329,7 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
-    add_path(&tree, &first, UINT32_MAX, 1, path->bounce_count);
+    add_path(&tree, &first, UINT32_MAX, vector_all(1), path->bounce_count);
     const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;
     return (ReferencePixel){.object = tree.object,
                             .path = tree.signature,

@@ -34,14 +34,16 @@ static TraceRay ray_from(const double origin[3], const double direction[3])
 
 static void branch_write(Tree *tree, const Branch *branch);
 
-// The secondary rays of a hit (kernels/shading/bounce.h): at total internal reflection one gets it all.
+// The secondary rays of a hit (kernels/shading/bounce.h). The reflected one carries what is not transmitted,
+// at total internal reflection or by Fresnel's equations. Without transmission the latter leave its part
+// unknown.
 static void branches_write(Tree *tree, const Branch *branch, const Material *material, const TraceHit *hit)
 {
     const bool is_total = material->transmission > 0 && hit->transmission == 0;
+    const double kept = is_total || material->fresnel ? material->transmission - hit->transmission : 0;
     const Branch reflected = {is_total ? "totally reflected" : "reflected",
-                              branch->weight *
-                                  (material->reflection + (is_total ? material->transmission : 0)),
-                              branch->depth + 1, ray_from(hit->reflected_origin, hit->reflected_direction)};
+                              branch->weight * (material->reflection + kept), branch->depth + 1,
+                              ray_from(hit->reflected_origin, hit->reflected_direction)};
     const Branch refracted = {"refracted", branch->weight * hit->transmission, branch->depth + 1,
                               ray_from(hit->refracted_origin, hit->refracted_direction)};
     branch_write(tree, &reflected);

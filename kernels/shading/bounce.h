@@ -47,6 +47,37 @@ static inline Vector vector_reflect(Vector direction, Vector normal)
     return vector_renormalize(vector_fma(normal, (real)(-2) * away, direction));
 }
 
+// Returns the square under the root of vector_refract: of c^2 + k for s = c on entering a body of index n, of
+// s^2 - k for s = n c on leaving it. It is negative in total internal reflection.
+static inline real refraction_squared(real s, mask entering, real ior)
+{
+    real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
+    return difference_of_products(s, s, above_one, ior + (real)(1));
+}
+
+// Returns (a - b) / (a + b) for a and b >= 0, and 0 where both are 0.
+static inline real relative_difference(real a, real b)
+{
+    return real_divide(a - b, real_max(a + b, (real)(SMALLEST_RATIO)));
+}
+
+// Returns the part of unpolarized light that a body of index n reflects, from outside or inside, by Fresnel's
+// equations (Born, Wolf, Principles of Optics, 1999, section 1.5.2); 1 in total internal reflection. With the
+// s of refraction_squared and the root r they are (s - r) / (s + r) and (n^2 s - r) / (n^2 s + r) on
+// entering, (s - n^2 r) / (s + n^2 r) on leaving.
+static inline real fresnel_reflectance(Vector direction, Vector normal, mask entering, real ior)
+{
+    const real one = (real)(1), zero = (real)(0);
+    real cosine = real_max(-vector_dot(direction, normal), zero);
+    real s = lanes_select(entering, cosine, ior * cosine), squared = refraction_squared(s, entering, ior);
+    real root = real_sqrt(real_max(squared, zero));
+    real across = relative_difference(s, root);
+    real along = relative_difference(s * lanes_select(entering, ior * ior, one),
+                                     root * lanes_select(entering, one, ior * ior));
+    real reflectance = (real)(0.5f) * real_fma(across, across, along * along);
+    return lanes_select(squared < zero, one, reflectance);
+}
+
 // Refracts a unit direction by Snell's law at a unit normal that faces it. Returns the lanes of total
 // internal reflection. With k = (n - 1)(n + 1) and the cosine c, the ray into a body of index n runs along d
 // + N (c - sqrt(c^2 + k)), and the ray out of it along n d + N (n c - sqrt((n c)^2 - k)). In this form
@@ -54,9 +85,8 @@ static inline Vector vector_reflect(Vector direction, Vector normal)
 static inline mask vector_refract(Vector direction, Vector normal, mask entering, real ior, Vector *refracted)
 {
     real scale = lanes_select(entering, (real)(1), ior);
-    real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
     real scaled = scale * -vector_dot(direction, normal);
-    real squared = difference_of_products(scaled, scaled, above_one, ior + (real)(1));
+    real squared = refraction_squared(scaled, entering, ior);
     mask total = squared < (real)(0);
     real cosine = real_sqrt(real_max(squared, (real)(0)));
     *refracted = vector_normalize(vector_fma(normal, scaled - cosine, vector_scale(direction, scale)));
@@ -240,37 +270,68 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     refracted->weight = vector_select(*doubt, none, refracted->weight);
 }
 
-// Returns a part of the weight, which no product rounds to 0, since paths must end only where nothing
+// Returns a part of a weight's channel, which no product rounds to 0, since paths must end only where nothing
 // reflects or transmits.
-static inline Color3 weight_part(Color3 weight, real part)
+static inline real channel_part(real channel, real part)
 {
     const real zero = (real)(0);
-    real least = lanes_select((part > zero) & (weight.x > zero), (real)(SMALLEST_RATIO), zero);
-    Color3 product = vector_scale(weight, part);
-    return (Color3){real_max(product.x, least), real_max(product.y, least), real_max(product.z, least)};
+    real least = lanes_select((part > zero) & (channel > zero), (real)(SMALLEST_RATIO), zero);
+    return real_max(channel * part, least);
+}
+
+// Returns a part of a weight. Without tints its channels are equal.
+static inline Color3 weight_part(Color3 weight, real part)
+{
+    if (HAS_TINTS)
+        return (Color3){channel_part(weight.x, part), channel_part(weight.y, part),
+                        channel_part(weight.z, part)};
+    const real all = channel_part(weight.x, part);
+    return (Color3){all, all, all};
+}
+
+// Returns the product with a color, whose channels no product rounds to 0.
+static inline Color3 weight_tinted(Color3 weight, Color3 parts)
+{
+    return (Color3){channel_part(weight.x, parts.x), channel_part(weight.y, parts.y),
+                    channel_part(weight.z, parts.z)};
+}
+
+// Returns a bound on all channels.
+static inline real weight_largest(Color3 weight)
+{
+    return HAS_TINTS ? real_max(real_max(weight.x, weight.y), weight.z) : weight.x;
 }
 
 // Computes the reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of
-// total internal reflection, whose reflected ray carries the transmission in addition. Unless `all`, a ray
-// that no lane carries is not set.
+// total internal reflection, whose reflected ray carries the transmission in addition, as it carries a part
+// of it by Fresnel's equations. Unless `all`, a ray that no lane carries is not set.
 static inline mask surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
                                   Bounce *reflected, Bounce *refracted)
 {
-    real reflection = HAS_REFLECTION ? surface->reflection : (real)(0);
+    real reflection = HAS_REFLECTION ? surface->reflection : (real)(0), kept = (real)(0);
     mask total = mask_none();
     mask transparent = HAS_TRANSMISSION ? surface->transmission > (real)(0) : mask_none();
+    if (HAS_FRESNEL && lanes_any(surface->fresnel)) {
+        real part = fresnel_reflectance(direction, surface->shading_normal, surface->entering, surface->ior);
+        kept = lanes_select(surface->fresnel & transparent, part * surface->transmission, kept);
+        reflection = lanes_select(surface->fresnel & !transparent, part * reflection, reflection);
+    }
     if (HAS_TRANSMISSION && (all || lanes_any(transparent))) {
         total = surface_refract(surface, direction, &refracted->direction);
-        real transmission = lanes_select(total, (real)(0), surface->transmission);
-        reflection = reflection + lanes_select(total, surface->transmission, (real)(0));
+        kept = lanes_select(total, surface->transmission, kept);
+        real transmission = lanes_select(total, (real)(0), surface->transmission - kept);
         refracted->origin = secondary_ray_origin(surface, true);
         refracted->weight = weight_part(weight, transmission);
         total = total & transparent;
     }
-    if (all || lanes_any(reflection > (real)(0))) {
+    if (all || lanes_any(reflection + kept > (real)(0))) {
         reflected->direction = surface_reflect(surface, direction);
         reflected->origin = secondary_ray_origin(surface, false);
-        reflected->weight = weight_part(weight, reflection);
+        if (HAS_TINTS)
+            reflected->weight = weight_tinted(
+                weight, vector_fma(surface->reflection_tint, reflection, (Color3){kept, kept, kept}));
+        else
+            reflected->weight = weight_part(weight, reflection + kept);
     }
     if (HAS_IMAGES) reflected->travelled = refracted->travelled = surface->travelled;
     return total;

@@ -135,8 +135,8 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
             return shaded->color;
         }
         if (IS_CERTIFIED)
-            color_error =
-                real_fma(weight.x, lanes_select(rays[0].active, shaded->color_error, (real)(0)), color_error);
+            color_error = real_fma(weight_largest(weight),
+                                   lanes_select(rays[0].active, shaded->color_error, (real)(0)), color_error);
         color = color_add_weighted(color, weight, vector_select(rays[0].active, shaded->color, black));
 
         Bounce reflected = {rays[0].origin, rays[0].direction, black, depth + 1};

@@ -219,6 +219,7 @@ static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_li
     if (!lanes_any(glossy)) return color;
     real highlight = surface->specular * phong_highlight(glossy, light_reflected(surface, to_light),
                                                          surface->to_eye, surface->shininess);
+    if (HAS_TINTS) return vector_fma(surface->specular_tint, highlight, color);
     return (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
 }
 

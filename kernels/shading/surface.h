@@ -33,8 +33,10 @@ typedef struct {
     Color3 diffuse;        // the factor by which it reflects a light that it faces
     real specular, shininess;
     real reflection, transmission, ior;
-    mask entering;  // the ray runs into the solid, against its outward normal
-    real travelled; // distance from the eye along the path
+    Color3 reflection_tint, specular_tint; // with HAS_TINTS
+    mask fresnel;                          // with HAS_FRESNEL
+    mask entering;                         // the ray runs into the solid, against its outward normal
+    real travelled;                        // distance from the eye along the path
     // At `certified`, bounds on the distance of the position from the exact one; on that of the shading
     // normal and, with HAS_TRIANGLES, of the geometric normal from the exact ones; on that of to_eye; and the
     // uncertain lanes.
@@ -258,6 +260,14 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
     surface->specular = lanes_select(lanes, (real)(material->diffuse.w), surface->specular);
     surface->shininess = lanes_select(lanes, (real)(material->other_color.w), surface->shininess);
     if (HAS_REFLECTION) surface->reflection = lanes_select(lanes, (real)(bounces.x), surface->reflection);
+    if (HAS_TINTS) {
+        Color3 reflected = vector_of(material->reflection_tint),
+               specular = vector_of(material->specular_tint);
+        surface->reflection_tint = vector_select(lanes, reflected, surface->reflection_tint);
+        surface->specular_tint = vector_select(lanes, specular, surface->specular_tint);
+    }
+    if (HAS_FRESNEL)
+        surface->fresnel = surface->fresnel | (lanes & ((real)(material->reflection_tint.w) > (real)(0)));
     if (!HAS_TRANSMISSION) return;
     surface->transmission = lanes_select(lanes, (real)(bounces.y), surface->transmission);
     surface->ior = lanes_select(lanes, (real)(bounces.z), surface->ior);
@@ -315,6 +325,8 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     surface.ambient = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
     surface.specular = surface.shininess = (real)(0);
     if (HAS_REFLECTION) surface.reflection = (real)(0);
+    if (HAS_TINTS) surface.reflection_tint = surface.specular_tint = surface.ambient;
+    if (HAS_FRESNEL) surface.fresnel = mask_none();
     if (HAS_TRANSMISSION) {
         surface.transmission = (real)(0);
         surface.ior = (real)(1);

@@ -366,8 +366,8 @@ def lit(scene, light, hit, base, rounding, total):
     shine, shine_error = highlight(hit, to_light, facing, facing_error, turn, rounding)
     color, errors = [], []
     for k in range(3):
-        surface = material.diffuse[k] * base[k] * facing + material.specular * shine
-        error = as_float(material.diffuse[k] * base[k]) * facing_error + as_float(material.specular) * shine_error
+        surface = material.diffuse[k] * base[k] * facing + material.specular[k] * shine
+        error = as_float(material.diffuse[k] * base[k]) * facing_error + as_float(material.specular[k]) * shine_error
         reached = light.color[k] * strength * part
         color.append(reached * surface)
         errors.append(
@@ -394,6 +394,28 @@ def refracted(hit, direction, rounding):
     passed = add(times(direction, eta), times(hit.normal, eta * cosine - root))
     gain = as_float(eta + abs(eta * cosine - root) + eta * eta * cosine / root)
     return passed, gain
+
+
+def reflectance(hit, cosine):
+    """The part of unpolarized light that the surface reflects, by Fresnel's equations."""
+    ior = arb(hit.thing.material.ior)
+    there = 1 / ior if hit.entering else ior  # the sine behind the surface over that before it
+    squared = 1 - there * there * (1 - cosine * cosine)
+    if squared <= 0:
+        return arb(1)
+    behind = squared.sqrt()
+    near, far = (arb(1), ior) if hit.entering else (ior, arb(1))
+    across = (near * cosine - far * behind) / (near * cosine + far * behind)
+    along = (near * behind - far * cosine) / (near * behind + far * cosine)
+    return (across * across + along * along) / 2
+
+
+def reflectance_bounded(hit, direction, turn, rounding):
+    """(reflectance, how far a turn of ray and normal may change it)"""
+    cosine = -dot(direction, hit.normal)
+    part = reflectance(hit, cosine)
+    change = max(abs(as_float(reflectance(hit, cosine + way * arb(turn)) - part)) for way in (-1, 1))
+    return part, 2 * change + rounding.arithmetic * rounding.u
 
 
 class Answer:
@@ -428,17 +450,25 @@ def follow(scene, hit, beam, rounding, bounces, total):
     """Adds the mirrored and the refracted ray's color; False where that is open."""
     material = hit.thing.material
     direction = times(hit.to_eye, -1)
-    reflection, transmission = material.reflection, material.transmission
+    reflection, transmission = list(material.reflection), arb(material.transmission)
+    kept, part_error = arb(0), 0.0
+    if material.fresnel:
+        part, part_error = reflectance_bounded(hit, direction, beam.turn + hit.turn + rounding.u, rounding)
+        if transmission > 0:
+            kept, transmission = part * transmission, (1 - part) * transmission
+        else:
+            reflection = times(reflection, part)
     own = rounding.arithmetic * rounding.u
-    if transmission > 0:
+    if material.transmission > 0:
         through = refracted(hit, direction, rounding)
         if through is None:
             return False
         passed, gain = through
         if passed is None:
-            reflection, transmission = reflection + transmission, fmpq(0)
-    for weight, kind in ((reflection, "mirrored"), (transmission, "passed")):
-        if weight == 0:
+            kept, transmission = arb(material.transmission), arb(0)
+    mirrored = [arb(r) + kept for r in reflection]
+    for weights, kind in ((mirrored, "mirrored"), ([transmission] * 3, "passed")):
+        if all(weight == 0 for weight in weights):
             continue
         if kind == "mirrored":
             away = dot(direction, hit.normal)
@@ -448,5 +478,8 @@ def follow(scene, hit, beam, rounding, bounces, total):
         seen = trace(scene, leaving(hit, way, turn, rounding), rounding, bounces - 1)
         if seen.color is None:
             return False
-        total.add(times(seen.color.color, weight), as_float(weight) * seen.color.error)
+        color = [c * weight for c, weight in zip(seen.color.color, weights)]
+        largest = max(as_float(weight) for weight in weights)
+        error = (part_error + own * largest) * max(as_float(c) for c in seen.color.color)
+        total.add(color, largest * seen.color.error + error)
     return True

@@ -28,8 +28,10 @@ materials:
   red: {color: [0.875, 0.25, 0.125], diffuse: [0.75, 0.5, 0.5], specular: 0.5, shininess: 24}
   tiles: {checker: {colors: [[0.25, 0.5, 1], [1, 1, 0.5]], size: 0.375}, diffuse: 0.5, specular: 0.25, shininess: 300}
   veil: {color: [0.5, 1, 0.5], diffuse: 0.5, transmission: 0.5, ior: 1}
-  mirror: {color: [0.5, 0.5, 0.5], diffuse: 0.25, specular: 0.5, shininess: 1000, reflection: 0.75}
+  mirror: {color: [0.5, 0.5, 0.5], diffuse: 0.25, specular: [0.5, 0.375, 0.125], shininess: 1000, reflection: [0.75, 0.5, 0.25]}
   glass: {color: [1, 1, 1], diffuse: 0.125, reflection: 0.125, transmission: 0.75, ior: 1.5}
+  clear: {color: [1, 1, 1], diffuse: 0.125, transmission: 0.75, ior: 1.25, fresnel: true}
+  plastic: {color: [0.25, 0.5, 1], diffuse: 0.5, reflection: 0.875, ior: 1.5, fresnel: true}
 objects:
   - plane: {point: [0, -0.5, 0], normal: [0, 1, 0], material: floor}
 """
@@ -77,7 +79,9 @@ SHAPES["shapes"] = [
     SHAPES["plane"][0],
     SHAPES["triangle"][1],
     "disc: {center: [-1.5, 1.5, -0.5], normal: [1, 1, 2], radius: 0.625, material: red}",
-    "box: {min: [-0.5, -0.5, 0.5], max: [0.375, 0.25, 1.25], material: glass}",
+    "box: {min: [-0.5, -0.5, 0.5], max: [0.375, 0.25, 1.25], material: clear}",
+    "sphere: {center: [1.375, 0.125, 2], radius: 0.375, material: glass}",
+    "sphere: {center: [-1.25, -0.125, 1.75], radius: 0.375, material: plastic}",
     "sphere: {center: [-1.375, 0.25, 0.5], radius: 0.5, material: mirror}",
     "torus: {center: [0, 1.25, 0], axis: [1, 2, 2], major: 0.75, minor: 0.25, material: red}",
     "cylinder: {from: [-0.75, -0.5, 1.5], to: [-0.5, 0.25, 1.75], radius: 0.25, caps: false, material: tiles}",

@@ -23,13 +23,15 @@ class Material:
         def color(values):
             return [rational(rounding(x)) for x in values]
 
-        diffuse = given.get("diffuse", 1)
+        def channels(name, default):
+            value = given.get(name, default)
+            return color(value if isinstance(value, list) else [value] * 3)
+
         self.color = color(given.get("color", [1, 1, 1]))
-        self.diffuse = color(diffuse if isinstance(diffuse, list) else [diffuse] * 3)
-        self.ambient, self.specular = number("ambient", 1), number("specular", 0)
-        self.shininess = number("shininess", 32)
-        self.reflection, self.transmission = number("reflection", 0), number("transmission", 0)
-        self.ior = number("ior", 1.5)
+        self.diffuse, self.specular = channels("diffuse", 1), channels("specular", 0)
+        self.ambient, self.shininess = number("ambient", 1), number("shininess", 32)
+        self.reflection, self.transmission = channels("reflection", 0), number("transmission", 0)
+        self.ior, self.fresnel = number("ior", 1.5), given.get("fresnel", False)
         self.checker = None
         if "checker" in given:
             self.checker = [color(c) for c in given["checker"]["colors"]]

@@ -179,14 +179,17 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const Surface *surface, 
     enum { SHININESS_MAX = 1 << 20 };
     const double metal = clamped(surface->metal), roughness = clamped(surface->roughness),
                  smooth = 1 - roughness;
-    const double alpha = roughness * roughness, facing = metal * mean_of(surface->base) + (1 - metal) * 0.04;
+    const double alpha = roughness * roughness;
+    const Color base = {surface->base[0], surface->base[1], surface->base[2]},
+                facing = vector_add(vector_scale(base, metal), vector_all(0.04 * (1 - metal)));
     look->diffuse = vector_all(1 - metal * smooth);
-    look->reflection = clamped(metal * smooth * smooth * mean_of(surface->base));
-    look->specular = alpha > 0 ? fmin(smooth * facing / (4 * alpha * alpha), 1) : 1;
+    look->specular = alpha > 0 ? fmin(smooth * vector_largest(facing) / (4 * alpha * alpha), 1) : 1;
     look->shininess = fmin(0.5 / fmax(alpha * alpha, 1e-12) - 0.5, SHININESS_MAX);
-    if (look->reflection > 0 && (surface->base[0] != surface->base[1] ||
-                                 surface->base[1] != surface->base[2] || surface->base_texture.json))
-        gltf_lose(gltf, GLTF_METAL_COLOR, item);
+    look->specular_tint = color_tint(facing);
+    look->reflection = clamped(metal * smooth * smooth * vector_largest(base));
+    if (look->reflection == 0) return;
+    look->reflection_tint = color_tint(base);
+    if (surface->base_texture.json) gltf_lose(gltf, GLTF_METAL_COLOR, item);
 }
 
 // Emission is shown as the reflection of an ambient light of 1, which no other material of the scene

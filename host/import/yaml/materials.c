@@ -75,6 +75,31 @@ static bool read_texture(YamlReader *reader, const Field *field, const YamlNode 
     return texture > 0;
 }
 
+// Takes one number or three. Sets the largest and the tint.
+static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *node, double *largest,
+                        Color *tint)
+{
+    Color channels;
+    *tint = vector_all(0);
+    if (node->kind != YAML_SEQUENCE) return read_number(reader, field, node, largest);
+    if (!read_vector(reader, field, node, &channels)) return false;
+    *largest = vector_largest(channels);
+    *tint = color_tint(channels);
+    return true;
+}
+
+static bool read_reflection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Material *material = target;
+    return read_tinted(reader, field, node, &material->reflection, &material->reflection_tint);
+}
+
+static bool read_specular(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Material *material = target;
+    return read_tinted(reader, field, node, &material->specular, &material->specular_tint);
+}
+
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
@@ -84,11 +109,12 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"size", read_number, offsetof(Material, texture_size), FORM_THIRD, OPTIONAL, &range_positive},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
         {"diffuse", read_factors, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
-        {"specular", read_number, offsetof(Material, specular), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
         {"shininess", read_number, offsetof(Material, shininess), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"reflection", read_number, offsetof(Material, reflection), FORM_ANY, OPTIONAL, &range_unit},
+        {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},
         {"transmission", read_number, offsetof(Material, transmission), FORM_ANY, OPTIONAL, &range_unit},
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
+        {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL, NULL},
     };
     Material material = material_default();
     if (node) fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
