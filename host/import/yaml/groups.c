@@ -8,18 +8,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The most objects that instances copy and members of lists that groups read, aliases included; four
-// triangles of a mesh count as one object. Bounds the cost of a hostile file.
-enum { COPIES_MAX = 1 << 22 };
+// The most objects that instances copy. Four triangles of a mesh count as one object, and a member of a group
+// that is read again, through an alias, as GROUP_COST of them. Bounds the cost of a hostile file.
+enum { COPIES_MAX = 1 << 22, GROUP_COST = 16 };
 
 static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
 {
-    if (reader->copy_count > COPIES_MAX) return false; // was reported
+    // a group's first reading is paid for by the file's size
+    const size_t largest = COPIES_MAX + GROUP_COST * reader->tree.nodes.count;
+    if (reader->copy_count > largest) return false; // was reported
     reader->copy_count += count;
-    return reader->copy_count <= COPIES_MAX ||
-           report_error(&reader->report, node->offset,
-                        "groups and instances make more than %d objects, or four times as many triangles",
-                        COPIES_MAX);
+    return reader->copy_count <= largest ||
+           report_error(
+               &reader->report, node->offset,
+               "instances and repeated groups make more than %d objects, or four times as many triangles",
+               COPIES_MAX);
 }
 
 // Returns whether the look of the object depends on where or how it lies in the world, so that a transform
@@ -66,7 +69,7 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
     };
     Group group = {.transform = affine_identity};
     if (!fields_read(reader, mapping, "group", fields, COUNT_OF(fields), &group, NULL) ||
-        !copies_add(reader, 1 + group.objects->child_count, mapping))
+        !copies_add(reader, GROUP_COST * (1 + (size_t)group.objects->child_count), mapping))
         return;
     const size_t first = reader->scene->objects.count;
     yaml_read_object_list(reader, "objects", group.objects);
