@@ -10,6 +10,7 @@
     FEATURE(POINT_LIGHTS, )       \
     FEATURE(DIRECTIONAL_LIGHTS, ) \
     FEATURE(SPOT_LIGHTS, )        \
+    FEATURE(FADING_LIGHTS, )      \
     FEATURE(CHECKERS, )           \
     FEATURE(IMAGES, )             \
     FEATURE(REFLECTION, )         \

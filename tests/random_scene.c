@@ -81,6 +81,11 @@ Scene random_scene(uint64_t seed, size_t object_count)
         light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
         light.half_angle = random_between(&random, 15, 40);
         light.penumbra = random_between(&random, 0, 10);
+        if (light.kind == LIGHT_POINT) {
+            light.color = vector_scale(light.color, 100);
+            light.fading[0] = random_between(&random, 0, 1);
+            light.fading[2] = 1;
+        }
         array_push(scene.lights, light);
     }
     return scene;

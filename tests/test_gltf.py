@@ -516,11 +516,10 @@ class Test(TestCase):
             "nodes[5].extensions.KHR_lights_punctual.light: must be an integer from 0 to 3: not used",
             "cameras[1]: only the first camera is used",
             "the orthographic camera becomes",
-            "lights do not fade",
             "lights of 33.9 in total at the center",
         )
         self.assertEqual(report["lights"], 3)
-        self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS"})
+        self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS"})
 
     def test_formats_look_alike(self):
         """A smooth, textured square of four formats: the same image, with the same camera and lights."""
@@ -562,8 +561,8 @@ class Test(TestCase):
         node = "<node id='{0}' name='{0}'><translate>0.5 0.5 {1}</translate><instance_{2} url='#{3}'/></node>"
         nodes = node.format("C", 2, "camera", "c") + node.format("L", 2, "light", "l") + node.format("P", 3, "light", "p")
         write("a.dae", text.replace("</visual_scene>", nodes + "</visual_scene>"))
-        report = self.checked("a.dae", "m: no 'C:\\a\\a.png': 'a.png' is used", "lights do not fade")
-        self.assertEqual(set(report["features"]), {"TRIANGLES", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "IMAGES"})
+        report = self.checked("a.dae", "m: no 'C:\\a\\a.png': 'a.png' is used")
+        self.assertEqual(set(report["features"]), {"TRIANGLES", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS", "IMAGES"})
         self.glint("render a.dae --size 20x10 -o a.npy")
         row = npy_read("a.npy")[2][100:120]  # 60 degrees wide, at a distance of 2: the square is 8.7 columns wide
         self.assertEqual([i for i, color in enumerate(row) if abs(color[0] - 0.18) > 1e-3 or abs(color[1] - 0.18) > 1e-3], list(range(6, 14)))

@@ -76,6 +76,7 @@ typedef struct {
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
     REALS(FLAT_LIGHTS, Light, FlatLight, cone)                                   \
+    REALS(FLAT_LIGHTS, Light, FlatLight, fading)                                 \
     INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)                                \
     INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
     INTEGERS(FLAT_TEXELS, Texel, Texel, color)

@@ -246,20 +246,17 @@ static void test_losses(void **state)
                     "warning: s.dat: no lights\n");
 }
 
-// The light has its strength at the middle of the objects.
 static void test_fading(void **state)
 {
     (void)state;
     const char *text = BEGIN CAMERA_OF("", "") SPHERE
         "sphere center 0 4 0 rad 1 " TEXTURE
         "light center 3 2 0 rad 0.1 attenuation constant 1 linear 2 quadratic 1 color 1.6 0 0\n";
-    assert_messages(
-        "s.dat", text,
-        "7:20: warning: lights are not visible themselves\n"
-        "7:28: warning: lights do not fade with distance: each has its strength at the center of the "
-        "objects\n");
+    assert_messages("s.dat", text, "7:20: warning: lights are not visible themselves\n");
     Scene scene = scene_of_text("s.dat", text);
-    assert_vector(scene.lights.items[0].color, 0.1, 0, 0);
+    assert_vector(scene.lights.items[0].color, 1.6, 0, 0);
+    const double *fading = scene.lights.items[0].fading;
+    assert_true(fading[0] == 1 && fading[1] == 2 && fading[2] == 1);
     scene_free(&scene);
 }
 

@@ -133,6 +133,8 @@ static const struct {
      "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
      "  material: {transmission: 0.9, fresnel: true}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" SPHERE},
+    {FEATURE_SPHERES | FEATURE_POINT_LIGHTS | FEATURE_FADING_LIGHTS,
+     SCENE_HEAD "lights: [{point: {position: [2, 3, -4], intensity: 20, falloff: inverse_square}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_DIRECTIONAL_LIGHTS,
      SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_SPOT_LIGHTS, SCENE_HEAD

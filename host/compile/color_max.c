@@ -1,5 +1,8 @@
 #include "host/compile/compile.h"
 
+#include <float.h>
+#include <math.h>
+
 // What the rounding of shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
 
@@ -19,8 +22,13 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
 double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces)
 {
     Color light_sum = {0}, seen = {0};
-    for (size_t i = 0; i < scene->lights.count; i++)
-        light_sum = vector_add(light_sum, scene->lights.items[i].color);
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        if (vector_is_zero(light->color)) continue;
+        const double nearest = light_fades(light) ? 1 / light->fading[0] : 1;
+        if (nearest > DBL_MAX) return INFINITY;
+        light_sum = vector_add(light_sum, vector_scale(light->color, nearest));
+    }
     // by rays with ever more bounces before them: the background, or a material's color and, reflected and
     // refracted, what rays with one bounce less see
     for (uint32_t left = 0; left <= bounces; left++) {

@@ -46,6 +46,8 @@ FeatureSet features_of(const Scene *scene)
     }
     for (size_t i = 0; i < scene->lights.count; i++)
         set |= light_features[scene->lights.items[i].kind];
+    for (size_t i = 0; i < scene->lights.count; i++)
+        if (light_fades(&scene->lights.items[i])) set |= FEATURE_FADING_LIGHTS;
     return set;
 }
 

@@ -20,6 +20,8 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         const Light *light = &scene->lights.items[i];
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
                                 .kind.x = (uint32_t)light->kind};
+        lights[i].fading =
+            (scalar4){light_fades(light) ? light->fading[0] : 1, light->fading[1], light->fading[2], 0};
         if (light->kind != LIGHT_DIRECTIONAL)
             lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
         if (light->kind != LIGHT_POINT)

@@ -38,6 +38,10 @@ void scene_scale(Scene *scene, double factor)
         for (const size_t *offset = shape_ops[object->kind]->lengths; *offset > 0; offset++)
             *(double *)(void *)((char *)object + *offset) *= factor;
     }
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        scene->lights.items[i].fading[1] /= factor;
+        scene->lights.items[i].fading[2] /= factor * factor;
+    }
     for (size_t i = 0; i < scene->meshes.count; i++)
         for (size_t k = 0; k < scene->meshes.items[i].vertex_count; k++)
             vector_grow(&scene->meshes.items[i].vertices[k], factor);

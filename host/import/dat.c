@@ -256,10 +256,8 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block 'camera'");
     }
-    dat_lights_finish(&reader);
     dat_camera_finish(&reader);
     free(reader.textures.items);
     free(reader.slots);
-    free(reader.fadings.items);
     return scene_finish(scene, &reader.report);
 }

@@ -11,13 +11,6 @@ typedef struct {
     uint32_t material; // of the scene
 } DatTexture;
 
-// The strength of a light is divided by fading[0] + fading[1] d + fading[2] d^2 at the distance d.
-typedef struct {
-    size_t light; // index
-    double fading[3];
-    size_t offset;
-} DatFading;
-
 typedef struct {
     Report report;
     Line line;
@@ -32,10 +25,6 @@ typedef struct {
     } textures;
     uint32_t *slots; // of a hash table: 1 + index of a texture; 0: free
     size_t slot_count;
-    struct {
-        DatFading *items;
-        size_t count, capacity;
-    } fadings;
 } DatReader;
 
 // Return the next word, on this or a later line, and leave it or move behind it. It is empty at the end of
@@ -83,7 +72,6 @@ bool dat_background(DatReader *reader);
 bool dat_light(DatReader *reader);
 bool dat_directional_light(DatReader *reader);
 bool dat_spotlight(DatReader *reader);
-void dat_lights_finish(DatReader *reader);
 void dat_camera_finish(DatReader *reader);
 
 // dat_objects.c: statements.

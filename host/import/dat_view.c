@@ -97,16 +97,18 @@ bool dat_background(DatReader *reader)
     return dat_components(reader, "background", &reader->scene->background);
 }
 
-static bool fading_read(DatReader *reader)
+static bool fading_read(DatReader *reader, Light *light)
 {
-    DatFading fading = {.light = reader->scene->lights.count, .offset = dat_peek(reader).offset};
+    static const char *const names[] = {"constant", "linear", "quadratic"};
+    const size_t offset = dat_peek(reader).offset;
     if (!dat_skip(reader, "attenuation")) return true;
-    if (!dat_number(reader, "constant", &fading.fading[0]) ||
-        !dat_number(reader, "linear", &fading.fading[1]) ||
-        !dat_number(reader, "quadratic", &fading.fading[2]))
-        return false;
-    array_push(reader->fadings, fading);
-    return true;
+    double sum = 0;
+    for (int i = 0; i < 3; i++) {
+        if (!dat_number(reader, names[i], &light->fading[i])) return false;
+        sum = light->fading[i] < 0 ? -INFINITY : sum + light->fading[i];
+    }
+    return sum > 0 || report_error(&reader->report, offset,
+                                   "'attenuation' must have numbers of 0 or more, and one above 0");
 }
 
 static bool light_end(DatReader *reader, Light light)
@@ -117,6 +119,7 @@ static bool light_end(DatReader *reader, Light light)
         return report_error(&reader->report, offset, "'color' must be 0 or more");
     if (light.kind != LIGHT_POINT && vector_is_zero(light.direction))
         return report_error(&reader->report, offset, "'direction' must not be zero");
+    light_fold_fading(&light);
     array_push(reader->scene->lights, light);
     return true;
 }
@@ -134,7 +137,7 @@ static bool light_place_read(DatReader *reader, Light *light)
 bool dat_light(DatReader *reader)
 {
     Light light = {.kind = LIGHT_POINT};
-    return light_place_read(reader, &light) && fading_read(reader) && light_end(reader, light);
+    return light_place_read(reader, &light) && fading_read(reader, &light) && light_end(reader, light);
 }
 
 bool dat_directional_light(DatReader *reader)
@@ -153,7 +156,7 @@ bool dat_spotlight(DatReader *reader)
         !dat_value_in_range(reader, "falloff_end", &range_falloff, &light.half_angle))
         return false;
     light.penumbra = light.half_angle - fmin(fmax(start, 0), light.half_angle);
-    return fading_read(reader) && light_end(reader, light);
+    return fading_read(reader, &light) && light_end(reader, light);
 }
 
 static Vector3 objects_center(const DatReader *reader)
@@ -161,25 +164,6 @@ static Vector3 objects_center(const DatReader *reader)
     const Bounds *bounds = &reader->bounds;
     return bounds_is_empty(bounds) ? reader->scene->camera.look_at
                                    : vector_scale(vector_add(bounds->min, bounds->max), 0.5);
-}
-
-// Gives each light its strength at the center of the objects, because lights do not fade in glint.
-void dat_lights_finish(DatReader *reader)
-{
-    const Vector3 center = objects_center(reader);
-    for (size_t i = 0; i < reader->fadings.count; i++) {
-        const DatFading *fading = &reader->fadings.items[i];
-        if (fading->light >= reader->scene->lights.count) continue; // an error was reported
-        Light *light = &reader->scene->lights.items[fading->light];
-        const double d = vector_length(vector_subtract(light->position, center));
-        const double divisor = fading->fading[0] + d * (fading->fading[1] + d * fading->fading[2]);
-        light->color = divisor > 0
-                           ? vector_min(vector_scale(light->color, 1 / divisor), vector_all(NUMBER_MAX))
-                           : (Color){0, 0, 0};
-        if (fading->fading[1] != 0 || fading->fading[2] != 0)
-            dat_warn(reader, fading->offset,
-                     "lights do not fade with distance: each has its strength at the center of the objects");
-    }
 }
 
 // Moves an orthographic camera so far back that its lines of sight are nearly parallel at the objects. Its

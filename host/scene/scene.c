@@ -22,6 +22,13 @@ Material material_default(void)
                       .texture_size = 1};
 }
 
+void light_fold_fading(Light *light)
+{
+    if (light_fades(light) || light->fading[0] == 0) return;
+    light->color = vector_scale(light->color, 1 / light->fading[0]);
+    light->fading[0] = 0;
+}
+
 Color color_tint(Color color)
 {
     if (color.x == color.y && color.y == color.z) return vector_all(0);

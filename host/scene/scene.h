@@ -29,7 +29,18 @@ typedef struct {
     Vector3 direction; // directional: where the light travels; spot: look_at - position; not unit
     // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
     double half_angle, penumbra;
+    // point, spot: unless the latter two are 0, the strength is divided by fading[0] + fading[1] d +
+    // fading[2] d^2 at the distance d
+    double fading[3];
 } Light;
+
+static inline bool light_fades(const Light *light)
+{
+    return light->fading[1] != 0 || light->fading[2] != 0;
+}
+
+// Divides the color by a fading that is the same at all distances, and clears it.
+void light_fold_fading(Light *light);
 
 // How a texture on a mesh continues beyond its edges.
 typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap;

@@ -94,6 +94,10 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     ReferenceRay shadow = {surface->point, to_light_unnormalized, start, directional ? (Quad)LDBL_MAX : 1};
     Quad strength =
         light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
+    if (light_fades(light)) {
+        const Quad distance = quad3_length(to_light_unnormalized);
+        strength /= light->fading[0] + distance * (light->fading[1] + distance * light->fading[2]);
+    }
     // a light before the shading normal but behind the surface
     const Quad height = quad3_dot(surface->geometric, to_light);
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(height) * surface->scale));

@@ -7,7 +7,8 @@
 typedef struct {
     Vector direction; // from the surface to the light, unit
     real facing;      // the cosine between the shading normal and that
-    real strength;    // 0..1: a spotlight's falloff
+    real strength;    // the part of its color that arrives unless it is occluded
+    real fading;      // with HAS_FADING_LIGHTS, that by the distance alone
     Ray shadow_ray;   // ends at the light
 } LightRay;
 
@@ -24,13 +25,22 @@ static inline real spot_strength(const Light *light, Vector from_light)
     return light->cone.z == 0 ? hard : soft;
 }
 
+// Returns the strength that a light has left at a vector's length, never 0.
+static inline real light_fading(const Light *light, Vector to_light)
+{
+    real distance = real_sqrt(vector_dot(to_light, to_light));
+    real divisor = real_fma((real)(light->fading.z), distance, (real)(light->fading.y));
+    divisor = real_max(real_fma(divisor, distance, (real)(light->fading.x)), (real)(SMALLEST_RATIO));
+    return real_max(real_divide((real)(1), divisor), (real)(SMALLEST_RATIO));
+}
+
 // The shadow ray to a point or spot light is not normalized: the light is at t = 1. It ends 32 u before, so
 // that a surface on which the light lies does not occlude it.
 static inline LightRay light_ray(const Light *light, const Surface *surface)
 {
     LightRay to_light;
     Vector start = secondary_ray_origin(surface, false);
-    to_light.strength = (real)(1);
+    to_light.strength = to_light.fading = (real)(1);
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
@@ -40,10 +50,15 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
         return to_light;
     }
     Vector position = vector_of(light->position);
-    to_light.direction = vector_normalize(vector_subtract(position, surface->position));
+    Vector way = vector_subtract(position, surface->position);
+    to_light.direction = vector_normalize(way);
     to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
+    if (HAS_FADING_LIGHTS) {
+        to_light.fading = light_fading(light, way);
+        to_light.strength = to_light.strength * to_light.fading;
+    }
     to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),
                                    (real)(1 - 32 * UNIT_ROUNDOFF), surface_found(surface));
     return to_light;
@@ -124,14 +139,14 @@ static inline real highlight_error(const Surface *surface, const LightRay *light
     return brightness * real_min(bound, one);
 }
 
-// A bound on the error of what a light adds where it shines in full. `angle_error`: of its direction,
-// `strength_error`: of a spotlight's falloff.
-static inline real light_color_error(const Light *light, const Surface *surface, const LightRay *to_light,
+// A bound on the error of what a light adds where it shines in full, with `brightest` in the largest channel.
+// `angle_error`: of its direction, `strength_error`: of its strength, relative to full.
+static inline real light_color_error(real brightest, const Surface *surface, const LightRay *to_light,
                                      real angle_error, real facing_error, real strength_error)
 {
     Color3 diffuse = surface->diffuse;
     real largest = real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
-    real brightest = (real)(light->color.w), shiny = brightest * surface->specular;
+    real shiny = brightest * surface->specular;
     real compared = real_fma((real)(2), surface->normal_error, angle_error + surface->eye_error);
     real highlight = highlight_error(surface, to_light, shiny, compared);
     real error = real_fma(brightest * largest, facing_error, highlight);
@@ -146,6 +161,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     Ray *shadow_ray = &to_light->shadow_ray;
     const real zero = (real)(0);
     real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
+    real brightest = (real)(light->color.w), strength_error = zero;
     mask far_off = mask_none(), skips_culling = far_off;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
@@ -162,6 +178,12 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         skips_culling =
             (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
         angle_error = angle_error + relative + relative;
+        // the distance d is off by at most the part r of it, 2^-6 unless that is in doubt, and 1 / (a + b d +
+        // c d^2) by less than 1 / (1 - r)^2 - 1 < 2.06 r
+        if (HAS_FADING_LIGHTS) {
+            strength_error = real_fma((real)(2.06f), relative, (real)(32 * UNIT_ROUNDOFF));
+            brightest = (real)(1.04f) * brightest * to_light->fading;
+        }
         shadow_ray->ends_at_light = true;
     }
     shadow_ray->origin_error = place_error;
@@ -173,7 +195,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     mask turned = (to_light->facing < -facing_error) | !surface_found(surface);
     mask open = !turned & !(to_light->facing > facing_error);
     Color3 diffuse = surface->diffuse;
-    real reflected = (real)(light->color.w) * real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
+    real reflected = brightest * real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
     real brightness = real_max(reflected, (real)(1));
     mask faint = facing_error * brightness <= FACING_ERROR_MAX;
     visibility->facing_doubt = open & faint;
@@ -181,7 +203,6 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
     mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
     self_doubt = self_doubt | (open & !faint);
-    real strength_error = (real)(0);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {
         Vector difference = vector_subtract(vector_negate(to_light->direction), vector_of(light->direction));
@@ -193,11 +214,12 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         if (light->cone.z == 0)
             fades = mask_none();
         else // the smooth step's slope is at most 1.5
-            strength_error = real_min((real)(1.5f * light->cone.z) * s_error, (real)(1));
+            strength_error = strength_error + real_min((real)(1.5f * light->cone.z) * s_error, (real)(1));
         self_doubt = self_doubt | (at_edge & !fades);
         visibility->facing_doubt = visibility->facing_doubt | (at_edge & fades);
     }
-    real color_error = light_color_error(light, surface, to_light, angle_error, facing_error, strength_error);
+    real color_error =
+        light_color_error(brightest, surface, to_light, angle_error, facing_error, strength_error);
     visibility->color_error = lanes_select(turned, (real)(0), color_error);
     visibility->lit = visibility->lit & !behind;
     visibility->doubt = self_doubt | (visibility->lit & far_off);

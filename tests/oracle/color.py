@@ -358,6 +358,11 @@ def lit(scene, light, hit, base, rounding, total):
         strength, strength_error = spot
         if strength == 0:
             return True if strength_error == 0 else None
+    if light.fading != [1, 0, 0]:
+        distance = arb(dot(way, way)).sqrt()
+        fading = 1 / (light.fading[0] + distance * (light.fading[1] + distance * light.fading[2]))
+        off = 2.1 * hit.off / length(way) + rounding.arithmetic * u
+        strength, strength_error = strength * fading, (strength_error + off) * as_float(fading)
     part = passing(scene, hit, way, inf if infinite else 1.0, turn, rounding)
     if part is None:
         return None

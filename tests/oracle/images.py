@@ -22,7 +22,7 @@ ambient: [0.125, 0.125, 0.25]
 lights:
   - point: {position: [4, 6, 5], color: [1, 0.75, 0.5], intensity: 0.5}
   - directional: {direction: [3, -6, -2], color: [0.25, 0.5, 0.75]}
-  - spot: {position: [-3, 5, 3], look_at: [0, 0, 0], angle: 16, penumbra: 8, intensity: 0.75}
+  - spot: {position: [-3, 5, 3], look_at: [0, 0, 0], angle: 16, penumbra: 8, intensity: 12, falloff: {linear: 1, quadratic: 0.25}}
 materials:
   floor: {checker: {colors: [[1, 1, 1], [0.25, 0.25, 0.25]], size: 0.75}, diffuse: 0.75}
   red: {color: [0.875, 0.25, 0.125], diffuse: [0.75, 0.5, 0.5], specular: 0.5, shininess: 24}

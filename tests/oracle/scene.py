@@ -48,6 +48,9 @@ class Light:
         if kind != "point":
             there = given.get("direction") or [b - a for a, b in zip(given["position"], given["look_at"])]
             self.direction = vector(float(x) for x in there)
+        falloff = given.get("falloff", {"constant": 1})
+        falloff = {"quadratic": 1} if falloff == "inverse_square" else falloff
+        self.fading = [rational(rounding(float(falloff.get(name, 0)))) for name in ("constant", "linear", "quadratic")]
         if kind == "spot":
             self.angle, self.penumbra = float(given["angle"]), float(given.get("penumbra", 0))
 

@@ -335,15 +335,15 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
         }
         const double outer = fmin(fmax(light->mAngleOuterCone, 1e-3), M_PI) * (90 / M_PI),
                      inner = fmin(fmax(light->mAngleInnerCone, 0) * (90 / M_PI), outer);
-        const MeshLight added = {
-            .light = {.kind = is_sun    ? LIGHT_DIRECTIONAL
-                              : is_spot ? LIGHT_SPOT
-                                        : LIGHT_POINT,
-                      .color = {light->mColorDiffuse.r, light->mColorDiffuse.g, light->mColorDiffuse.b},
-                      .position = affine_point(affine, vector_of(&light->mPosition)),
-                      .direction = vector_normalize(affine_direction(affine, vector_of(&light->mDirection))),
-                      .half_angle = outer,
-                      .penumbra = outer - inner},
+        const Light added = {
+            .kind = is_sun    ? LIGHT_DIRECTIONAL
+                    : is_spot ? LIGHT_SPOT
+                              : LIGHT_POINT,
+            .color = {light->mColorDiffuse.r, light->mColorDiffuse.g, light->mColorDiffuse.b},
+            .position = affine_point(affine, vector_of(&light->mPosition)),
+            .direction = vector_normalize(affine_direction(affine, vector_of(&light->mDirection))),
+            .half_angle = outer,
+            .penumbra = outer - inner,
             .fading = {light->mAttenuationConstant, light->mAttenuationLinear, light->mAttenuationQuadratic}};
         array_push(view->lights, added);
     }

@@ -273,7 +273,7 @@ static bool view_read(MeshDraft *draft, FILE *reply, const ReplyHeader *header)
     if (header->light_count > LIGHTS_MAX || (!view && (header->light_count > 0 || header->has_camera)))
         return false;
     for (uint64_t i = 0; i < header->light_count; i++) {
-        MeshLight light;
+        Light light;
         if (fread(&light, sizeof light, 1, reply) != 1) return false;
         array_push(view->lights, light);
     }

@@ -220,16 +220,16 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
         inner = fmin(fmax(inner, 0), outer);
         // a white surface reflects 1 / pi of the illuminance
         const double part = fmax(intensity, 0) / M_PI;
-        const MeshLight added = {
-            .light = {.kind = is_sun    ? LIGHT_DIRECTIONAL
-                              : is_spot ? LIGHT_SPOT
-                                        : LIGHT_POINT,
-                      .color = {fmax(color[0], 0) * part, fmax(color[1], 0) * part, fmax(color[2], 0) * part},
-                      .position = affine_point(affine, (Vector3){0, 0, 0}),
-                      .direction = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})),
-                      .half_angle = outer * (180 / M_PI),
-                      .penumbra = (outer - inner) * (180 / M_PI)},
-            .fading = {is_sun, 0, !is_sun}};
+        const Light added = {
+            .kind = is_sun    ? LIGHT_DIRECTIONAL
+                    : is_spot ? LIGHT_SPOT
+                              : LIGHT_POINT,
+            .color = {fmax(color[0], 0) * part, fmax(color[1], 0) * part, fmax(color[2], 0) * part},
+            .position = affine_point(affine, (Vector3){0, 0, 0}),
+            .direction = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})),
+            .half_angle = outer * (180 / M_PI),
+            .penumbra = (outer - inner) * (180 / M_PI),
+            .fading = {0, 0, 1}};
         array_push(gltf->draft->import->view->lights, added);
     }
     gltf->is_optional = false;

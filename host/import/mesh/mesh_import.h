@@ -8,19 +8,13 @@
 // Source of shading normals: the file if it has any; none; the file, else the triangles around each vertex.
 typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 
-// A light whose strength is multiplied by 1 / (fading[0] + fading[1] d + fading[2] d^2) at the distance d.
-typedef struct {
-    Light light;
-    double fading[3];
-} MeshLight;
-
 // The camera and the lights of a file.
 typedef struct {
     Camera camera;
     bool has_camera;
     double half_height; // of the frame of an orthographic camera; else 0
     struct {
-        MeshLight *items;
+        Light *items;
         size_t count, capacity;
     } lights;
 } MeshView;

@@ -79,32 +79,39 @@ static bool light_is_sound(const Light *light)
            (light->kind != LIGHT_SPOT || has_cone);
 }
 
-// Adds the light with its strength at the center, because lights do not fade with distance in glint.
-static void light_add(Scene *scene, const MeshLight *from, Vector3 center, bool *fades)
+// A file's fading may be anything; what no light has is left out.
+static void fading_check(Light *light)
 {
-    Light light = from->light;
-    if (light.kind != LIGHT_DIRECTIONAL) {
-        const double d = vector_length(vector_subtract(light.position, center));
-        const double fading = from->fading[0] + d * (from->fading[1] + d * from->fading[2]);
-        *fades |= from->fading[1] != 0 || from->fading[2] != 0;
-        light.color = vector_scale(light.color, fading > 0 ? 1 / fading : 0);
+    double sum = 0;
+    bool is_sound = light->kind != LIGHT_DIRECTIONAL;
+    for (int i = 0; i < 3; i++) {
+        sum += light->fading[i];
+        is_sound = is_sound && light->fading[i] >= 0 && light->fading[i] <= NUMBER_MAX;
     }
-    if (light_is_sound(&light)) array_push(scene->lights, light);
+    if (!is_sound || sum == 0) memset(light->fading, 0, sizeof light->fading);
+    light_fold_fading(light);
+}
+
+// Returns the largest channel of what arrives at a point.
+static double light_arriving(const Light *light, Vector3 point)
+{
+    const double d = vector_length(vector_subtract(light->position, point));
+    const double divisor = light->fading[0] + d * (light->fading[1] + d * light->fading[2]);
+    return vector_largest(light->color) / (light_fades(light) ? fmax(divisor, 1 / NUMBER_MAX) : 1);
 }
 
 // Adds the lights. If they would make the image white or black, they are scaled.
 static void lights_add(Scene *scene, const MeshView *view, Vector3 center, Report *report)
 {
     const double brightest = 4, darkest = 0x1p-6;
-    bool fades = false;
-    for (size_t i = 0; i < view->lights.count; i++)
-        light_add(scene, &view->lights.items[i], center, &fades);
     double sum = 0;
-    for (size_t i = 0; i < scene->lights.count; i++)
-        sum += vector_largest(scene->lights.items[i].color);
-    if (fades)
-        report_warning(report, MESSAGE_WHOLE_FILE,
-                       "lights do not fade with distance: each has its strength at the center of the mesh");
+    for (size_t i = 0; i < view->lights.count; i++) {
+        Light light = view->lights.items[i];
+        fading_check(&light);
+        if (!light_is_sound(&light)) continue;
+        array_push(scene->lights, light);
+        sum += light_arriving(&light, center);
+    }
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
     report_warning(
         report, MESSAGE_WHOLE_FILE,

@@ -40,7 +40,7 @@ typedef struct {
         size_t count, capacity;
     } definitions;
     bool has_fixed_pattern; // which a transform does not move; was warned of
-    size_t copy_count;      // of objects and lists that were read or copied more than once, at most
+    size_t copy_count;      // see COPIES_MAX in groups.c
 } YamlReader;
 
 typedef struct Field Field;

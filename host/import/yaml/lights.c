@@ -10,6 +10,31 @@ typedef struct {
     double intensity;
 } LightFields;
 
+// Takes `inverse_square`, or what divides the strength at a distance d: constant + linear d + quadratic d^2.
+static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    static const Field fields[] = {
+        {"constant", read_number, 0, FORM_ANY, OPTIONAL, &range_not_negative},
+        {"linear", read_number, sizeof(double), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"quadratic", read_number, 2 * sizeof(double), FORM_ANY, OPTIONAL, &range_not_negative},
+    };
+    double *fading = target;
+    if (node->kind == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "inverse_square") == 0) {
+        fading[2] = 1;
+        return true;
+    }
+    if (node->kind != YAML_MAPPING)
+        return expected_report(reader, field->name, "inverse_square or a mapping", node);
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), fading, NULL)) return false;
+    return fading[0] + fading[1] + fading[2] > 0 ||
+           report_error(&reader->report, node->offset, "'%s' needs a number above 0", field->name);
+}
+
+#define FALLOFF                                                                                              \
+    {                                                                                                        \
+        "falloff", read_falloff, offsetof(LightFields, light.fading), FORM_ANY, OPTIONAL, NULL               \
+    }
+
 #define COLOR                                                                                                \
     {"color", read_color, offsetof(LightFields, light.color), FORM_ANY, OPTIONAL, NULL},                     \
     {                                                                                                        \
@@ -18,6 +43,7 @@ typedef struct {
 
 static const Field point_fields[] = {
     {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
+    FALLOFF,
     COLOR,
 };
 
@@ -33,6 +59,7 @@ static const Field spot_fields[] = {
     {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED, NULL},
     {"angle", read_number, offsetof(LightFields, light.half_angle), FORM_ANY, REQUIRED, &range_half_turn},
     {"penumbra", read_number, offsetof(LightFields, light.penumbra), FORM_ANY, OPTIONAL, &range_not_negative},
+    FALLOFF,
     COLOR,
 };
 
@@ -77,6 +104,7 @@ static void light_read(YamlReader *reader, const YamlNode *item)
         return;
     if (kind == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
     fields.light.color = vector_scale(fields.light.color, fields.intensity);
+    light_fold_fading(&fields.light);
     array_push(reader->scene->lights, fields.light);
 }
 
