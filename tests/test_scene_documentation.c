@@ -4,6 +4,7 @@
 
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -66,6 +67,27 @@ static void test_every_shape_is_named(void **state)
     }
 }
 
+// Each pair of a name and its sRGB value, such as `aqua` `#00ffff`, stands for one color.
+static void test_names_of_colors(void **state)
+{
+    (void)state;
+    char name[16], hex[8];
+    size_t count = 0;
+    for (const char *at = text_c(&page); (at = strchr(at, '`')); at++) {
+        if (sscanf(at, "`%15[a-z]` `#%7[0-9a-f]`", name, hex) != 2) continue;
+        Text text = {0};
+        text_appendf(&text,
+                     "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nambient: %s\nbackground: '#%s'\n",
+                     name, hex);
+        Scene scene = scene_of_text("s.yaml", text_c(&text));
+        assert_memory_equal(&scene.ambient, &scene.background, sizeof scene.ambient);
+        scene_free(&scene);
+        text_free(&text);
+        count++;
+    }
+    assert_int_equal(count, 24);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -75,6 +97,7 @@ int main(void)
         {"test_nff_examples", check_examples, NULL, NULL, &(Examples){"nff", 1}},
         {"test_dat_examples", check_examples, NULL, NULL, &(Examples){"dat", 1}},
         cmocka_unit_test(test_every_shape_is_named),
+        cmocka_unit_test(test_names_of_colors),
     };
     return cmocka_run_group_tests(tests, page_read, page_free);
 }

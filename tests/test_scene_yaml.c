@@ -257,6 +257,39 @@ static void test_tiny_numbers_are_zero(void **state)
     scene_free(&scene);
 }
 
+// The linear values of sRGB are those of Python's decimal module, rounded to float.
+static void test_colors(void **state)
+{
+    (void)state;
+    const double half = 0.21586050011389926F, dark = 0.0030352698354883752F, third = 0.033104766570885055F;
+    Scene scene =
+        scene_of_text("s.yaml", CAMERA "background: '#FF800a'\n"
+                                       "ambient: 0.1\n"
+                                       "lights:\n"
+                                       "  - point: {position: [0, 9, 0], color: Gray, intensity: 4}\n"
+                                       "  - point: {position: [0, 9, 0], color: 20}\n"
+                                       "  - point: {position: [0, 9, 0], color: [255.0, 255, 255]}\n"
+                                       "materials:\n"
+                                       "  a: {color: \"#3f0\", diffuse: navy}\n"
+                                       "  b: {color: 1, diffuse: [2, 1, 0]}\n"
+                                       "  c: {checker: {colors: [lime, 0.25]}}\n"
+                                       "  d: {color: [1.5, 0, 0]}\n");
+    assert_vector(scene.background, 1, half, dark);
+    assert_vector(scene.ambient, 0.1, 0.1, 0.1);
+    assert_vector(scene.lights.items[0].color, 4 * half, 4 * half, 4 * half);
+    assert_vector(scene.lights.items[1].color, 20, 20, 20);
+    assert_vector(scene.lights.items[2].color, 255, 255, 255);
+    const Material *materials = scene.materials.items;
+    assert_vector(materials[0].color, third, 1, 0);
+    assert_vector(materials[0].diffuse, 0, 0, half);
+    assert_vector(materials[1].color, 1, 1, 1);
+    assert_vector(materials[1].diffuse, 2, 1, 0);
+    assert_vector(materials[2].checker_colors[0], 0, 1, 0);
+    assert_vector(materials[2].checker_colors[1], 0.25, 0.25, 0.25);
+    assert_vector(materials[3].color, 1.5, 0, 0);
+    scene_free(&scene);
+}
+
 static void test_layers_of_images(void **state)
 {
     (void)state;
@@ -342,6 +375,7 @@ int main(void)
         cmocka_unit_test(test_block_style_and_number_forms),
         cmocka_unit_test(test_names_in_every_style),
         cmocka_unit_test(test_tiny_numbers_are_zero),
+        cmocka_unit_test(test_colors),
         cmocka_unit_test(test_layers_of_images),
         cmocka_unit_test(test_materials_may_follow_objects),
         cmocka_unit_test(test_warnings),

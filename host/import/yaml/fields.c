@@ -1,9 +1,14 @@
 #include "host/import/yaml/fields.h"
 
+#include "host/base/text.h"
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
-enum { FIELDS_MAX = 32 };
+enum {
+    FIELDS_MAX = 32,
+    LISTED_MAX = 20 // a message lists at most this many known words
+};
 
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
@@ -19,16 +24,39 @@ bool expected_report(YamlReader *reader, const char *name, const char *expected,
     return report_error(&reader->report, node->offset, "'%s' must be %s, not %s", name, expected, found);
 }
 
+// Words that other programs use for what glint calls by another name.
+static const struct {
+    const char *word, *known;
+} synonyms[] = {
+    {"albedo", "color"},  {"ball", "sphere"},    {"circle", "disc"},     {"cube", "box"},
+    {"cuboid", "box"},    {"donut", "torus"},    {"eye", "position"},    {"floor", "plane"},
+    {"ground", "plane"},  {"lookat", "look_at"}, {"sun", "directional"}, {"target", "look_at"},
+    {"texture", "image"},
+};
+
+// Returns the known word that `word` may stand for, or NULL.
+static const char *known_word(const char *word, const char *const *known, size_t known_count)
+{
+    for (size_t i = 0; i < COUNT_OF(synonyms); i++)
+        for (size_t j = 0; j < known_count && !strcasecmp(word, synonyms[i].word); j++)
+            if (!strcmp(synonyms[i].known, known[j])) return known[j];
+    return strlen(word) <= WORD_SHOWN ? text_nearest(word, known, known_count) : NULL;
+}
+
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
                     size_t known_count)
 {
     const char *word = yaml_text(&reader->tree, node);
-    const char *nearest = strlen(word) <= WORD_SHOWN ? text_nearest(word, known, known_count) : NULL;
-    if (nearest)
-        report_error(&reader->report, node->offset, "unknown %s '%s': did you mean '%s'?", kind, word,
-                     nearest);
-    else
-        report_error(&reader->report, node->offset, "unknown %s '%.*s'", kind, WORD_SHOWN, word);
+    const char *meant = known_word(word, known, known_count);
+    Text text = {0};
+    text_appendf(&text, "unknown %s '%.*s'", kind, WORD_SHOWN, word);
+    if (meant) text_appendf(&text, ": did you mean '%.*s'?", WORD_SHOWN, meant);
+    const bool is_listed = known_count > 1 && known_count <= LISTED_MAX;
+    if (is_listed) text_appendf(&text, meant ? " The choices are " : "; the choices are ");
+    for (size_t i = 0; i < known_count && is_listed; i++)
+        text_appendf(&text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, known[i]);
+    report_error(&reader->report, node->offset, "%s", text_c(&text));
+    text_free(&text);
 }
 
 static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,
@@ -172,24 +200,6 @@ bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node
     if (!read_vector(reader, field, node, target)) return false;
     if (vector_is_zero(*(const Vector3 *)target))
         return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
-    return true;
-}
-
-bool read_color(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    Field channels = *field;
-    channels.range = &range_not_negative;
-    return read_vector(reader, &channels, node, target);
-}
-
-bool read_factors(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    Field channels = *field;
-    channels.range = &range_not_negative;
-    if (node->kind == YAML_SEQUENCE) return read_vector(reader, &channels, node, target);
-    double value;
-    if (!read_number(reader, &channels, node, &value)) return false;
-    *(Color *)target = (Color){value, value, value};
     return true;
 }
 

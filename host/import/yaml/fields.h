@@ -79,9 +79,14 @@ bool key_is_word(YamlReader *reader, const YamlNode *key);
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value);
 
-// Target types: `const YamlNode *`, double, Vector3, nonzero Vector3, Color, Color from one or three numbers,
-// bool. Numbers must lie in the field's range.
-FieldReader read_node, read_number, read_vector, read_direction, read_color, read_factors, read_boolean;
+// Target types: `const YamlNode *`, double, Vector3, nonzero Vector3, bool. Numbers must lie in the field's
+// range.
+FieldReader read_node, read_number, read_vector, read_direction, read_boolean;
+
+// Read a Color from three numbers, from one for a gray, or from sRGB as "#rrggbb", "#rgb" or a name. Whole
+// numbers that look like values from 0 to 255 are an error: those above 1 of a surface's color, and those
+// above 31 of a strength, such as a light's.
+FieldReader read_color, read_strength;
 
 // Reads a list of exactly `count` values of `size` bytes, each by `read`; `what` as in "three numbers".
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
@@ -89,6 +94,7 @@ bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, si
 
 // Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
-// Reports `unknown kind 'word'`, with a suggestion if a known word is similar.
+// Reports `unknown kind 'word'`, with a suggestion if a known word is similar or means the same, and with the
+// known words unless they are many.
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
                     size_t known_count);

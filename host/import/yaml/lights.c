@@ -36,7 +36,7 @@ static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode 
     }
 
 #define COLOR                                                                                                \
-    {"color", read_color, offsetof(LightFields, light.color), FORM_ANY, OPTIONAL, NULL},                     \
+    {"color", read_strength, offsetof(LightFields, light.color), FORM_ANY, OPTIONAL, NULL},                  \
     {                                                                                                        \
         "intensity", read_number, offsetof(LightFields, intensity), FORM_ANY, OPTIONAL, &range_not_negative  \
     }

@@ -75,14 +75,16 @@ static bool read_texture(YamlReader *reader, const Field *field, const YamlNode 
     return texture > 0;
 }
 
-// Takes one number or three. Sets the largest and the tint.
+// Takes a color whose channels lie in the field's range. Sets the largest and the tint.
 static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *node, double *largest,
                         Color *tint)
 {
     Color channels;
+    const bool is_name =
+        node->kind == YAML_SCALAR && !strchr("+-.0123456789", yaml_text(&reader->tree, node)[0]);
     *tint = vector_all(0);
-    if (node->kind != YAML_SEQUENCE) return read_number(reader, field, node, largest);
-    if (!read_vector(reader, field, node, &channels)) return false;
+    if (node->kind == YAML_SCALAR && !is_name) return read_number(reader, field, node, largest);
+    if (!(is_name ? read_strength : read_vector)(reader, field, node, &channels)) return false;
     *largest = vector_largest(channels);
     *tint = color_tint(channels);
     return true;
@@ -108,7 +110,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED, NULL},
         {"size", read_number, offsetof(Material, texture_size), FORM_THIRD, OPTIONAL, &range_positive},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"diffuse", read_factors, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
+        {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
         {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
         {"shininess", read_number, offsetof(Material, shininess), FORM_ANY, OPTIONAL, &range_not_negative},
         {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},

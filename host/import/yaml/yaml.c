@@ -54,8 +54,8 @@ static void document_read(YamlReader *reader)
 {
     static const Field fields[] = {
         {"camera", read_node, offsetof(Document, camera), FORM_ANY, REQUIRED, NULL},
-        {"background", read_color, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
-        {"ambient", read_color, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
+        {"background", read_strength, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
+        {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
         {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
         {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL, NULL},
         {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL, NULL},
