@@ -4,11 +4,13 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/progress.h"
+#include "host/import/load.h"
 #include "host/import/mesh/assimp_process.h"
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static const struct {
     const char *name;
@@ -34,11 +36,18 @@ enum { COMMAND_COUNT = sizeof commands / sizeof *commands };
 static void help(FILE *stream)
 {
     fputs("glint: an OpenCL ray tracer that reports its speed and its error\n\n"
-          "usage: glint COMMAND [OPTIONS]\n\n",
+          "usage: glint COMMAND [OPTIONS]\n"
+          "       glint SCENE [OPTIONS]     renders the scene as glint render SCENE [OPTIONS]\n\n",
           stream);
     for (size_t i = 0; i < COMMAND_COUNT; i++)
         fprintf(stream, "  %-9s %s\n", commands[i].name, commands[i].purpose);
     fputs("\nglint COMMAND --help lists a command's options, glint --version prints the version.\n", stream);
+}
+
+static bool file_exists(const char *path)
+{
+    struct stat status;
+    return stat(path, &status) == 0 && !S_ISDIR(status.st_mode);
 }
 
 static int command_run(int argument_count, char **arguments)
@@ -66,6 +75,11 @@ static int command_run(int argument_count, char **arguments)
             return commands[i].run(argument_count - 1, arguments + 1);
         }
         names[i] = commands[i].name;
+    }
+    if (scene_is_known(name) || file_exists(name)) {
+        static char render_name[] = "glint render";
+        arguments[0] = render_name;
+        return command_render(argument_count, arguments);
     }
     const char *near = text_nearest(name, names, COMMAND_COUNT);
     fprintf(stderr, "glint: unknown command \"%s\"", name);

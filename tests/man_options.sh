@@ -31,7 +31,7 @@ for page in "$pages"/*; do diff "docs/${page##*/}" "$page" || failed=1; done
 keys=$("$GLINT" view --help | sed -n '3,/^$/s/^  \(.*[^ ]\)   *\([^ ].*\)$/| \1 | \2 |/p' | sed 's/ * |/ |/')
 diff <(echo "$keys") <(sed -n '/^<!-- keys/,/^<!-- end/{/^| [^|]/p}' docs/guide.md) || failed=1
 
-listed=$("$GLINT" --help | sed -n 's/^  \([a-z]*\)  .*/\1/p' | xargs)
+listed=$("$GLINT" --help | sed -n 's/^  \([a-z][a-z]*\)  .*/\1/p' | xargs)
 if [ "$listed" != "$subcommands" ]; then
     echo "glint --help lists the commands '$listed', not '$subcommands'"
     failed=1
@@ -55,7 +55,9 @@ offers() {
 }
 glint() { "$GLINT" "$@"; }
 offers 'glint r' render
+offers 'glint LICEN' LICENSE
 offers 'glint render --si' --size
+offers 'glint scenes/demo.yaml --si' --size
 offers 'glint check --le' --lenient
 offers 'glint render --lanes 1' '1 16'
 offers 'glint render --precision ' 'single strict double certified'

@@ -181,6 +181,9 @@ static void camera_is_written_into_the_file(void **state)
         "[0, 0, 0.001] # there\n" REST);
     check_replaced("camera: {look_at: [0, 0, 0.001], position: [1, 2.50, 3.0]}\n" REST,
                    "camera: {up: [0, 0, 1], look_at: [0, 0, 0.001], position: [1, 2.50, 3.0]}\n" REST);
+    check_replaced("{\"camera\": {\"look_at\": [0, 0, 0], \"position\": [1, 2.5, 3]}, \"objects\": []}\n",
+                   "{\"camera\": {\"up\": [0, 0, 1], \"look_at\": [0, 0, 0.001], \"position\": [1, 2.5, 3]}, "
+                   "\"objects\": []}\n");
     check_replaced("{objects: [&a [9, 9, 9]], camera: {position: *a, look_at: [0, 0, 0]}}\n", NULL);
     check_replaced("{a: [1], objects: []}\n", NULL);
     check_replaced("camera: {position: [1, 2, 3]}\n", NULL);

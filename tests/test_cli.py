@@ -27,7 +27,7 @@ WRONG_COMMAND_LINES = [
     ('"rendr".*did you mean render', "rendr sphere.yaml"),
     ('unknown command "zzzzzz"$', "zzzzzz"),
     ("scene.*--help", "{render|trace|check}"),
-    ("one scene", "{trace|check} sphere.yaml other.yaml"),
+    ("one scene", "{trace|check --json|check --object 0} sphere.yaml other.yaml"),
     ("would both be 'sphere.png'", "render sphere.yaml ./sphere.yaml"),
     ("--checkpoint takes one scene", "render sphere.yaml other.yaml --checkpoint saved"),
     ("--timing=json takes one scene", "render sphere.yaml other.yaml --timing=json"),
@@ -48,9 +48,11 @@ WRONG_COMMAND_LINES = [
     ('--precision: .*"sinlge".*did you mean single', "{render|trace --rays rays} sphere.yaml --precision sinlge"),
     ('--lanes: expected 1, 4, 8 or 16, not "[30]"', "{render|trace --rays rays} sphere.yaml --lanes {3|0}"),
     (r'device.* "(toaster|99)".*: 0 \(', "{render|trace --rays rays} sphere.yaml --device {toaster|99}"),
-    (r"missing\.yaml.*No such file", "{render|trace --rays rays|check} missing.yaml"),
+    (r"missing\.yaml.*No such file", "{render|trace --rays rays|check|} missing.yaml"),
     (r"sphere\.txt", "{render|trace --rays rays|check} sphere.txt"),
-    (r"one scene, not also 'b\.yaml'", "{trace --rays rays|check} sphere.yaml b.yaml"),
+    ("notes: a scene's name ends in", "{render|} notes"),
+    ('unknown command "folder"', "folder"),
+    (r"one scene, not also 'b\.yaml'", "trace --rays rays sphere.yaml b.yaml"),
     (r"writes CSV", "trace sphere.yaml --rays rays -o {hits.npy|hits.PNG}"),
     ("no-rays.*No such file", "trace sphere.yaml --rays no-rays"),
     (r"\.png, \.ppm, \.exr or \.npy", "render sphere.yaml -o image.{jpg|PNGX|}"),
@@ -85,6 +87,8 @@ class CliTestCase(TestCase):
     def setUp(self):
         super().setUp()
         write("sphere.yaml", SPHERE)
+        write("notes", "not a scene\n")
+        os.makedirs("folder", exist_ok=True)
         write("rays", "0 0 -4  0 0 1\n")
 
     def nothing_left(self, pattern):
@@ -309,6 +313,16 @@ class Failures(CliTestCase):
 
 
 class Images(CliTestCase):
+    def test_a_scene_alone_is_rendered(self):
+        camera, lights, objects = ('{"position": [0, 0, -4], "look_at": [0, 0, 0]}', '[{"point": {"position": [3, 4, -5]}}]',
+                                   '[{"sphere": {"center": [0, 0, 0], "radius": 1}}]')
+        write("s.json", f'{{"camera": {camera}, "lights": {lights},\n\t"objects": {objects}}}')
+        write("s.yaml", f"camera: {camera}\nlights: {lights}\nobjects: {objects}\n")
+        self.glint(f"render s.yaml {SMALL} -o command.ppm")
+        for scene in "s.yaml", "s.json", "./s.yaml":
+            self.glint(f"{scene} {SMALL} -o alone.ppm")
+            self.assertEqual(Path("alone.ppm").read_bytes(), Path("command.ppm").read_bytes(), scene)
+
     def test_several_scenes(self):
         self.glint(f"render sphere.yaml {SMALL} -o one.png")
         write("other.yaml", SPHERE)
@@ -507,6 +521,17 @@ class Reports(CliTestCase):
         process = self.glint(f"render sphere.yaml {SMALL} --timing")
         self.assertRegex(process.stderr, r"(?m)^ +launches +[0-9.]+ ms")
         self.assertEqual(process.stdout, "")
+
+    def test_check_of_several(self):
+        write("bad.yaml", "camera: 5\nlight: []\n")
+        lines = SPHERE.splitlines(keepends=True)
+        write("dark.yaml", "".join(lines[:2] + lines[5:]))
+        process = self.glint("check sphere.yaml bad.yaml dark.yaml missing.yaml", status=1)
+        self.assertEqual(process.stdout.splitlines(), [
+            "sphere.yaml: 1 object, 2 lights, 1 material", "bad.yaml: 2 errors",
+            "dark.yaml: 1 object, 0 lights, 1 material, 1 warning", "missing.yaml: 1 error"])
+        self.assertRegex(process.stderr, "(?ms)^bad.yaml:1:9: error.*^bad.yaml:2:1: error.*dark.yaml: no lights")
+        self.assertEqual(self.glint("check sphere.yaml sphere.yaml").stdout.count("\n"), 2)
 
     def test_check(self):
         scene = SCENES / "every_shape.yaml"

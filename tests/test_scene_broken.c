@@ -144,11 +144,10 @@ static void test_names(void **state)
     SceneOptions options = {0};
     Scene scene;
     assert_false(scene_load(&scene, "tests/scenes/complete.txt", &options, &messages));
-    assert_string_equal(
-        messages.items[0].text,
-        "tests/scenes/complete.txt: a scene's name ends in .yaml, .yml, .rt, .cfg, .nff or .dat, or in "
-        "a "
-        "mesh's, such as .obj, .ply, .stl, .gltf, .glb, .fbx, .dae");
+    assert_string_equal(messages.items[0].text, "tests/scenes/complete.txt: a scene's name ends in .yaml, "
+                                                ".yml, .json, .rt, .cfg, .nff or .dat, or in "
+                                                "a "
+                                                "mesh's, such as .obj, .ply, .stl, .gltf, .glb, .fbx, .dae");
     assert_false(scene_load(&scene, ".rt", &options, &messages));
     assert_false(scene_load(&scene, "tests/scenes/absent.yml", &options, &messages));
     assert_non_null(strstr(messages.items[2].text, "absent.yml"));

@@ -26,9 +26,9 @@ static const struct option long_options[] = {
     {0},
 };
 
-static const char help_text[] = "usage: glint check SCENE [OPTIONS]\n\n"
+static const char help_text[] = "usage: glint check SCENE... [OPTIONS]\n\n"
                                 "Reports a scene's objects, lights, materials, bounds and kernel features, "
-                                "and warns of what is ignored.\n\n"
+                                "and warns of what is ignored. Of several scenes it prints one line each.\n\n"
                                 "      --object ID       print one object and its line; IDs are those of "
                                 "glint trace\n" //
     HELP_JSON HELP_LENIENT HELP_HELP;
@@ -194,22 +194,65 @@ static bool object_print(const Scene *scene, const char *path, uint32_t id)
     return true;
 }
 
+// Prints a scene's line in the report of several.
+static void line_print(const char *path, const Scene *scene, bool loaded, const MessageList *messages)
+{
+    const size_t errors = message_count(messages, MESSAGE_ERROR),
+                 warnings = message_count(messages, MESSAGE_WARNING);
+    if (loaded)
+        printf("%s: %zu object%s, %zu light%s, %zu material%s", path, scene->objects.count,
+               text_plural(scene->objects.count), scene->lights.count, text_plural(scene->lights.count),
+               scene->materials.count, text_plural(scene->materials.count));
+    else
+        printf("%s: %zu error%s", path, errors, text_plural(errors));
+    if (warnings > 0) printf(", %zu warning%s", warnings, text_plural(warnings));
+    printf("\n");
+}
+
+typedef struct {
+    SceneOptions scene_options;
+    bool as_json, is_one_of_several;
+    uint32_t object; // UINT32_MAX if not given
+} CheckOptions;
+
+// Reports a scene. Returns false, with messages printed, if it is not valid.
+static bool scene_check(const CheckOptions *options, const char *path)
+{
+    Scene scene = {0};
+    MessageList messages = {0};
+    bool loaded = scene_load(&scene, path, &options->scene_options, &messages) &&
+                  images_are_there(&scene, &messages) && scene_renders(&scene, &messages);
+    if (options->as_json) {
+        json_report(path, &scene, loaded, &messages);
+        message_list_free(&messages);
+    } else {
+        if (options->is_one_of_several) line_print(path, &scene, loaded, &messages);
+        messages_print(&messages, path);
+        if (loaded && options->object != UINT32_MAX) {
+            loaded = object_print(&scene, path, options->object);
+        } else if (loaded && !options->is_one_of_several) {
+            SceneFacts facts = facts_of(&scene);
+            text_print(path, &scene, &facts);
+        }
+    }
+    scene_free(&scene);
+    return loaded;
+}
+
 int command_check(int argument_count, char **arguments)
 {
-    SceneOptions scene_options = {0};
-    bool as_json = false;
-    uint32_t object = UINT32_MAX; // UINT32_MAX if not given
+    CheckOptions options = {.object = UINT32_MAX};
     int option;
     while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
         switch (option) {
         case OPTION_JSON:
-            as_json = true;
+            options.as_json = true;
             break;
         case OPTION_OBJECT:
-            if (!option_count("object", optarg, 0, UINT32_MAX - 1, &object)) return EXIT_USER;
+            if (!option_count("object", optarg, 0, UINT32_MAX - 1, &options.object)) return EXIT_USER;
             break;
         case OPTION_LENIENT:
-            scene_options.lenient = true;
+            options.scene_options.lenient = true;
             break;
         case 'h':
             return option_help(help_text);
@@ -217,26 +260,14 @@ int command_check(int argument_count, char **arguments)
             return EXIT_USER;
         }
     }
-    if (!option_only_scene("check", argument_count, arguments)) return EXIT_USER;
-    if (as_json && object != UINT32_MAX)
+    if (optind == argument_count) return option_usage_fault("check", "no scene given");
+    if (options.as_json && options.object != UINT32_MAX)
         return option_usage_fault("check", "--object cannot be combined with --json");
-    const char *path = arguments[optind];
-    Scene scene = {0};
-    MessageList messages = {0};
-    bool loaded = scene_load(&scene, path, &scene_options, &messages) &&
-                  images_are_there(&scene, &messages) && scene_renders(&scene, &messages);
-    if (as_json) {
-        json_report(path, &scene, loaded, &messages);
-        message_list_free(&messages);
-    } else {
-        messages_print(&messages, path);
-        if (loaded && object != UINT32_MAX) {
-            loaded = object_print(&scene, path, object);
-        } else if (loaded) {
-            SceneFacts facts = facts_of(&scene);
-            text_print(path, &scene, &facts);
-        }
-    }
-    scene_free(&scene);
-    return loaded ? EXIT_DONE : EXIT_USER;
+    options.is_one_of_several = argument_count - optind > 1;
+    if (options.is_one_of_several && (options.as_json || options.object != UINT32_MAX))
+        return option_usage_fault("check", "--json and --object take one scene, but several are given");
+    int status = EXIT_DONE;
+    for (int i = optind; i < argument_count; i++)
+        if (!scene_check(&options, arguments[i])) status = EXIT_USER;
+    return status;
 }

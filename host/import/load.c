@@ -30,7 +30,8 @@ static bool scene_read(Scene *scene, const Source *source, const SceneOptions *o
     if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
     if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
     if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
-    if (ends_with(source->file, ".yaml") || ends_with(source->file, ".yml"))
+    if (ends_with(source->file, ".yaml") || ends_with(source->file, ".yml") ||
+        ends_with(source->file, ".json"))
         return scene_read_yaml(scene, source, options, messages);
     return scene_read_dat(scene, source, messages);
 }
@@ -51,18 +52,29 @@ static bool begins_dat(const char *path)
     return length - at >= strlen(begin) && strncasecmp(text + at, begin, strlen(begin)) == 0;
 }
 
-bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+static bool has_scene_ending(const char *path)
 {
-    static const char *const endings[] = {".yaml", ".yml", ".rt", ".cfg", ".nff", ".dat"};
-    *scene = (Scene){0};
+    static const char *const endings[] = {".yaml", ".yml", ".json", ".rt", ".cfg", ".nff", ".dat"};
     bool is_known = false;
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
         is_known |= ends_with(path, endings[i]);
+    return is_known;
+}
+
+bool scene_is_known(const char *path)
+{
+    return has_scene_ending(path) || mesh_is_known(path);
+}
+
+bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+{
+    *scene = (Scene){0};
+    const bool is_known = has_scene_ending(path);
     if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
     if (!is_known && !begins_dat(path))
         return message_error(
             messages,
-            "%s: a scene's name ends in .yaml, .yml, .rt, .cfg, .nff or .dat, or in a mesh's, such as "
+            "%s: a scene's name ends in .yaml, .yml, .json, .rt, .cfg, .nff or .dat, or in a mesh's, such as "
             ".obj, .ply, .stl, .gltf, .glb, .fbx, .dae",
             path);
     Text text = {0};

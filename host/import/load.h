@@ -16,9 +16,12 @@ typedef struct {
     const char *mesh_program;
 } SceneOptions;
 
-// Reads a scene. Its ending gives the format (.yaml .yml .rt .cfg .nff .dat, or one of a mesh), or its first
-// word that of .dat. On a mistake in the file returns false with errors in `messages` and an empty scene.
-// Warnings may be added in either case.
+// Returns whether the name's ending is that of a scene or a mesh that glint reads.
+bool scene_is_known(const char *path);
+
+// Reads a scene. Its ending gives the format (.yaml .yml .json .rt .cfg .nff .dat, or one of a mesh), or its
+// first word that of .dat. On a mistake in the file returns false with errors in `messages` and an empty
+// scene. Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
 // The readers, from memory; `source->file` is used in messages only.

@@ -58,13 +58,16 @@ static size_t indentation(const Source *source, size_t offset)
 
 static void up_insert(Copy *copy, const CameraFile *file, const YamlNode *key, Vector3 up)
 {
-    copy_until(copy, key->offset);
-    text_appendf(copy->text, "up: ");
+    const char *before = copy->source->bytes + key->offset - 1; // a quoted key's offset is behind its quote
+    const bool is_quoted = *before == '"' || *before == '\'';
+    const size_t offset = key->offset - is_quoted;
+    copy_until(copy, offset);
+    text_appendf(copy->text, is_quoted ? "\"up\": " : "up: ");
     vector_write_yaml(copy->text, up);
     if (copy->source->bytes[file->camera->offset] == '{')
         text_appendf(copy->text, ", ");
     else
-        text_appendf(copy->text, "\n%*s", (int)indentation(copy->source, key->offset), "");
+        text_appendf(copy->text, "\n%*s", (int)indentation(copy->source, offset), "");
 }
 
 // Whether the value of a key has changed and must be written.

@@ -1,6 +1,6 @@
 # Completion of glint for bash. The commands and options are those that --help lists.
 
-_glint_commands() { glint --help | sed -n 's/^  \([a-z]*\)  .*/\1/p'; }
+_glint_commands() { glint --help | sed -n 's/^  \([a-z][a-z]*\)  .*/\1/p'; }
 
 _glint_options() {
     glint "$1" --help | sed -n 's/^ *\(-.*\)/\1/p' | sed 's/  .*//' | grep -oE -e '--?[a-zA-Z][a-z-]*'
@@ -14,7 +14,8 @@ _glint() {
     local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} subcommand=${COMP_WORDS[1]} words=
     COMPREPLY=()
     if [ "$COMP_CWORD" -eq 1 ]; then
-        mapfile -t COMPREPLY < <(compgen -W "$(_glint_commands) --version --help" -- "$word")
+        compopt -o filenames 2>/dev/null
+        mapfile -t COMPREPLY < <(compgen -W "$(_glint_commands) --version --help" -- "$word"; compgen -f -- "$word")
         return
     fi
     # bash splits --option=value into three words.

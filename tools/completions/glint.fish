@@ -20,6 +20,7 @@ end
 
 complete -c glint -f
 complete -c glint -n __fish_use_subcommand -a '(glint --help | string replace -rf "^  (\w+)  +(.*)" "\$1\t\$2")'
+complete -c glint -n __fish_use_subcommand -F
 complete -c glint -n 'not __fish_use_subcommand; and string match -q -- "-*" (commandline -ct)' -a '(__glint_options)'
 complete -c glint -n 'not __fish_use_subcommand; and not __glint_after --precision --lanes --bvh --bits --transfer --aov' -F
 complete -c glint -n '__glint_after --precision' -a '(__glint_precisions)'

@@ -4,8 +4,9 @@
 _glint() {
     local -a found
     if ((CURRENT == 2)); then
-        found=(${(f)"$(glint --help | sed -n 's/^  \([a-z]*\)  *\(.*\)/\1:\2/p')"})
+        found=(${(f)"$(glint --help | sed -n 's/^  \([a-z][a-z]*\)  *\(.*\)/\1:\2/p')"})
         _describe command found
+        _files
         return
     fi
     local option=$words[CURRENT-1]
