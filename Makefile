@@ -365,4 +365,4 @@ clean:
 .PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements library wheel install install-library uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)
+-include $(objects:.o=.d) $(window_objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)
