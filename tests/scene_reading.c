@@ -20,8 +20,17 @@ bool scene_read_text(Scene *scene, const char *name, const Text *text, bool leni
     return scene_read_yaml(scene, &source, &options, messages);
 }
 
+bool scene_read_set(Scene *scene, const char *name, const Text *text, const char *const *overrides,
+                    size_t count, MessageList *messages)
+{
+    const Source source = {.file = name, .bytes = text_c(text), .length = text->count};
+    const SceneOptions options = {.overrides = overrides, .override_count = count};
+    return scene_read_yaml(scene, &source, &options, messages);
+}
+
 void message_describe(Text *description, const Message *message)
 {
+    if (message->file && !strcmp(message->file, "--set")) text_appendf(description, "--set:");
     if (message->line) text_appendf(description, "%u:%u: ", message->line, message->column);
     text_appendf(description, "%s: %s\n", message->severity == MESSAGE_ERROR ? "error" : "warning",
                  message->text);

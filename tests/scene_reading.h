@@ -6,9 +6,12 @@
 
 // Reads with the reader for the ending of `name`.
 bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages);
+// Reads a YAML scene with values that replace its own.
+bool scene_read_set(Scene *scene, const char *name, const Text *text, const char *const *overrides,
+                    size_t count, MessageList *messages);
 
 // Describes a message as tests write it: `line:column: severity: text`, or only the severity and text if it
-// has no place.
+// has no place. A place in a --set is `--set:line:column`.
 void message_describe(Text *description, const Message *message);
 
 // Returns all messages that a text gets, one per line. Fails the test if they disagree with whether the scene

@@ -153,6 +153,8 @@ for line in worker.stdout:
         rows = self.json("bench sphere.yaml pipe.yaml other.yaml --size 8x8 --seconds 0.01 --json", input=SPHERE)["runs"]
         self.assertEqual(rows[0]["scene_hash"], rows[1]["scene_hash"])
         self.assertNotEqual(rows[0]["scene_hash"], rows[2]["scene_hash"])
+        changed = self.json("bench sphere.yaml --set camera.fov=61 --size 8x8 --seconds 0.01 --json")["runs"]
+        self.assertNotEqual(rows[0]["scene_hash"], changed[0]["scene_hash"])
 
     def test_refused(self):
         for arguments, word in (

@@ -119,7 +119,8 @@ class Checkpoints(TestCase):
         self.end_early()
         saved = Path("saved").read_bytes()
         write("other.yaml", SPHERE.replace("radius: 1", "radius: 1.01"))
-        for command, reason in ((RENDER.replace("sphere", "other"), "scene"), (RENDER.replace("256", "128"), "size"),
+        for command, reason in ((RENDER.replace("sphere", "other"), "scene"), (f"{RENDER} --set objects[0].sphere.radius=1.01", "scene"),
+                                (RENDER.replace("256", "128"), "size"),
                                 (RENDER.replace("strict", "single"), "precision"), (RENDER.replace("100", "99"), "samples"),
                                 (f"{RENDER} --region 0,0,64,64", "region"), (f"{RENDER} --bounces 3", "bounces"),
                                 (f"{RENDER} --aov t", "AOVs"), (f"{RENDER} --perturb 1", "perturb"),

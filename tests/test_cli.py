@@ -40,6 +40,10 @@ WRONG_COMMAND_LINES = [
     ("--region: expected",
      "render sphere.yaml --region {1,2,3|1,2,3,4,5|1,2,0,4|1,2,3,0|-1,0,2,2|a,b,c,d|1,2,3,4x|9999999999,0,1,1}"),
     ("--region: .*8x6", "render sphere.yaml --size 8x6 --region {0,0,9,1|0,0,1,7|8,0,1,1|0,6,1,1|99999,0,1,1}"),
+    ("^--set:1:12: error: 'fov' must be a number, not '6O'$",
+     "{render|trace --rays rays|check|bench|accuracy|certify} sphere.yaml --set camera.fov=6O"),
+    ("s.rt: --set needs a YAML scene", "{render|check} s.rt --set camera.fov=60"),
+    ("--set: may be given at most 64 times", "check sphere.yaml" + 65 * " --set camera.fov=60"),
     ('--bits: .*"12"', "render sphere.yaml --bits 12"),
     ('--transfer: .*"srbg".*did you mean srgb', "render sphere.yaml --transfer srbg"),
     ('--timing: .*"jsn".*did you mean json', "render sphere.yaml --timing=jsn"),
@@ -88,6 +92,7 @@ class CliTestCase(TestCase):
         super().setUp()
         write("sphere.yaml", SPHERE)
         write("notes", "not a scene\n")
+        write("s.rt", "")
         os.makedirs("folder", exist_ok=True)
         write("rays", "0 0 -4  0 0 1\n")
 
@@ -322,6 +327,21 @@ class Images(CliTestCase):
         for scene in "s.yaml", "s.json", "./s.yaml":
             self.glint(f"{scene} {SMALL} -o alone.ppm")
             self.assertEqual(Path("alone.ppm").read_bytes(), Path("command.ppm").read_bytes(), scene)
+
+    def test_values_are_set(self):
+        """The image is that of a scene with these values, and the file names them."""
+        write("small.yaml", SPHERE.replace("fov: 60", "fov: 40").replace("radius: 1", "radius: 0.5, material: {color: [1, 0, 0]}"))
+        self.glint(f"render small.yaml {SMALL} -o small.png")
+        values = "camera.fov=40", "objects[0].sphere.radius=0.5", "objects[0].sphere.material={color: red}"
+        options = " ".join(f"--set '{value}'" for value in values)
+        self.glint(f"render sphere.yaml {SMALL} {options} -o set.png")
+        _, rows, texts, _ = png_read("set.png")
+        self.assertEqual(rows, png_read("small.png")[1])
+        self.assertEqual(texts["Set"], "\n".join(values))
+        trace = "trace {} --rays rays"
+        self.assertEqual(self.glint(f"{trace.format('sphere.yaml')} {options}").stdout, self.glint(trace.format("small.yaml")).stdout)
+        bounds = "bounds +-0.5 -0.5 -0.5"
+        self.assertRegex(self.glint(f"check sphere.yaml {options}").stdout, bounds)
 
     def test_several_scenes(self):
         self.glint(f"render sphere.yaml {SMALL} -o one.png")

@@ -1,5 +1,5 @@
 // Every scene in tests/broken gets exactly the messages in the file next to it, and every message has such a
-// scene.
+// scene. The lines of NAME.set, if there is one, are its overrides.
 #include "host/base/array.h"
 #include "host/import/load.h"
 #include "tests/scene_reading.h"
@@ -10,6 +10,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include <cmocka.h>
 
@@ -32,18 +33,40 @@ static bool name_ends_with(const char *name, const char *ending)
     return length > ending_length && !strcmp(name + length - ending_length, ending);
 }
 
+enum { SETS_MAX = 40 };
+
+// Reads the scene with the lines of `path` as overrides.
+static bool scene_read_lines(Scene *scene, const char *name, const Text *text, const char *path,
+                             MessageList *messages)
+{
+    Text lines = file_text(path);
+    const char *overrides[SETS_MAX];
+    size_t count = 0;
+    for (char *line = lines.items, *rest; (line = strtok_r(line, "\n", &rest)); line = NULL) {
+        assert_true(count < SETS_MAX);
+        overrides[count++] = line;
+    }
+    const bool read = scene_read_set(scene, name, text, overrides, count, messages);
+    text_free(&lines);
+    return read;
+}
+
 static void check_scene(const char *folder, const char *name)
 {
-    Text path = {0}, expected_path = {0}, got = {0};
+    Text path = {0}, expected_path = {0}, set_path = {0}, got = {0};
     text_appendf(&path, "%s/%s", folder, name);
     text_append(&expected_path, path.items, (size_t)(strrchr(path.items, '.') - path.items));
+    text_append(&set_path, expected_path.items, expected_path.count);
     text_appendf(&expected_path, ".expected");
+    text_appendf(&set_path, ".set");
     Text text = file_text(text_c(&path)), expected = file_text(text_c(&expected_path));
     text_append(&all_expected, text_c(&expected), expected.count);
 
     MessageList messages = {0};
     Scene scene;
-    bool read = scene_read_text(&scene, name, &text, false, &messages);
+    bool read = access(text_c(&set_path), F_OK) == 0
+                    ? scene_read_lines(&scene, name, &text, text_c(&set_path), &messages)
+                    : scene_read_text(&scene, name, &text, false, &messages);
     for (size_t i = 0; i < messages.count; i++)
         message_describe(&got, &messages.items[i]);
     if (read || strcmp(text_c(&got), text_c(&expected)) != 0)
@@ -52,6 +75,7 @@ static void check_scene(const char *folder, const char *name)
     message_list_free(&messages);
     text_free(&path);
     text_free(&expected_path);
+    text_free(&set_path);
     text_free(&got);
     text_free(&text);
     text_free(&expected);

@@ -290,6 +290,108 @@ static void test_colors(void **state)
     scene_free(&scene);
 }
 
+static Scene scene_of_set(const char *text, const char *const *overrides, size_t count)
+{
+    Text source = {0};
+    text_appendf(&source, "%s", text);
+    MessageList messages = {0};
+    Scene scene;
+    assert_true(scene_read_set(&scene, "s.yaml", &source, overrides, count, &messages));
+    message_list_free(&messages);
+    text_free(&source);
+    return scene;
+}
+
+#define SET(text, ...)                                                                                       \
+    scene_of_set(text, (const char *const[]){__VA_ARGS__},                                                   \
+                 sizeof(const char *[]){__VA_ARGS__} / sizeof(char *))
+
+static void test_values_are_set(void **state)
+{
+    (void)state;
+    Scene scene =
+        SET(LIT SPHERE, "camera.fov=60", "ambient=#f00", "background= 0.5", "camera.fov=40",
+            "objects[0].sphere.radius=3", "lights[0].point={position: [1, 2, 3], color: red}",
+            "materials={red: {color: red}, 'a.b': {}}", "materials.'a.b'.color=[0, 0.5, 0]",
+            "objects[0].sphere.material=red", "objects[1]=plane: {point: [0, -1, 0], normal: [0, 1, 0]}",
+            "objects[1].plane.material=\"a.b\"", "lights[1]={directional: {direction: [0, -1, 0]}}");
+    assert_number(scene.camera.half_tangent, tan(20 * M_PI / 180));
+    assert_vector(scene.ambient, 1, 0, 0);
+    assert_vector(scene.background, 0.5, 0.5, 0.5);
+    assert_int_equal(scene.objects.count, 2);
+    assert_number(scene.objects.items[0].as.sphere.radius, 3);
+    assert_int_equal(scene.objects.items[0].line, 5);
+    assert_int_equal(scene.objects.items[1].line, 0);
+    assert_int_equal(scene.lights.count, 2);
+    assert_vector(scene.lights.items[0].position, 1, 2, 3);
+    assert_vector(scene.materials.items[scene.objects.items[0].material].color, 1, 0, 0);
+    assert_vector(scene.materials.items[scene.objects.items[1].material].color, 0, 0.5, 0);
+    scene_free(&scene);
+}
+
+static void test_values_are_removed(void **state)
+{
+    (void)state;
+    Scene scene =
+        SET("camera: {position: [0, 0, -5], look_at: [0, 0, 0], focal_length: 1, frame: [2, 1]}\n"
+            "lights: [{point: {position: [0, 9, 0]}}]\n"
+            "objects: [{sphere: {center: [0, 0, 0], radius: 1}}, {sphere: {center: [1, 0, 0], radius: 2}},\n"
+            "  {sphere: {center: [0, 0, 0], radius: 3}}]\n",
+            "camera.frame=", "camera.focal_length=", "camera.fov=40",
+            "objects[1]=", "objects[0]= ", "lights=", "objects[1]={box: {min: [0, 0, 0], max: [1, 1, 1]}}");
+    assert_int_equal(scene.camera.field_axis, FIELD_VERTICAL);
+    assert_int_equal(scene.objects.count, 2);
+    assert_number(scene.objects.items[0].as.sphere.radius, 3);
+    assert_int_equal(scene.objects.items[1].kind, SHAPE_BOX);
+    assert_int_equal(scene.lights.count, 0);
+    scene_free(&scene);
+}
+
+// What is set through one of several names of the same nodes changes under that name alone.
+static void test_aliases_keep_what_is_set_elsewhere(void **state)
+{
+    (void)state;
+    Scene scene = SET(LIT "materials:\n  a: &a {color: [0, 0, 1], ior: 2}\n  b: *a\n  c: *a\n"
+                          "objects:\n  - &s sphere: {center: [0, 0, 0], radius: 1}\n"
+                          "  - sphere: &t {center: [9, 9, 9], radius: 1}\n  - sphere: *t\n  - sphere: *t\n",
+                      "materials.b.color=red", "materials.a.ior=3", "materials.c.diffuse=0.5",
+                      "materials.b.ior=", "objects[2].sphere.center[1]=5", "objects[1].sphere.radius=7",
+                      "objects[3].sphere={center: &u [1, 2, 3], radius: 4, material: {diffuse: *u}}");
+    const Material *materials = scene.materials.items;
+    assert_vector(materials[0].color, 0, 0, 1);
+    assert_vector(materials[1].color, 1, 0, 0);
+    assert_vector(materials[2].color, 0, 0, 1);
+    assert_number(materials[0].ior, 3);
+    assert_number(materials[1].ior, 1.5);
+    assert_number(materials[2].ior, 2);
+    assert_number(materials[1].diffuse.x, 1);
+    assert_number(materials[2].diffuse.x, 0.5);
+    const Object *objects = scene.objects.items;
+    assert_vector(objects[1].as.sphere.center, 9, 9, 9);
+    assert_vector(objects[2].as.sphere.center, 9, 5, 9);
+    assert_number(objects[1].as.sphere.radius, 7);
+    assert_number(objects[2].as.sphere.radius, 1);
+    assert_vector(materials[objects[3].material].diffuse, 1, 2, 3);
+    scene_free(&scene);
+}
+
+// A message about a texture that was set points into the override's text, which the scene keeps.
+static void test_textures_that_are_set_have_a_place(void **state)
+{
+    (void)state;
+    Scene scene = SET(LIT SPHERE, "ambient=1", "objects[0].sphere.material={image: a.png}");
+    const Source source = scene_source(&scene);
+    MessageList messages = {0};
+    message_add_at(&messages, MESSAGE_ERROR, &source, scene.textures.items[0].offset, "lost");
+    Text described = {0};
+    message_describe(&described, &messages.items[0]);
+    assert_string_equal(text_c(&described), "--set:1:36: error: lost\n");
+    assert_string_equal(messages.items[0].source_line, "objects[0].sphere.material={image: a.png}");
+    text_free(&described);
+    message_list_free(&messages);
+    scene_free(&scene);
+}
+
 static void test_layers_of_images(void **state)
 {
     (void)state;
@@ -376,6 +478,10 @@ int main(void)
         cmocka_unit_test(test_names_in_every_style),
         cmocka_unit_test(test_tiny_numbers_are_zero),
         cmocka_unit_test(test_colors),
+        cmocka_unit_test(test_values_are_set),
+        cmocka_unit_test(test_values_are_removed),
+        cmocka_unit_test(test_aliases_keep_what_is_set_elsewhere),
+        cmocka_unit_test(test_textures_that_are_set_have_a_place),
         cmocka_unit_test(test_layers_of_images),
         cmocka_unit_test(test_materials_may_follow_objects),
         cmocka_unit_test(test_warnings),

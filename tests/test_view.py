@@ -353,6 +353,14 @@ class View(TestCase):
         window.shows_at_last(self.image_of(re.sub("^camera: .*", camera, SCENE)))
         window.close()
 
+    def test_reload_keeps_what_is_set(self):
+        window = Window(self, options="--set background=red")
+        window.shows_at_last(self.image_of(SCENE.replace("[0.125, 0.25, 0.5]", "[1, 0, 0]")))
+        changed = SCENE.replace("[0.9, 0.8, 0.7]", "[0.1, 0.8, 0.7]")
+        write("scene.yaml", changed)
+        window.shows_at_last(self.image_of(changed.replace("[0.125, 0.25, 0.5]", "[1, 0, 0]")))
+        window.close()
+
     def test_reload_of_an_image(self):
         """One that breaks leaves the last scene, which can be moved and saved."""
         text = SCENE + "  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {image: image.png}}\n"

@@ -79,6 +79,8 @@ bool message_error(MessageList *list, const char *format, ...)
 static Message message_place(const Source *source, size_t offset)
 {
     Message message = {0};
+    for (; source->next && offset > source->length && offset != MESSAGE_WHOLE_FILE; source = source->next)
+        offset -= source->length + 1;
     if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
     if (offset == MESSAGE_WHOLE_FILE) return message;
     if (offset > source->length) offset = source->length;

@@ -22,10 +22,12 @@ typedef struct {
 } MessageList;
 
 // The text in memory that a message points into, so that its line can be shown with a caret.
-typedef struct {
+typedef struct Source {
     const char *file;
     const char *bytes;
     size_t length;
+    // A text that follows, whose offsets begin at length + 1, or NULL.
+    struct Source *next;
 } Source;
 
 // Add a message without a file. The function for errors returns false, so that its caller can return that.

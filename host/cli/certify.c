@@ -25,6 +25,7 @@ static const struct option long_options[] = {
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     FORMAT_LONG_OPTIONS,
     COMMON_LONG_OPTIONS,
+    SET_LONG_OPTION,
     PERTURB_LONG_OPTION,
     REFERENCE_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
@@ -40,7 +41,7 @@ static const char help_text[] =
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of single, strict, double, certified (default: all that fit)\n" //
-    HELP_BOUNCES HELP_DEVICE HELP_REFERENCE HELP_LANES                                       //
+    HELP_BOUNCES HELP_SET HELP_DEVICE HELP_REFERENCE HELP_LANES                              //
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n"   //
     HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_FORMAT HELP_HELP;
 

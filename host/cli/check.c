@@ -22,6 +22,7 @@ static const struct option long_options[] = {
     {"json", no_argument, NULL, OPTION_JSON},
     {"object", required_argument, NULL, OPTION_OBJECT},
     {"lenient", no_argument, NULL, OPTION_LENIENT},
+    SET_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -31,7 +32,7 @@ static const char help_text[] = "usage: glint check SCENE... [OPTIONS]\n\n"
                                 "and warns of what is ignored. Of several scenes it prints one line each.\n\n"
                                 "      --object ID       print one object and its line; IDs are those of "
                                 "glint trace\n" //
-    HELP_JSON HELP_LENIENT HELP_HELP;
+    HELP_SET HELP_JSON HELP_LENIENT HELP_HELP;
 
 typedef struct {
     size_t shapes[SHAPE_COUNT], mesh_triangle_count, unbounded_count;
@@ -210,7 +211,7 @@ static void line_print(const char *path, const Scene *scene, bool loaded, const 
 }
 
 typedef struct {
-    SceneOptions scene_options;
+    CommonOptions common;
     bool as_json, is_one_of_several;
     uint32_t object; // UINT32_MAX if not given
 } CheckOptions;
@@ -220,7 +221,8 @@ static bool scene_check(const CheckOptions *options, const char *path)
 {
     Scene scene = {0};
     MessageList messages = {0};
-    bool loaded = scene_load(&scene, path, &options->scene_options, &messages) &&
+    const SceneOptions scene_options = scene_options_of(&options->common);
+    bool loaded = scene_load(&scene, path, &scene_options, &messages) &&
                   images_are_there(&scene, &messages) && scene_renders(&scene, &messages);
     if (options->as_json) {
         json_report(path, &scene, loaded, &messages);
@@ -242,6 +244,7 @@ static bool scene_check(const CheckOptions *options, const char *path)
 int command_check(int argument_count, char **arguments)
 {
     CheckOptions options = {.object = UINT32_MAX};
+    bool valid;
     int option;
     while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
         switch (option) {
@@ -251,13 +254,10 @@ int command_check(int argument_count, char **arguments)
         case OPTION_OBJECT:
             if (!option_count("object", optarg, 0, UINT32_MAX - 1, &options.object)) return EXIT_USER;
             break;
-        case OPTION_LENIENT:
-            options.scene_options.lenient = true;
-            break;
         case 'h':
             return option_help(help_text);
         default:
-            return EXIT_USER;
+            if (!option_common(&options.common, option, optarg, &valid) || !valid) return EXIT_USER;
         }
     }
     if (optind == argument_count) return option_usage_fault("check", "no scene given");

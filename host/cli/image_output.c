@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOTE_COUNT_MAX = 16 };
+enum { NOTE_COUNT_MAX = 24 };
 
 typedef struct {
     void *items;
@@ -167,6 +167,12 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     } while (0)
     NOTE("Software", "glint %s", glint_version());
     NOTE("Scene", "%s", slash ? slash + 1 : output->scene_path);
+    if (output->scene->overrides) {
+        text_free(&value);
+        for (const Source *set = output->scene->overrides; set; set = set->next)
+            text_appendf(&value, "%s%s", set->bytes, set->next ? "\n" : "");
+        notes_add(notes, "Set", text_c(&value));
+    }
     NOTE_EACH("Device", "%s", report->device->name);
     NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
     NOTE("Precision", "%s", precision_names[settings->precision]);

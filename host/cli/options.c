@@ -1,6 +1,5 @@
 #include "host/cli/options.h"
 #include "host/image/image.h"
-#include "host/import/load.h"
 
 #include "host/base/array.h"
 #include "host/base/fault.h"
@@ -109,6 +108,16 @@ static bool perturb_read(const char *value, CommonOptions *common)
     return true;
 }
 
+static bool override_add(CommonOptions *common, const char *value)
+{
+    if (common->override_count == OVERRIDES_MAX) {
+        fprintf(stderr, "glint: --set: may be given at most %d times\n", OVERRIDES_MAX);
+        return false;
+    }
+    common->overrides[common->override_count++] = value;
+    return true;
+}
+
 static void choices_print(const char *const *names, size_t count, const char *value)
 {
     for (size_t i = 0; i < count; i++)
@@ -200,6 +209,9 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     case OPTION_LENIENT:
         common->lenient = true;
         return true;
+    case OPTION_SET:
+        *valid = override_add(common, value);
+        return true;
     case OPTION_MAX_PIXELS:
         *valid = option_max_pixels(value);
         return true;
@@ -252,10 +264,17 @@ void messages_print(MessageList *messages, const char *path)
     message_list_free(messages);
 }
 
+SceneOptions scene_options_of(const CommonOptions *common)
+{
+    return (SceneOptions){
+        .lenient = common->lenient, .overrides = common->overrides, .override_count = common->override_count};
+}
+
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
 {
     MessageList messages = {0};
-    bool loaded = scene_load(scene, path, &(SceneOptions){.lenient = common->lenient}, &messages);
+    const SceneOptions options = scene_options_of(common);
+    bool loaded = scene_load(scene, path, &options, &messages);
     messages_print(&messages, path);
     return loaded;
 }

@@ -1,6 +1,7 @@
 // Reads option values, opens devices and loads scenes for all commands.
 #pragma once
 
+#include "host/import/load.h"
 #include "host/measure/error_budget.h"
 #include "host/opencl/compute.h"
 #include "host/render/renderer.h"
@@ -8,6 +9,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+enum { OVERRIDES_MAX = 64 };
 
 // The options of every command that uses a device.
 typedef struct {
@@ -20,6 +23,8 @@ typedef struct {
     uint32_t perturb_seed, perturb_scale; // 0 if not given
     const char *build_options;            // NULL if not given
     uint32_t work_group[2];               // 0 if not given
+    const char *overrides[OVERRIDES_MAX]; // --set, in order
+    size_t override_count;
 } CommonOptions;
 
 // getopt_long values of long options. A command's other options start at OPTION_OWN.
@@ -30,6 +35,7 @@ enum {
     OPTION_BVH,
     OPTION_NO_CACHE,
     OPTION_LENIENT,
+    OPTION_SET,
     OPTION_MAX_PIXELS,
     OPTION_PERTURB,
     OPTION_REFERENCE_DEVICE,
@@ -46,6 +52,12 @@ enum {
         {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
     {                                                                                                        \
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
+    }
+
+// The option of commands whose scenes' values can be set.
+#define SET_LONG_OPTION                                                                                      \
+    {                                                                                                        \
+        "set", required_argument, NULL, OPTION_SET                                                           \
     }
 
 // The option of commands that render or trace.
@@ -78,8 +90,10 @@ enum {
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
 #define HELP_BOUNCES                                                                                         \
     "      --bounces N       reflections and refractions of a ray: at most N, up to 255 (default: 5)\n"
-#define HELP_NO_CACHE   "      --no-cache        ignore the kernel cache\n"
-#define HELP_LENIENT    "      --lenient         skip unknown elements of .rt files with a warning\n"
+#define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
+#define HELP_LENIENT  "      --lenient         skip unknown elements of .rt files with a warning\n"
+#define HELP_SET                                                                                             \
+    "      --set PATH=VALUE  set a value of YAML scenes, such as camera.fov=60; may be repeated\n"
 #define HELP_MAX_PIXELS "      --max-pixels N    of an image that is read (default: 134217728)\n"
 #define HELP_PERTURB                                                                                         \
     "      --perturb SEED[:SCALE]\n"                                                                         \
@@ -146,6 +160,8 @@ int option_usage_fault(const char *command, const char *what);
 // or superfluous.
 bool option_only_scene(const char *command, int argument_count, char **arguments);
 
+// Returns the options that scenes are read with. They refer to `common`.
+SceneOptions scene_options_of(const CommonOptions *common);
 // Loads the scene and prints its messages. Returns false, with nothing to free, if it cannot be read.
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
 // Prints and frees messages. Errors in an .rt file follow the line `Error` that miniRT's testers expect.

@@ -270,7 +270,8 @@ static bool scene_is_overwritten(RenderOptions options, const char *path, char *
     Scene scene = {0};
     MessageList ignored = {0};
     bool is_overwritten = false;
-    if (scene_load(&scene, path, &(SceneOptions){.lenient = options.common.lenient}, &ignored))
+    const SceneOptions scene_options = scene_options_of(&options.common);
+    if (scene_load(&scene, path, &scene_options, &ignored))
         for (size_t i = 0; i < options.scene_count && !is_overwritten; i++) {
             options.output.path = images[i];
             is_overwritten = image_output_overwrites_scene(&options.output, &scene, path);

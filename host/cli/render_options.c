@@ -34,6 +34,7 @@ static const struct option long_options[] = {
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
+    SET_LONG_OPTION,
     PERTURB_LONG_OPTION,
     DRIVER_LONG_OPTIONS,
     REFERENCE_LONG_OPTION,
@@ -47,7 +48,7 @@ static const char help_text[] =
     "usage: glint render SCENE... [OPTIONS]\n\n"
     "  -o, --output FILE     .png, .ppm, .exr or .npy; of several scenes their folder (default: each "
     "scene's\n"
-    "                        name with .png)\n"
+    "                        name with .png)\n" HELP_SET
     "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
     "      --region X,Y,W,H  render these pixels of the image only\n"

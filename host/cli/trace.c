@@ -21,6 +21,7 @@ static const struct option long_options[] = {
     {"rays", required_argument, NULL, OPTION_RAYS},
     {"output", required_argument, NULL, 'o'},
     COMMON_LONG_OPTIONS,
+    SET_LONG_OPTION,
     PERTURB_LONG_OPTION,
     DRIVER_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
@@ -38,7 +39,7 @@ static const char help_text[] =
     "decimal or C hexadecimal; - is\n"
     "                        standard input; # starts a comment\n"
     "  -o, --output FILE     CSV file (default: standard output)\n" //
-    HELP_DEVICE HELP_PRECISION                                      //
+    HELP_SET HELP_DEVICE HELP_PRECISION                             //
         HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
 typedef struct {

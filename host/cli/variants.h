@@ -37,9 +37,7 @@ enum {
         {"device", required_argument, NULL, OPTION_DEVICE},                                                  \
         {"reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE},                              \
         {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
-    {                                                                                                        \
-        "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
-    }
+        {"lenient", no_argument, NULL, OPTION_LENIENT}, SET_LONG_OPTION
 
 // The help of these options except --precision, whose default differs.
 #define HELP_VARIANTS                                                                                        \
@@ -47,7 +45,7 @@ enum {
     "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
     "      --size WxH        image size (default: as glint render)\n"                                        \
     "      --seconds MAX     time limit of the measurement, converged or not (default: 5 per "               \
-    "row)\n" HELP_DEVICE HELP_REFERENCE HELP_LENIENT HELP_MAX_PIXELS
+    "row)\n" HELP_SET HELP_DEVICE HELP_REFERENCE HELP_LENIENT HELP_MAX_PIXELS
 
 // Handles one of these options and sets *valid if its value is valid, else prints a message. Returns false if
 // `option` is not one of them.

@@ -9,7 +9,6 @@
 #include <getopt.h>
 #include <stdio.h>
 #include <string.h>
-#include <strings.h>
 
 enum { OPTION_SIZE = OPTION_OWN, OPTION_SAMPLES, OPTION_BOUNCES, OPTION_WRITE_CAMERA };
 
@@ -21,6 +20,7 @@ static const struct option long_options[] = {
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"write-camera", no_argument, NULL, OPTION_WRITE_CAMERA},
     COMMON_LONG_OPTIONS,
+    SET_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -30,7 +30,7 @@ static const char help_text[] =
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel, once the camera rests (default: 16)\n"                      //
     HELP_BOUNCES "      --write-camera    C writes the camera into the scene file, which is YAML\n" //
-    HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
+    HELP_SET HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
 
 typedef struct {
     CommonOptions common;
@@ -81,9 +81,7 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
     }
     if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
-    const char *ending = strrchr(options->scene, '.');
-    if (options->writes_camera &&
-        !(ending && (!strcasecmp(ending, ".yaml") || !strcasecmp(ending, ".yml")))) {
+    if (options->writes_camera && !scene_is_yaml(options->scene)) {
         fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", options->scene);
         return EXIT_USER;
     }
@@ -111,7 +109,7 @@ static int scene_view(ViewOptions *options, const Device *device)
     WindowOptions window = {
         .frames = {.device = device,
                    .scene_path = options->scene,
-                   .scene_options = {.lenient = options->common.lenient},
+                   .scene_options = scene_options_of(&options->common),
                    .settings = settings_whole(&options->common, options->width, options->height),
                    .save = image_save,
                    .save_context = options},

@@ -25,14 +25,17 @@ static bool ends_with(const char *path, const char *ending)
     return length > ending_length && !strcasecmp(path + length - ending_length, ending);
 }
 
+bool scene_is_yaml(const char *path)
+{
+    return ends_with(path, ".yaml") || ends_with(path, ".yml") || ends_with(path, ".json");
+}
+
 static bool scene_read(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
 {
     if (ends_with(source->file, ".rt")) return scene_read_rt(scene, source, options, messages);
     if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
     if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
-    if (ends_with(source->file, ".yaml") || ends_with(source->file, ".yml") ||
-        ends_with(source->file, ".json"))
-        return scene_read_yaml(scene, source, options, messages);
+    if (scene_is_yaml(source->file)) return scene_read_yaml(scene, source, options, messages);
     return scene_read_dat(scene, source, messages);
 }
 
@@ -54,8 +57,8 @@ static bool begins_dat(const char *path)
 
 static bool has_scene_ending(const char *path)
 {
-    static const char *const endings[] = {".yaml", ".yml", ".json", ".rt", ".cfg", ".nff", ".dat"};
-    bool is_known = false;
+    static const char *const endings[] = {".rt", ".cfg", ".nff", ".dat"};
+    bool is_known = scene_is_yaml(path);
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
         is_known |= ends_with(path, endings[i]);
     return is_known;
@@ -70,6 +73,9 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
 {
     *scene = (Scene){0};
     const bool is_known = has_scene_ending(path);
+    if (options->override_count > 0 && !scene_is_yaml(path))
+        return message_error(
+            messages, "%s: --set needs a YAML scene (.yaml, .yml or .json), whose values have names", path);
     if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
     if (!is_known && !begins_dat(path))
         return message_error(
@@ -84,6 +90,8 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
         Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         read = scene_read(scene, &source, options, messages);
         scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
+        for (const Source *set = scene->overrides; set; set = set->next)
+            scene->text_hash = hash_bytes(scene->text_hash, set->bytes, set->length + 1);
     }
     text_free(&text);
     return read;

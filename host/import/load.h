@@ -7,6 +7,10 @@
 
 typedef struct {
     bool lenient; // skip unknown elements of .rt with a warning
+    // Values that replace those of a YAML scene or are added to it, in order: PATH=VALUE, such as
+    // camera.fov=60.
+    const char *const *overrides;
+    size_t override_count;
     // Called with each mesh and image that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);
     void *context;
@@ -18,6 +22,8 @@ typedef struct {
 
 // Returns whether the name's ending is that of a scene or a mesh that glint reads.
 bool scene_is_known(const char *path);
+// Returns whether it is that of a YAML scene.
+bool scene_is_yaml(const char *path);
 
 // Reads a scene. Its ending gives the format (.yaml .yml .json .rt .cfg .nff .dat, or one of a mesh), or its
 // first word that of .dat. On a mistake in the file returns false with errors in `messages` and an empty

@@ -7,7 +7,7 @@
 
 Places places_open(const Source *source)
 {
-    Places places = {0};
+    Places places = {.source_length = source->length};
     for (size_t i = 0; i < source->length; i++)
         if (text_ends_line(source->bytes + i, source->length - i)) array_push(places.line_starts, i + 1);
     return places;
@@ -31,5 +31,6 @@ void places_note(Places *places, Scene *scene, size_t offset)
             end = middle;
     }
     for (; places->object_count < scene->objects.count; places->object_count++)
-        scene->objects.items[places->object_count].line = (uint32_t)first + 1;
+        scene->objects.items[places->object_count].line =
+            offset > places->source_length ? 0 : (uint32_t)first + 1;
 }

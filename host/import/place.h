@@ -10,10 +10,11 @@ typedef struct {
         size_t count, capacity;
     } line_starts;
     size_t object_count; // of the objects that have their lines
+    size_t source_length;
 } Places;
 
 Places places_open(const Source *source);
 void places_close(Places *places);
-// Sets the line of an offset in all objects that were added since the last call. Offsets may come in any
-// order, because an alias leads back to its target.
+// Sets the line of an offset, or 0 if it is beyond the source, in all objects that were added since the last
+// call. Offsets may come in any order, because an alias leads back to its target.
 void places_note(Places *places, Scene *scene, size_t offset);

@@ -129,12 +129,27 @@ void scene_free(Scene *scene)
     free(scene->textures.items);
     free(scene->file);
     text_free(&scene->text);
+    while (scene->overrides) {
+        Source *freed = scene->overrides;
+        scene->overrides = freed->next;
+        free((char *)freed->bytes);
+        free(freed);
+    }
     *scene = (Scene){0};
 }
 
 Source scene_source(const Scene *scene)
 {
-    return (Source){scene->file, text_c(&scene->text), scene->text.count};
+    return (Source){scene->file, text_c(&scene->text), scene->text.count, scene->overrides};
+}
+
+void scene_add_override(Scene *scene, const char *text)
+{
+    Source **end = &scene->overrides;
+    while (*end)
+        end = &(*end)->next;
+    *end = memory_allocate_zeroed(1, sizeof **end);
+    **end = (Source){.file = "--set", .bytes = memory_copy_text(text), .length = strlen(text)};
 }
 
 static bool is_same_file(const char *path, const struct stat *other)

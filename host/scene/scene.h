@@ -198,7 +198,8 @@ typedef struct {
     } textures;
     char *file;         // of a scene that has textures, and
     Text text;          // what was read from it: for messages about them, see scene_source
-    uint64_t text_hash; // of the file's bytes; hash_bytes
+    uint64_t text_hash; // of the file's bytes and the overrides; hash_bytes
+    Source *overrides;  // what replaced values of the file, PATH=VALUE each, in order; NULL if none
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;
@@ -220,6 +221,8 @@ void scene_add_object(Scene *scene, Object object, const Material *material);
 
 // Returns the source of messages about a scene that has images.
 Source scene_source(const Scene *scene);
+// Adds PATH=VALUE to the scene's overrides, which its reader applies.
+void scene_add_override(Scene *scene, const char *text);
 
 // Returns whether `path` is the file that the scene was read from, or one of its images or meshes, by
 // whatever name.

@@ -43,20 +43,25 @@ static const char *known_word(const char *word, const char *const *known, size_t
     return strlen(word) <= WORD_SHOWN ? text_nearest(word, known, known_count) : NULL;
 }
 
+void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count)
+{
+    const char *meant = known_word(word, known, known_count);
+    if (meant) text_appendf(text, ": did you mean '%.*s'?", WORD_SHOWN, meant);
+    if (known_count < 2 || known_count > LISTED_MAX) return;
+    text_appendf(text, meant ? " The choices are " : "; the choices are ");
+    for (size_t i = 0; i < known_count; i++)
+        text_appendf(text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, known[i]);
+}
+
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
                     size_t known_count)
 {
     const char *word = yaml_text(&reader->tree, node);
-    const char *meant = known_word(word, known, known_count);
-    Text text = {0};
-    text_appendf(&text, "unknown %s '%.*s'", kind, WORD_SHOWN, word);
-    if (meant) text_appendf(&text, ": did you mean '%.*s'?", WORD_SHOWN, meant);
-    const bool is_listed = known_count > 1 && known_count <= LISTED_MAX;
-    if (is_listed) text_appendf(&text, meant ? " The choices are " : "; the choices are ");
-    for (size_t i = 0; i < known_count && is_listed; i++)
-        text_appendf(&text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, known[i]);
-    report_error(&reader->report, node->offset, "%s", text_c(&text));
-    text_free(&text);
+    Text choices = {0};
+    choices_describe(&choices, word, known, known_count);
+    report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", kind, WORD_SHOWN, word,
+                 text_c(&choices));
+    text_free(&choices);
 }
 
 static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,

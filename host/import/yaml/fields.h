@@ -94,6 +94,9 @@ bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, si
 
 // Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
+// Appends the known word that `word` may stand for, if there is one, and the known words unless they are
+// many.
+void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count);
 // Reports `unknown kind 'word'`, with a suggestion if a known word is similar or means the same, and with the
 // known words unless they are many.
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,

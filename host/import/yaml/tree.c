@@ -119,6 +119,7 @@ static bool alias_append(TreeBuilder *builder, const char *name, size_t length, 
     YamlNode copy = builder->tree->nodes.items[anchor->node];
     copy.next = 0;
     node_append(builder, copy);
+    builder->tree->has_aliases = true;
     return true;
 }
 
@@ -190,8 +191,8 @@ static size_t place_offset(const Source *source, int line, int column)
     return at;
 }
 
-// `end`: how far the parser came, for the few errors it does not describe.
-static void syntax_report(struct fy_diag *diagnostics, Report *report, size_t end)
+// `parsed` is what the parser read, and `end` how far it came, for the few errors it does not describe.
+static void syntax_report(struct fy_diag *diagnostics, Report *report, const Source *parsed, size_t end)
 {
     if (errno == ENOMEM) fault("out of memory: reading %s%s", report->source->file, fault_limits());
     void *iterator = NULL;
@@ -200,7 +201,7 @@ static void syntax_report(struct fy_diag *diagnostics, Report *report, size_t en
         report_error(report, end, "not well-formed YAML");
         return;
     }
-    report_error(report, place_offset(report->source, error->line, error->column), "%s", error->msg);
+    report_error(report, place_offset(parsed, error->line, error->column), "%s", error->msg);
 }
 
 static void diagnostic_ignore(struct fy_diag *diag, void *user, const char *text, size_t length)
@@ -209,13 +210,13 @@ static void diagnostic_ignore(struct fy_diag *diag, void *user, const char *text
 }
 
 static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy_diag *diagnostics,
-                       Stage *stage)
+                       const Source *parsed, Stage *stage)
 {
     bool ended = false;
     while (!ended) {
         struct fy_event *event = fy_parser_parse(parser);
         if (!event) {
-            syntax_report(diagnostics, builder->report, builder->end);
+            syntax_report(diagnostics, builder->report, parsed, builder->end);
             return false;
         }
         ended = event->type == FYET_STREAM_END;
@@ -238,10 +239,10 @@ static bool source_is_text(const Source *source, Report *report)
     return true;
 }
 
-bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
+// Reads `parsed`, which is the report's source or as long.
+static bool source_read(YamlTree *tree, Report *report, const Source *parsed, Stage *stage)
 {
-    if (report->source->length > source_length_max)
-        return report_error(report, 0, "a scene of more than 2 GiB");
+    if (parsed->length > source_length_max) return report_error(report, 0, "a scene of more than 2 GiB");
     if (!source_is_text(report->source, report)) return false;
     struct fy_diag_cfg quiet;
     fy_diag_cfg_default(&quiet);
@@ -251,16 +252,33 @@ bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
     fy_diag_set_collect_errors(diagnostics, true);
     struct fy_parse_cfg settings = {.flags = FYPCF_DEFAULT_PARSE | FYPCF_JSON_NONE, .diag = diagnostics};
     struct fy_parser *parser = fy_parser_create(&settings);
-    if (!parser || fy_parser_set_string(parser, report->source->bytes, report->source->length))
+    if (!parser || fy_parser_set_string(parser, parsed->bytes, parsed->length))
         fault("libfyaml: cannot make a parser");
 
     TreeBuilder builder = {.tree = tree, .report = report};
     errno = 0;
-    bool built = tree_build(&builder, parser, diagnostics, stage);
+    bool built = tree_build(&builder, parser, diagnostics, parsed, stage);
     free(builder.anchors.items);
     fy_parser_destroy(parser);
     fy_diag_destroy(diagnostics);
     return built;
+}
+
+bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
+{
+    return source_read(tree, report, report->source, stage);
+}
+
+bool yaml_value_read(YamlTree *tree, Report *report, size_t start)
+{
+    const Source *source = report->source;
+    Text blanked = {0}; // in which all offsets are those of the source
+    text_append(&blanked, source->bytes, source->length);
+    memset(blanked.items, ' ', start);
+    const bool is_read =
+        source_read(tree, report, &(Source){.bytes = blanked.items, .length = blanked.count}, NULL);
+    text_free(&blanked);
+    return is_read;
 }
 
 void yaml_tree_free(YamlTree *tree)

@@ -26,11 +26,14 @@ typedef struct {
         size_t count, capacity;
     } nodes;    // root first
     Text texts; // of all scalars, each ended by a NUL
+    bool has_aliases;
 } YamlTree;
 
 // Reports errors and returns false if the text is malformed, empty, larger than 2 GiB, nested too deeply, or
 // has several documents or tags. The stage, which may be NULL, is set to the bytes that were read.
 bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage);
+// Reads the value that begins at a byte of the source, and skips the bytes before it.
+bool yaml_value_read(YamlTree *tree, Report *report, size_t start);
 void yaml_tree_free(YamlTree *tree);
 
 // Returns the next child, or NULL at the end. A mapping's children are key, value, key, value …

@@ -2,6 +2,7 @@
 #include "host/import/yaml/yaml.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
+#include "host/import/yaml/overrides.h"
 #include "host/scene/portable.h"
 
 #include <stdlib.h>
@@ -79,12 +80,16 @@ static void document_read(YamlReader *reader)
 bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_LINEAR};
-    YamlReader reader = {.report = report_open(source, messages),
+    for (size_t i = 0; i < options->override_count; i++)
+        scene_add_override(scene, options->overrides[i]);
+    const Source whole = {source->file, source->bytes, source->length, scene->overrides};
+    YamlReader reader = {.report = report_open(&whole, messages),
                          .scene = scene,
                          .options = options,
                          .default_material = UINT32_MAX};
     stage_begin(options->stage, "reading", source->file, source->length);
-    if (yaml_tree_read(&reader.tree, &reader.report, options->stage)) document_read(&reader);
+    if (yaml_tree_read(&reader.tree, &reader.report, options->stage) && yaml_override(&reader))
+        document_read(&reader);
     if (scene->textures.count > 0) {
         scene->file = memory_copy_text(source->file);
         text_append(&scene->text, source->bytes, source->length);

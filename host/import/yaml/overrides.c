@@ -1,0 +1,286 @@
+#include "host/import/yaml/overrides.h"
+#include "host/base/array.h"
+#include "host/base/memory.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// Bounds the cost of a wrong name.
+enum { NAMES_COMPARED = 1000 };
+
+// The way from the document's root to a node, as far as an override's PATH was read.
+typedef struct {
+    YamlTree *tree;
+    Report *report; // of the override's text
+    const char *text;
+    size_t at;         // behind the parts that were read
+    size_t parent_end; // behind the parts before the last one
+    size_t base;       // of the text's offsets among those of the document's source
+    uint32_t node, parent;
+    uint32_t previous; // the parent's child before the node and its key; 0: none
+} Path;
+
+// The parts before the last one, for printf's %.*s.
+#define PARENT(path)                                                                                         \
+    (path)->parent_end > 0 ? (int)(path)->parent_end : (int)strlen("scene"),                                 \
+        (path)->parent_end > 0 ? (path)->text : "scene"
+
+static YamlNode *node_at(const Path *path, uint32_t index)
+{
+    return &path->tree->nodes.items[index];
+}
+
+// Aliases share their children, so that a change of one would change the others.
+static void children_unshare(const Path *path)
+{
+    uint32_t last = 0;
+    for (uint32_t child = node_at(path, path->node)->first; child && path->tree->has_aliases;) {
+        const YamlNode copy = *node_at(path, child);
+        const uint32_t index = (uint32_t)path->tree->nodes.count;
+        array_push(path->tree->nodes, copy);
+        *(last ? &node_at(path, last)->next : &node_at(path, path->node)->first) = index;
+        last = index;
+        child = copy.next;
+    }
+}
+
+// Adds a scalar without a parent, which stands at the offset of the override's text.
+static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
+{
+    Text *texts = &path->tree->texts;
+    const size_t start = path->base + offset;
+    const YamlNode node = {.offset = (uint32_t)start,
+                           .end = (uint32_t)(start + strlen(text)),
+                           .text = (uint32_t)texts->count,
+                           .kind = YAML_SCALAR};
+    text_append(texts, text, strlen(text) + 1);
+    array_push(path->tree->nodes, node);
+    return (uint32_t)(path->tree->nodes.count - 1);
+}
+
+// Appends a child to the path's node, whose last one so far is `last`, or 0 if it is empty.
+static void child_append(const Path *path, uint32_t last, uint32_t child)
+{
+    *(last ? &node_at(path, last)->next : &node_at(path, path->node)->first) = child;
+    node_at(path, path->node)->child_count++;
+}
+
+// Returns whether the path's node is of a kind, and reports an error if it is not.
+static bool node_is(const Path *path, YamlKind kind)
+{
+    static const char *const names[] = {
+        [YAML_SCALAR] = "a value", [YAML_SEQUENCE] = "a list", [YAML_MAPPING] = "a mapping"};
+    const YamlKind found = node_at(path, path->node)->kind;
+    if (found == kind) return true;
+    return report_error(path->report, path->parent_end, "'%.*s' is %s, not %s", PARENT(path), names[found],
+                        names[kind]);
+}
+
+static bool path_report(const Path *path)
+{
+    return report_error(path->report, path->at,
+                        "expected PATH=VALUE, such as camera.fov=60 or objects[0].sphere.radius=2");
+}
+
+static bool is_last(const Path *path)
+{
+    return path->text[path->at] == '=';
+}
+
+static bool is_blank(const char *text)
+{
+    return text[strspn(text, " ")] == '\0';
+}
+
+// Returns whether the part that was read may name something new: it is the last one, with a value.
+static bool can_add(const Path *path)
+{
+    return is_last(path) && !is_blank(path->text + path->at + 1);
+}
+
+// Within a path a new name is more likely a mistake.
+static bool missing_report(const Path *path, const char *name, size_t start)
+{
+    const char *known[NAMES_COMPARED];
+    size_t known_count = 0;
+    for (const YamlNode *key = yaml_first(path->tree, node_at(path, path->node));
+         key && known_count < NAMES_COMPARED; key = yaml_next(path->tree, yaml_next(path->tree, key)))
+        if (key->kind == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
+    Text choices = {0};
+    choices_describe(&choices, name, known, known_count);
+    report_error(path->report, start, "'%.*s' has no '%.*s'%s", PARENT(path), WORD_SHOWN, name,
+                 text_c(&choices));
+    text_free(&choices);
+    return false;
+}
+
+// Moves the path to a child of its node.
+static void path_move(Path *path, uint32_t previous, uint32_t child)
+{
+    path->parent = path->node;
+    path->previous = previous;
+    path->node = child;
+}
+
+// Moves the path to the value of a key, which is added at the end of the path.
+static bool key_follow(Path *path, const char *name, size_t start)
+{
+    if (!node_is(path, YAML_MAPPING)) return false;
+    children_unshare(path);
+    uint32_t last = 0, key = node_at(path, path->node)->first;
+    for (; key; key = node_at(path, last)->next) {
+        const YamlNode *node = node_at(path, key);
+        if (node->kind == YAML_SCALAR && strcmp(yaml_text(path->tree, node), name) == 0) break;
+        last = node->next;
+    }
+    if (!key) {
+        if (!can_add(path)) return missing_report(path, name, start);
+        key = scalar_add(path, name, start);
+        const uint32_t value = scalar_add(path, "", start);
+        child_append(path, last, key);
+        child_append(path, key, value);
+    }
+    path_move(path, last, node_at(path, key)->next);
+    return true;
+}
+
+// Moves the path to an element. The next one is added at the end of the path.
+static bool index_follow(Path *path, uint32_t index, size_t start)
+{
+    if (!node_is(path, YAML_SEQUENCE)) return false;
+    const uint32_t count = node_at(path, path->node)->child_count;
+    if (index > count || (index == count && !can_add(path)))
+        return report_error(path->report, start, "'%.*s' has %u element%s, counted from [0]", PARENT(path),
+                            count, text_plural(count));
+    children_unshare(path);
+    uint32_t last = 0, child = node_at(path, path->node)->first;
+    for (uint32_t i = 0; i < index; i++) {
+        last = child;
+        child = node_at(path, child)->next;
+    }
+    if (index == count) {
+        child = scalar_add(path, "", start);
+        child_append(path, last, child);
+    }
+    path_move(path, last, child);
+    return true;
+}
+
+static bool index_read(Path *path)
+{
+    const size_t start = path->at, digits = strspn(path->text + start + 1, "0123456789");
+    path->at += 1 + digits;
+    if (digits == 0 || digits > 9 || path->text[path->at] != ']')
+        return report_error(path->report, start, "expected an index, such as [0]");
+    path->at++;
+    return index_follow(path, (uint32_t)strtoul(path->text + start + 1, NULL, 10), start);
+}
+
+// Reads a name up to the next part. One in quotes may have any characters but these quotes.
+static bool name_read(Path *path)
+{
+    const char first = path->text[path->at];
+    const bool is_quoted = first == '"' || first == '\'';
+    const size_t start = path->at + is_quoted;
+    const size_t length = strcspn(path->text + start, is_quoted ? (char[]){first, '\0'} : ".[=");
+    path->at = start + length;
+    if (length == 0 || (is_quoted && path->text[path->at] != first)) return path_report(path);
+    path->at += is_quoted;
+    char *name = memory_copy_part(path->text + start, length);
+    const bool followed = key_follow(path, name, start);
+    free(name);
+    return followed;
+}
+
+// Moves the path to the node that the override's PATH names, and `at` behind its `=`.
+static bool path_follow(Path *path)
+{
+    do {
+        path->parent_end = path->at;
+        const bool is_index = path->text[path->at] == '[';
+        if (path->at > 0 && !is_index) {
+            if (path->text[path->at] != '.') return path_report(path);
+            path->at++;
+        }
+        if (!(is_index ? index_read(path) : name_read(path))) return false;
+    } while (!is_last(path));
+    path->at++;
+    return true;
+}
+
+// Appends another tree and returns the index of its root.
+static uint32_t tree_append(const Path *path, const YamlTree *added)
+{
+    YamlTree *tree = path->tree;
+    const uint32_t first_node = (uint32_t)tree->nodes.count, first_text = (uint32_t)tree->texts.count;
+    for (size_t i = 0; i < added->nodes.count; i++) {
+        YamlNode node = added->nodes.items[i];
+        node.offset += (uint32_t)path->base;
+        node.end += (uint32_t)path->base;
+        if (node.next > 0) node.next += first_node;
+        if (node.kind == YAML_SCALAR)
+            node.text += first_text;
+        else if (node.first > 0)
+            node.first += first_node;
+        array_push(tree->nodes, node);
+    }
+    text_append(&tree->texts, added->texts.items, added->texts.count);
+    tree->has_aliases |= added->has_aliases;
+    return first_node;
+}
+
+// Adds the nodes of the VALUE and sets the index of their root. A # there begins a color, since a comment
+// would be of no use.
+static bool value_read(const Path *path, uint32_t *root)
+{
+    const size_t start = path->at + strspn(path->text + path->at, " ");
+    if (path->text[start] == '#') {
+        *root = scalar_add(path, path->text + start, start);
+        return true;
+    }
+    YamlTree tree = {0};
+    const bool is_read = yaml_value_read(&tree, path->report, start);
+    if (is_read) *root = tree_append(path, &tree);
+    yaml_tree_free(&tree);
+    return is_read;
+}
+
+static void node_remove(const Path *path)
+{
+    const uint32_t next = node_at(path, path->node)->next;
+    YamlNode *parent = node_at(path, path->parent);
+    *(path->previous ? &node_at(path, path->previous)->next : &parent->first) = next;
+    parent->child_count -= parent->kind == YAML_MAPPING ? 2 : 1;
+}
+
+static bool override_apply(YamlTree *tree, Report *report, size_t base)
+{
+    Path path = {.tree = tree, .report = report, .text = report->source->bytes, .base = base};
+    uint32_t value = 0;
+    if (!path_follow(&path)) return false;
+    if (is_blank(path.text + path.at)) {
+        node_remove(&path);
+        return true;
+    }
+    if (!value_read(&path, &value)) return false;
+    const uint32_t next = node_at(&path, path.node)->next;
+    *node_at(&path, path.node) = *node_at(&path, value);
+    node_at(&path, path.node)->next = next;
+    return true;
+}
+
+bool yaml_override(YamlReader *reader)
+{
+    bool all_applied = true;
+    const Source *source = reader->report.source;
+    size_t base = source->length + 1;
+    for (const Source *text = source->next; text; text = text->next) {
+        MessageList messages = {0};
+        const Source alone = {.file = text->file, .bytes = text->bytes, .length = text->length};
+        Report report = report_open(&alone, &messages);
+        all_applied &= override_apply(&reader->tree, &report, base);
+        report_include(&reader->report, &report);
+        base += text->length + 1;
+    }
+    return all_applied;
+}
