@@ -60,6 +60,7 @@ offers 'glint render --si' --size
 offers 'glint scenes/demo.yaml --si' --size
 offers 'glint check --le' --lenient
 offers 'glint render --lanes 1' '1 16'
+offers 'glint render --tone f' filmic
 offers 'glint render --precision ' 'single strict double certified'
 offers 'glint trace --precision ' 'single strict double certified'
 offers 'glint render --timing = j' json

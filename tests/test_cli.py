@@ -45,6 +45,10 @@ WRONG_COMMAND_LINES = [
     ("s.rt: --set needs a YAML scene", "{render|check} s.rt --set camera.fov=60"),
     ("--set: may be given at most 64 times", "check sphere.yaml" + 65 * " --set camera.fov=60"),
     ('--bits: .*"12"', "render sphere.yaml --bits 12"),
+    ('--tone: .*"flimic".*did you mean filmic', "render sphere.yaml --tone flimic"),
+    ("--exposure: expected", "render sphere.yaml --exposure {bright|1x|65|-65|nan|''}"),
+    ("EXR and NPY hold linear", "render sphere.yaml -o a.{exr|npy} {--tone filmic|--exposure -1|--dither}"),
+    ("--dither is for 8 bits", "render sphere.yaml --dither --bits 16"),
     ('--transfer: .*"srbg".*did you mean srgb', "render sphere.yaml --transfer srbg"),
     ('--timing: .*"jsn".*did you mean json', "render sphere.yaml --timing=jsn"),
     ('--aov: .*"nromal".*did you mean normal', "render sphere.yaml --aov t,nromal"),
@@ -342,6 +346,31 @@ class Images(CliTestCase):
         self.assertEqual(self.glint(f"{trace.format('sphere.yaml')} {options}").stdout, self.glint(trace.format("small.yaml")).stdout)
         bounds = "bounds +-0.5 -0.5 -0.5"
         self.assertRegex(self.glint(f"check sphere.yaml {options}").stdout, bounds)
+
+    def test_display(self):
+        """The PNG has the curve's values of the linear image, and its notes name the options; a region has the same pattern."""
+        options = "--size 20x12 --quiet --samples 2"
+        self.glint(f"render sphere.yaml {options} -o linear.npy")
+        linear = [value * 2**1.5 for pixel in npy_read("linear.npy")[-1] for value in pixel]
+        self.glint(f"render sphere.yaml {options} --exposure 1.5 --tone filmic --transfer none --bits 16 -o a.ppm")
+        shown = struct.unpack(">720H", Path("a.ppm").read_bytes()[len("P6\n20 12\n65535\n"):])
+        for x, value in zip(linear, shown):
+            self.assertAlmostEqual(value, 65535 * min(1, x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)), delta=0.51)
+        self.assertGreater(len(set(shown)), 30)
+        self.glint(f"render sphere.yaml {options} --exposure 1.5 --tone filmic -o a.png")
+        texts = png_read("a.png")[2]
+        self.assertEqual((texts["Exposure"], texts["Tone"]), ("1.5", "filmic"))
+        self.assertNotIn("Dither", texts)
+        self.glint(f"render sphere.yaml {options} --dither --tone none --exposure 0 -o b.ppm")
+        self.glint(f"render sphere.yaml {options} -o c.ppm")
+        self.glint(f"render sphere.yaml {options} --dither --region 3,5,7,6 -o d.ppm")
+        dithered, plain, part = (Path(name).read_bytes() for name in ("b.ppm", "c.ppm", "d.ppm"))
+        self.assertNotEqual(dithered, plain)
+        self.assertTrue(all(abs(a - b) <= 1 for a, b in zip(dithered[13:], plain[13:])))
+        whole = dithered[len("P6\n20 12\n255\n"):]
+        for y in range(6):
+            start = 3 * (20 * (5 + y) + 3)
+            self.assertEqual(part[len("P6\n7 6\n255\n"):][21 * y : 21 * y + 21], whole[start : start + 21])
 
     def test_several_scenes(self):
         self.glint(f"render sphere.yaml {SMALL} -o one.png")

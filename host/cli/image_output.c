@@ -14,6 +14,8 @@
 
 enum { NOTE_COUNT_MAX = 24 };
 
+const char *const tone_names[TONE_COUNT] = {"none", "filmic"};
+
 typedef struct {
     void *items;
     size_t capacity;
@@ -131,8 +133,7 @@ static bool is_exr(const ImageOutput *output)
     return image_format_of(output->options->path) == IMAGE_EXR;
 }
 
-// Returns whether the file's format holds linear floats.
-static bool holds_floats(const char *path)
+bool image_output_holds_floats(const char *path)
 {
     const ImageFormat format = image_format_of(path);
     return format == IMAGE_EXR || format == IMAGE_NPY;
@@ -195,8 +196,11 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
     const bool is_display =
-        output->options->transfer == TRANSFER_SRGB && !holds_floats(output->options->path);
+        output->options->transfer == TRANSFER_SRGB && !image_output_holds_floats(output->options->path);
     NOTE("Transfer", "%s", is_display ? "srgb" : "none");
+    if (output->options->exposure != 0) NOTE("Exposure", "%g", output->options->exposure);
+    if (output->options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[output->options->tone]);
+    if (output->options->dither) NOTE("Dither", "ordered");
     NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
     if (output->ranks) NOTE("Ranks", "%zu", output->ranks->count + 1);
     if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
@@ -282,6 +286,9 @@ static bool image_open(ImageOutput *output, const Film *film, const ImageNote *n
     header.format = image_format_of(output->options->path);
     header.transfer = output->options->transfer;
     header.bits = output->options->bits;
+    header.exposure = output->options->exposure;
+    header.tone = output->options->tone;
+    header.dither = output->options->dither;
     header.notes = notes;
     if (header.format != IMAGE_NPY) header.npy_type = 'f';
     header.full_width = settings->width;

@@ -13,10 +13,15 @@ typedef struct {
     unsigned aovs; // AOV_COLOR means the linear values
     Transfer transfer;
     unsigned bits;
+    double exposure; // in stops
+    Tone tone;
+    bool dither;
     const Pilot *pilot; // chose the precision, or NULL
     bool prints_names;  // prints the files' names once they are written
     bool synchronous;   // encodes a band before the next one is rendered, so that times do not overlap
 } ImageOutputOptions;
+
+extern const char *const tone_names[TONE_COUNT];
 
 typedef struct ImageOutput ImageOutput;
 
@@ -24,6 +29,8 @@ typedef struct ImageOutput ImageOutput;
 char *image_output_default_path(const char *scene_path);
 // Returns whether the path's ending is known; if not, prints the known endings.
 bool image_output_path_known(const char *path);
+// Returns whether the path's format holds linear floats, which are not for display.
+bool image_output_holds_floats(const char *path);
 // Returns true with a message if one of the files is a file that the scene was read from.
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path);

@@ -2,6 +2,7 @@
 #include "host/cli/progress.h"
 #include <errno.h>
 #include <getopt.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -15,6 +16,9 @@ enum {
     OPTION_TIMING,
     OPTION_TRANSFER,
     OPTION_BITS,
+    OPTION_EXPOSURE,
+    OPTION_TONE,
+    OPTION_DITHER,
     OPTION_BOUNCES,
     OPTION_CHECKPOINT,
     OPTION_QUIET
@@ -30,6 +34,9 @@ static const struct option long_options[] = {
     {"timing", optional_argument, NULL, OPTION_TIMING},
     {"transfer", required_argument, NULL, OPTION_TRANSFER},
     {"bits", required_argument, NULL, OPTION_BITS},
+    {"exposure", required_argument, NULL, OPTION_EXPOSURE},
+    {"tone", required_argument, NULL, OPTION_TONE},
+    {"dither", no_argument, NULL, OPTION_DITHER},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"quiet", no_argument, NULL, OPTION_QUIET},
@@ -62,6 +69,10 @@ static const char help_text[] =
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and "
                     ".dat)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
+                    "      --exposure STOPS  of a PNG or PPM: twice as bright per stop (default: 0)\n"
+                    "      --tone T          curve of a PNG or PPM, none or filmic (default: none, which "
+                    "clips at 1)\n"
+                    "      --dither          hide the steps of 8 bits in a pattern\n"
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command resumes where an earlier one ended\n"
@@ -83,6 +94,31 @@ static bool region_read(const char *value, uint32_t region[4])
     }
     fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n",
             value);
+    return false;
+}
+
+static bool exposure_read(const char *value, double *exposure)
+{
+    enum { STOPS_MAX = 64 };
+    char *end;
+    *exposure = strtod(value, &end);
+    if (end != value && *end == '\0' && fabs(*exposure) <= STOPS_MAX) return true;
+    fprintf(stderr, "glint: --exposure: expected a number of stops from -%d to %d, not \"%s\"\n", STOPS_MAX,
+            STOPS_MAX, value);
+    return false;
+}
+
+// Rejects options of display values that the image does not have. Returns false with a message.
+static bool display_fits(const ImageOutputOptions *output)
+{
+    const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
+    if (is_changed && output->path && image_output_holds_floats(output->path))
+        option_usage_fault(
+            "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
+    else if (output->dither && output->bits != 8)
+        option_usage_fault("render", "--dither is for 8 bits; it cannot be combined with --bits 16");
+    else
+        return true;
     return false;
 }
 
@@ -117,6 +153,15 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     case OPTION_BITS:
         if (!option_choice("bits", value, (const char *const[]){"8", "16"}, 2, &choice)) return false;
         options->output.bits = choice == 0 ? 8 : 16;
+        return true;
+    case OPTION_EXPOSURE:
+        return exposure_read(value, &options->output.exposure);
+    case OPTION_TONE:
+        if (!option_choice("tone", value, tone_names, TONE_COUNT, &choice)) return false;
+        options->output.tone = (Tone)choice;
+        return true;
+    case OPTION_DITHER:
+        options->output.dither = true;
         return true;
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
@@ -171,6 +216,7 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
         return option_usage_fault("render",
                                   "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
+    if (!display_fits(&options->output)) return EXIT_USER;
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
     return options->scene_count == 1 || several_fit(options) ? OPTIONS_READ : EXIT_USER;

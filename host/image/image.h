@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 typedef enum { TRANSFER_SRGB, TRANSFER_NONE } Transfer;
+typedef enum { TONE_NONE, TONE_FILMIC, TONE_COUNT } Tone; // curves from linear values to displayed light
 typedef enum { IMAGE_PNG, IMAGE_PPM, IMAGE_EXR, IMAGE_NPY, IMAGE_UNKNOWN } ImageFormat;
 
 typedef struct {
@@ -27,10 +28,13 @@ typedef struct {
     unsigned bits;                    // 8 or 16: PNG, PPM
     char npy_type;                    // 'f': float32, 'd': float64, 'u': uint32
     const ImageNote *notes;           // ended by a NULL key
-    // EXR: the image's place in a larger one, whose size is 0 if there is none
+    // The image's place in a larger one, whose size is 0 if there is none: EXR; the place is that of dither
     uint32_t full_width, full_height, left, top;
     const ImageLayer *layers; // EXR: after the color
     size_t layer_count;       // at most IMAGE_LAYERS_MAX
+    double exposure;          // in stops, before the tone curve: PNG, PPM
+    Tone tone;                // before the transfer: PNG, PPM
+    bool dither;              // ordered, of 8 bits: PNG, PPM
 } ImageHeader;
 
 enum { IMAGE_LAYERS_MAX = 16 };

@@ -1,6 +1,6 @@
 // PNG through libpng (Portable Network Graphics, second edition, 2003).
 #include "host/image/codec.h"
-#include "host/image/transfer.h"
+#include "host/image/display.h"
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -99,8 +99,8 @@ static bool png_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
     size_t row_values = (size_t)header->width * header->channels;
     if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
     for (uint32_t row = 0; row < row_count; row++) {
-        transfer_quantize(state->bytes, (const float *)pixels + row * row_values, row_values,
-                          header->transfer, header->bits);
+        display_row(state->bytes, (const float *)pixels + row * row_values, header,
+                    writer->rows_written + row);
         png_write_row(state->png, state->bytes);
     }
     return true;

@@ -1,6 +1,6 @@
 // Portable anymaps (Netpbm, the formats ppm and pgm): P5 and P6 are written; P2, P3, P5 and P6 are read.
 #include "host/image/codec.h"
-#include "host/image/transfer.h"
+#include "host/image/display.h"
 
 #include "host/base/memory.h"
 
@@ -25,7 +25,7 @@ static bool ppm_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
     size_t row_values = (size_t)header->width * header->channels;
     const float *values = pixels;
     for (uint32_t row = 0; row < row_count; row++, values += row_values) {
-        transfer_quantize(writer->state, values, row_values, header->transfer, header->bits);
+        display_row(writer->state, values, header, writer->rows_written + row);
         if (!output_write(&writer->output, writer->state, row_values * (header->bits / 8), messages))
             return false;
     }

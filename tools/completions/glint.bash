@@ -26,6 +26,7 @@ _glint() {
     --bvh) words="auto on off" ;;
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
+    --tone) words="none filmic" ;;
     --device) words="cpu gpu all" ;;
     --reference-device) words="cpu gpu" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;

@@ -19,6 +19,7 @@ _glint() {
     --bvh) compadd auto on off ;;
     --bits) compadd 8 16 ;;
     --transfer) compadd srgb none ;;
+    --tone) compadd none filmic ;;
     --device) compadd cpu gpu all ;;
     --reference-device) compadd cpu gpu ;;
     --timing) [[ -n $IPREFIX ]] && compadd json || _files ;;

@@ -1,0 +1,64 @@
+#include "host/image/display.h"
+#include "host/image/transfer.h"
+
+#include <math.h>
+#include <string.h>
+
+// Values that are converted at once.
+enum { CHUNK = 768 };
+
+// Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2016: a rational fit of the Academy's reference
+// transforms, per channel. It reaches 1 at 7.24.
+static double filmic(double value)
+{
+    if (!(value > 0)) return 0;
+    if (value >= 8) return 1;
+    const double shown = value * (2.51 * value + 0.03) / (value * (2.43 * value + 0.59) + 0.14);
+    return shown < 1 ? shown : 1;
+}
+
+double tone_apply(double value, Tone tone)
+{
+    return tone == TONE_FILMIC ? filmic(value) : value;
+}
+
+// Returns 0 to 63 in the order of B. E. Bayer, "An optimum method for two-level rendition of continuous-tone
+// pictures", ICC 1973, for 8 by 8 pixels.
+static uint32_t bayer(uint32_t x, uint32_t y)
+{
+    uint32_t order = 0;
+    for (unsigned bit = 0; bit < 3; bit++)
+        order = order << 2 | ((x ^ y) >> bit & 1) << 1 | (y >> bit & 1);
+    return order;
+}
+
+// A display value of 16 bits is 257 times one of 8 bits and a rest, which the order of the pixel rounds up or
+// down. Values that have no rest keep theirs.
+static uint8_t dithered(float value, Transfer transfer, uint32_t x, uint32_t y)
+{
+    return (uint8_t)((image_quantize(value, transfer, 16) + ((2 * bayer(x, y) + 1) * 257 >> 7)) / 257);
+}
+
+void display_row(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t row)
+{
+    const size_t count = (size_t)header->width * header->channels, value_size = header->bits / 8;
+    const double gain =
+        (float)exp2(header->exposure); // rounded, so that the last bits of the host's exp2() do not matter
+    const bool is_toned = gain != 1 || header->tone != TONE_NONE;
+    float toned[CHUNK];
+    for (size_t start = 0, length; start < count; start += length) {
+        length = count - start < CHUNK ? count - start : CHUNK;
+        const float *chunk = values + start;
+        for (size_t i = 0; i < length && is_toned; i++)
+            toned[i] = (float)tone_apply(chunk[i] * gain, header->tone);
+        if (is_toned) chunk = toned;
+        if (!header->dither) {
+            transfer_quantize(bytes + start * value_size, chunk, length, header->transfer, header->bits);
+            continue;
+        }
+        for (size_t i = 0; i < length; i++)
+            bytes[start + i] =
+                dithered(chunk[i], header->transfer,
+                         header->left + (uint32_t)((start + i) / header->channels), header->top + row);
+    }
+}
