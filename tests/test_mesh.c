@@ -504,7 +504,7 @@ static void scene_file_faults_are_reported(void **state)
     REFUSED("{file: a.obj, transform: {rotate: 90}}",
             "4:45: error: 'rotate' must be three numbers, not '90'\n");
     REFUSED("{file: a.obj, transform: {turn: 90}}",
-            "4:37: error: unknown transform key 'turn'; the choices are translate, rotate, scale\n");
+            "4:37: error: unknown transform key 'turn'; the choices are translate, rotate, scale, matrix\n");
 }
 
 static void ids_count_the_triangles(void **state)

@@ -121,9 +121,11 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
         const char *name = yaml_text(&reader->tree, key);
         const size_t first_object = reader->scene->objects.count, first_mesh = reader->scene->meshes.count;
         const YamlNode *objects = NULL;
-        if (definition_find(reader, name))
+        if (definition_find(reader, name)) {
             report_error(&reader->report, key->offset, "'%.*s' is given twice", WORD_SHOWN, name);
-        else if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL))
+            continue;
+        }
+        if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL))
             yaml_read_object_list(reader, "objects", objects);
         const Definition definition = definition_take(reader, name, first_object, first_mesh);
         array_push(reader->definitions, definition);
