@@ -144,7 +144,8 @@ enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 }
 
 // A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
 // high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. With
-// several lanes a leaf of triangles is a block. The box of an empty slot is inverted, with low above high.
+// several lanes a leaf of triangles or spheres is a block. The box of an empty slot is inverted, low above
+// high.
 //
 // Nodes are as wide as the kernel's packets, and at least 4 wide.
 enum { BVH_WIDTH_MIN = 4, BVH_WIDTH_MAX = 16 };
@@ -154,12 +155,12 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 #define BVH_QUARTER (BVH_WIDTH >> 2)
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
-    uint4 child_index[BVH_QUARTER]; // the child's node, first primitive or block of triangles
-    uint4 child_kind[BVH_QUARTER];  // BVH_NODE, or a leaf's count << 8 | kind; 16 bits, count <= 255
+    uint4 child_index[BVH_QUARTER]; // the child's node, first primitive, or its block
+    uint4 child_kind[BVH_QUARTER];  // BVH_NODE, BVH_EMPTY, or a leaf's count << 8 | kind, at most 16 bits
 } BvhNode;
 #endif
 
-enum { BVH_NODE = 0xff };
+enum { BVH_EMPTY = 0, BVH_NODE = 0xff };
 
 // The vertices of a leaf's triangles, for kernels with several lanes, which test a lane per triangle
 // (kernels/traversal/triangle_block.h). The rows a.x, a.y, a.z, b.x ... c.z are as wide as a node. If a leaf
@@ -169,6 +170,19 @@ enum { BLOCK_ROWS = 9 };
 typedef struct {
     scalar4 rows[BLOCK_ROWS * BVH_QUARTER];
 } TriangleBlock;
+#endif
+
+// The spheres of a leaf, for kernels with several lanes (kernels/traversal/sphere_block.h): rows of the
+// centers' x, y and z and of the radii, at least FLT_MAX for spheres with HAS_POWER, then the ids, with
+// SPHERE_HAS_FLAGS if the sphere has any, and the places in the array of spheres. If a leaf has fewer
+// spheres, the first one is repeated.
+enum { SPHERE_ROWS = 4 };
+#define SPHERE_HAS_FLAGS 0x80000000u
+#ifdef __OPENCL_VERSION__
+typedef struct {
+    scalar4 rows[SPHERE_ROWS * BVH_QUARTER];
+    uint4 ids[BVH_QUARTER], places[BVH_QUARTER];
+} SphereBlock;
 #endif
 
 // The first triangles of four blocks.
@@ -327,6 +341,7 @@ typedef struct {
     ARRAY(TRIANGLE_NEIGHBORS, TriangleNeighbors, , triangle_neighbors) \
     ARRAY(TRIANGLE_BLOCKS, TriangleBlock, , triangle_blocks)           \
     ARRAY(BLOCK_PLACES, BlockPlaces, , block_places)                   \
+    ARRAY(SPHERE_BLOCKS, SphereBlock, , sphere_blocks)                 \
     ARRAY(CULL_SPHERES, CullSphere, , cull_spheres)                    \
     ARRAY(OBJECTS, ObjectEntry, , objects)                             \
     ARRAY(MATERIALS, Material, , materials)                            \

@@ -21,6 +21,11 @@ typedef struct {
     scalar4 rows[BLOCK_ROWS];
 } HostTriangleBlock;
 
+typedef struct {
+    scalar4 rows[SPHERE_ROWS];
+    uint4 ids[1], places[1];
+} HostSphereBlock;
+
 // Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
 // member. REALS are scalar4, INTEGERS uint4. In a shape only the last member, its id, is listed.
 // clang-format off
@@ -60,6 +65,10 @@ typedef struct {
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_kind[0])                    \
     REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[0])       \
     REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[BLOCK_ROWS - 1]) \
+    REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[0])             \
+    REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[SPHERE_ROWS - 1]) \
+    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, ids[0])           \
+    INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, places[0])        \
     INTEGERS(FLAT_BLOCK_PLACES, BlockPlaces, BlockPlaces, triangles)             \
     REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
     INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
@@ -300,7 +309,8 @@ static void list_is_complete(void **state)
     layouts_of_host(layouts, true);
     // between the ends
     size_t filled[FLAT_COUNT] = {[FLAT_HEADER] = 2 * (KIND_QUARTETS - 2) * sizeof(uint4),
-                                 [FLAT_TRIANGLE_BLOCKS] = (BLOCK_ROWS - 2) * sizeof(scalar4)};
+                                 [FLAT_TRIANGLE_BLOCKS] = (BLOCK_ROWS - 2) * sizeof(scalar4),
+                                 [FLAT_SPHERE_BLOCKS] = (SPHERE_ROWS - 2) * sizeof(scalar4)};
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
         size_t *bytes = &filled[members[i].kind];
         bool is_shape = members[i].kind - FLAT_FIRST_SHAPE < KIND_COUNT;

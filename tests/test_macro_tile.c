@@ -117,7 +117,7 @@ static Object sphere_in_view(void)
     Vector3 along = vector_normalize(vector_subtract(seen, origins[origin]));
     Vector3 touched = point_in_view(origin, seen, random_between(&random_state, 0.05, 0.95));
     Vector3 aside = vector_normalize(vector_cross(along, random_unit_vector(&random_state)));
-    double radius = random_power(&random_state, -2, -0.5);
+    double radius = random_power(&random_state, -4, -0.5); // from less than a pixel on
     Vector3 center = vector_add(touched, vector_scale(aside, radius));
     return (Object){.kind = SHAPE_SPHERE, .as.sphere = {vector_nudge(center), nudge(radius), false}};
 }

@@ -5,6 +5,8 @@
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
 #include "tests/scene_reading.h"
+#include <float.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdatomic.h>
@@ -117,6 +119,26 @@ static size_t check_block(const CompiledScene *compiled, size_t index, size_t co
     return first;
 }
 
+// Checks that a block has the spheres of its leaf. Returns the first one's place.
+static size_t check_sphere_block(const CompiledScene *compiled, size_t index, size_t count)
+{
+    const size_t width = single.lanes;
+    const double *rows = flat_array_at(&compiled->arrays[FLAT_SPHERE_BLOCKS], index);
+    const uint32_t *ids = (const void *)(rows + SPHERE_ROWS * width), *places = ids + width;
+    for (size_t lane = 0; lane < width; lane++) {
+        const size_t place = places[0] + (lane < count ? lane : 0);
+        const Sphere *sphere = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + KIND_SPHERES], place);
+        assert_int_equal(places[lane], place);
+        assert_true(rows[lane] == sphere->center_radius.x);
+        assert_true(rows[width + lane] == sphere->center_radius.y);
+        assert_true(rows[2 * width + lane] == sphere->center_radius.z);
+        const double least = sphere->id.y & HAS_POWER ? FLT_MAX : 0;
+        assert_true(rows[3 * width + lane] == fmax(sphere->center_radius.w, least));
+        assert_int_equal(ids[lane], sphere->id.x | (sphere->id.y != 0 ? SPHERE_HAS_FLAGS : 0));
+    }
+    return places[0];
+}
+
 // Returns the box of everything below a node, after checks that its children's boxes are exact.
 static Bounds check_node(const CompiledScene *compiled, size_t index, const Bounds *empty)
 {
@@ -131,6 +153,7 @@ static Bounds check_node(const CompiledScene *compiled, size_t index, const Boun
         if (node.child_kind[i] == BVH_NODE) expected = check_node(compiled, node.child_index[i], empty);
         size_t first = node.child_index[i];
         if (kind == KIND_TRIANGLES && count > 0) first = check_block(compiled, first, count);
+        if (kind == KIND_SPHERES && count > 0) first = check_sphere_block(compiled, first, count);
         for (size_t k = first; k < first + count; k++) {
             assert_true(
                 primitive_bounds(kind, flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], k), &box));

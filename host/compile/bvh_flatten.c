@@ -3,6 +3,7 @@
 #include "host/compile/bvh_widen.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -207,12 +208,6 @@ static void child_box_write(const FlatNode *node, unsigned child, const Bounds *
     }
 }
 
-// The first triangle of a block.
-static uint32_t *block_place(const CompiledScene *compiled, size_t block)
-{
-    return (uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items + block;
-}
-
 static void node_write(const BvhWideNode *wide, const Bvh *bvh, const uint32_t *order, const Bounds *empty,
                        const FlatNode *node)
 {
@@ -248,43 +243,77 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
     bvh_wide_free(&wide);
 }
 
-static bool is_triangle_leaf(uint32_t child_kind)
+// One block of FLAT_SPHERE_BLOCKS.
+typedef struct {
+    double *rows;
+    uint32_t *ids, *places;
+    size_t width;
+} FlatSphereBlock;
+
+static FlatSphereBlock sphere_block_at(const CompiledScene *compiled, size_t block)
 {
-    return child_kind >> 8 > 0 && (child_kind & 0xff) == KIND_TRIANGLES;
+    const FlatArray *blocks = &compiled->arrays[FLAT_SPHERE_BLOCKS];
+    const size_t width = 4 * blocks->layout.scalar4_count / SPHERE_ROWS;
+    double *rows = flat_array_at(blocks, block);
+    uint32_t *ids = (void *)(rows + SPHERE_ROWS * width);
+    return (FlatSphereBlock){rows, ids, ids + width, width};
 }
 
-// Makes a block of each leaf of triangles, still without vertices.
+// Returns whether a child is a leaf that kernels with several lanes read as a block.
+static bool is_block(uint32_t child_kind)
+{
+    const unsigned kind = child_kind & 0xff;
+    return child_kind >> 8 > 0 && (kind == KIND_TRIANGLES || kind == KIND_SPHERES);
+}
+
+// Returns the index of a block's first primitive, to be read or set.
+static uint32_t *block_place(const CompiledScene *compiled, unsigned kind, size_t block)
+{
+    if (kind == KIND_SPHERES) return sphere_block_at(compiled, block).places;
+    return (uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items + block;
+}
+
+// Makes a block of each leaf of triangles or spheres, still without these.
 static void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
 {
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
-    size_t count = 0;
+    size_t counts[KIND_COUNT] = {0};
     for (size_t i = 0; i < nodes->count; i++)
-        for (unsigned k = 0; k < width; k++)
-            count += is_triangle_leaf(flat_node_at(nodes, i).child_kind[k]);
-    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, count, width, !is_double);
-    flat_array_renew(compiled, FLAT_BLOCK_PLACES, (count + 3) / 4);
-    uint32_t block = 0;
+        for (unsigned k = 0; k < width; k++) {
+            const uint32_t child_kind = flat_node_at(nodes, i).child_kind[k];
+            if (is_block(child_kind)) counts[child_kind & 0xff]++;
+        }
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, counts[KIND_TRIANGLES], width, !is_double);
+    flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, counts[KIND_SPHERES], width, false);
+    flat_array_renew(compiled, FLAT_BLOCK_PLACES, (counts[KIND_TRIANGLES] + 3) / 4);
+    uint32_t next[KIND_COUNT] = {0};
     for (size_t i = 0; i < nodes->count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
         for (unsigned k = 0; k < width; k++) {
-            if (!is_triangle_leaf(node.child_kind[k])) continue;
-            *block_place(compiled, block) = node.child_index[k];
-            node.child_index[k] = block++;
+            if (!is_block(node.child_kind[k])) continue;
+            const unsigned kind = node.child_kind[k] & 0xff;
+            *block_place(compiled, kind, next[kind]) = node.child_index[k];
+            node.child_index[k] = next[kind]++;
         }
     }
 }
 
-static void block_fill(const CompiledScene *compiled, size_t block, unsigned count)
+static size_t blocks_count(const CompiledScene *compiled)
+{
+    return compiled->arrays[FLAT_TRIANGLE_BLOCKS].count + compiled->arrays[FLAT_SPHERE_BLOCKS].count;
+}
+
+static void triangle_block_fill(const CompiledScene *compiled, size_t block, unsigned count)
 {
     const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS],
                     *triangles = &compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
     // floats are narrowed here: a million triangles' blocks take 130 MB as doubles
     const bool is_double = blocks->layout.scalar4_count > 0;
     const size_t width = 4 * (blocks->layout.scalar4_count + blocks->layout.uint4_count) / BLOCK_ROWS;
+    const size_t first = *block_place(compiled, KIND_TRIANGLES, block);
     void *rows = flat_array_at(blocks, block);
     for (size_t lane = 0; lane < width; lane++) {
-        const Triangle *triangle =
-            flat_array_at(triangles, *block_place(compiled, block) + (lane < count ? lane : 0));
+        const Triangle *triangle = flat_array_at(triangles, first + (lane < count ? lane : 0));
         const double vertices[BLOCK_ROWS] = {triangle->a.x, triangle->a.y, triangle->a.z,
                                              triangle->b.x, triangle->b.y, triangle->b.z,
                                              triangle->c.x, triangle->c.y, triangle->c.z};
@@ -296,33 +325,55 @@ static void block_fill(const CompiledScene *compiled, size_t block, unsigned cou
     }
 }
 
+static void sphere_block_fill(const CompiledScene *compiled, size_t index, unsigned count)
+{
+    const FlatSphereBlock block = sphere_block_at(compiled, index);
+    for (unsigned lane = 0; lane < block.width; lane++) {
+        block.places[lane] = block.places[0] + (lane < count ? lane : 0);
+        const Sphere *sphere =
+            flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + KIND_SPHERES], block.places[lane]);
+        block.rows[lane] = sphere->center_radius.x;
+        block.rows[block.width + lane] = sphere->center_radius.y;
+        block.rows[2 * block.width + lane] = sphere->center_radius.z;
+        // never rejected with HAS_POWER
+        block.rows[3 * block.width + lane] =
+            fmax(sphere->center_radius.w, sphere->id.y & HAS_POWER ? FLT_MAX : 0);
+        block.ids[lane] = sphere->id.x | (sphere->id.y != 0 ? SPHERE_HAS_FLAGS : 0);
+    }
+}
+
 static void nodes_fill_blocks(void *context, size_t begin, size_t end)
 {
     const CompiledScene *compiled = context;
     for (size_t i = begin; i < end; i++) {
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
-        for (unsigned k = 0; k < node.width; k++)
-            if (is_triangle_leaf(node.child_kind[k]))
-                block_fill(compiled, node.child_index[k], node.child_kind[k] >> 8);
+        for (unsigned k = 0; k < node.width; k++) {
+            if (!is_block(node.child_kind[k])) continue;
+            const unsigned kind = node.child_kind[k] & 0xff, count = node.child_kind[k] >> 8;
+            if (kind == KIND_SPHERES)
+                sphere_block_fill(compiled, node.child_index[k], count);
+            else
+                triangle_block_fill(compiled, node.child_index[k], count);
+        }
     }
 }
 
-// Copies the triangles' vertices into the blocks.
+// Copies the triangles' vertices and the spheres into the blocks.
 static void blocks_fill(CompiledScene *compiled)
 {
-    if (compiled->arrays[FLAT_TRIANGLE_BLOCKS].count == 0) return;
-    compiled->changed[FLAT_TRIANGLE_BLOCKS] = true;
+    if (blocks_count(compiled) == 0) return;
+    compiled->changed[FLAT_TRIANGLE_BLOCKS] = compiled->changed[FLAT_SPHERE_BLOCKS] = true;
     parallel_run(compiled->arrays[FLAT_NODES].count, FLAT_RANGE_MIN / 16, nodes_fill_blocks, compiled);
 }
 
-// Leaves as large as measurement found best. With several lanes a leaf of triangles is a block, which costs
-// the same whatever its size; where most primitives are triangles the tree is built for that.
+// Leaves as large as measurement found best. With several lanes a leaf of triangles or spheres is a block,
+// which costs the same whatever its size; where most primitives are such the tree is built for that.
 static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
 {
     enum { LEAF_SIZE_MAX = 8 };
-    const size_t triangle_count = bounded->kind_counts[KIND_TRIANGLES];
-    const bool has_blocks = lanes > 1 && triangle_count > 0;
-    if (has_blocks && triangle_count > bounded->count / 2) return (BvhLeaves){lanes, true};
+    const size_t block_count = bounded->kind_counts[KIND_TRIANGLES] + bounded->kind_counts[KIND_SPHERES];
+    const bool has_blocks = lanes > 1 && block_count > 0;
+    if (has_blocks && block_count > bounded->count / 2) return (BvhLeaves){lanes, true};
     return (BvhLeaves){has_blocks && lanes < LEAF_SIZE_MAX ? lanes : LEAF_SIZE_MAX, false};
 }
 
@@ -330,6 +381,7 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
 {
     flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
     flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN, false);
+    flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, 0, BVH_WIDTH_MIN, false);
     flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
     if (settings->bvh == BVH_OFF) return;
     Bounded bounded;
@@ -364,15 +416,16 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
 static void leaves_fit(void *context, size_t begin, size_t end)
 {
     const CompiledScene *compiled = context;
+    const bool has_blocks = blocks_count(compiled) > 0;
     for (size_t i = begin; i < end; i++) {
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
         for (unsigned k = 0; k < node.width; k++) {
-            const size_t kind = node.child_kind[k] & 0xff, count = node.child_kind[k] >> 8;
+            const unsigned kind = node.child_kind[k] & 0xff, count = node.child_kind[k] >> 8;
             if (count == 0) continue;
             const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
             Bounds all = bounds_empty(), box;
-            const bool is_block = kind == KIND_TRIANGLES && compiled->arrays[FLAT_TRIANGLE_BLOCKS].count > 0;
-            const size_t first = is_block ? *block_place(compiled, node.child_index[k]) : node.child_index[k];
+            size_t first = node.child_index[k];
+            if (has_blocks && is_block(node.child_kind[k])) first = *block_place(compiled, kind, first);
             for (size_t p = first; p < first + count; p++)
                 if (primitive_bounds(kind, flat_array_at(array, p), &box)) all = bounds_join(all, box);
             child_box_write(&node, k, &all);

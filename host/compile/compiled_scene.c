@@ -22,6 +22,8 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_TRIANGLE_NEIGHBORS] = LAYOUT(TriangleNeighbors, ids_sides, ids_sides),
     // the widest; flat_wide_array_renew makes them as wide as the kernel's
     [FLAT_TRIANGLE_BLOCKS] = {BVH_WIDTH_MAX / 4 * BLOCK_ROWS * sizeof(scalar4), BVH_WIDTH_MAX / 4 * BLOCK_ROWS, 0},
+    [FLAT_SPHERE_BLOCKS] = {BVH_WIDTH_MAX / 4 * (SPHERE_ROWS * sizeof(scalar4) + 2 * sizeof(uint4)),
+                            BVH_WIDTH_MAX / 4 * SPHERE_ROWS, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_BLOCK_PLACES] = LAYOUT(BlockPlaces, triangles, triangles),
     [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
@@ -76,7 +78,8 @@ void *flat_array_at(const FlatArray *array, size_t index)
 bool is_ordered_by_bvh(size_t kind)
 {
     return (kind >= FLAT_FIRST_SHAPE && kind < FLAT_FIRST_SHAPE + KIND_COUNT) || kind == FLAT_OBJECTS ||
-           kind == FLAT_NODES || kind == FLAT_TRIANGLE_BLOCKS || kind == FLAT_BLOCK_PLACES;
+           kind == FLAT_NODES || kind == FLAT_TRIANGLE_BLOCKS || kind == FLAT_SPHERE_BLOCKS ||
+           kind == FLAT_BLOCK_PLACES;
 }
 
 uint64_t flat_array_hash(uint64_t hash, const FlatArray *array)

@@ -157,4 +157,13 @@ static inline Vector pair_vector_cross_once(PairVector a, Vector b)
                     high.z + real_fma(a.x.low, b.y, -(a.y.low * b.x))};
 }
 
+#if LANES > 1
+// Returns the vector of one lane in all lanes.
+static inline Vector vector_of_lane(const Vector *lanes, uint lane)
+{
+    return (Vector){real_of_lane(&lanes->x, lane), real_of_lane(&lanes->y, lane),
+                    real_of_lane(&lanes->z, lane)};
+}
+#endif
+
 #endif

@@ -59,6 +59,21 @@ static inline real sphere_discriminant(SphereCoefficients compensated, Vector mo
     return discriminant;
 }
 
+// Returns whether rays start outside the sphere and leave it outward. b and c are the coefficients of the
+// textbook's test.
+static inline mask sphere_is_left(real c, real squared_radius, real b, real tmin)
+{
+    return (c > (real)(32 * UNIT_ROUNDOFF) * squared_radius) & (b > (real)(0)) & (tmin >= (real)(0));
+}
+
+// Returns the same for `from`, the starts seen from the centers, by the operations of sphere_hit.
+static inline mask ray_leaves_sphere(Vector from, Vector direction, real tmin, real radius)
+{
+    const real squared_radius = radius * radius;
+    return sphere_is_left(vector_dot(from, from) - squared_radius, squared_radius,
+                          vector_dot(from, direction), tmin);
+}
+
 // Intersects a sphere after two conservative rejects. The first is b^2 - a c, divided by a to stay in range
 // for any direction, with f . f lowered by more than all roundings (about 20 u), which costs no more than the
 // textbook's test. The second rejects rays that leave the sphere outward.
@@ -81,8 +96,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     hit = hit & RAY_ACTIVE(ray);
 
     real c = squared_distance - squared_radius;
-    mask outside = c > (real)(32 * UNIT_ROUNDOFF) * squared_radius;
-    hit = hit & !(outside & (b > (real)(0)) & (ray->tmin >= (real)(0)));
+    hit = hit & !sphere_is_left(c, squared_radius, b, ray->tmin);
     if (!lanes_any(hit)) return mask_none();
 
     real discriminant;

@@ -36,6 +36,18 @@ typedef struct {
     scalar u_min, u_max, v_min, v_max, w;
 } SeenRectangle;
 
+// A child of a node.
+typedef struct {
+    SeenRectangle seen;
+    uint index, kind; // of BvhNode
+    uint packets;     // that may hit it, as bits
+} TileEntry;
+
+// Rectangles, one per lane: the boxes of a node's children, or a block's primitives.
+typedef struct {
+    RealLanes u_min, u_max, v_min, v_max, w;
+} SeenRectangles;
+
 typedef struct {
     Traversal *traversals; // of each packet, as the rays
     Ray *rays;
@@ -85,6 +97,18 @@ static inline OriginFrame origin_frame(const Scene *scene, const Ray *ray, mask 
     frame.v = scalar4_along(origin, frame.v_axis);
     frame.w = scalar4_along(origin, frame.w_axis) * frame.side;
     return frame;
+}
+
+static inline Vector frame_origin(const OriginFrame *frame)
+{
+    return (Vector){(real)(frame->u), (real)(frame->v), (real)(frame->w)};
+}
+
+// Returns points, one per lane, on the frame's axes. `rows` are those of their x, y and z.
+static inline Vector frame_load(const OriginFrame *frame, global const scalar *rows)
+{
+    return (Vector){real_load(rows + frame->u_axis * LANES), real_load(rows + frame->v_axis * LANES),
+                    real_load(rows + frame->w_axis * LANES) * (real)(frame->side)};
 }
 
 static inline real tile_reach(const MacroTile *tile, uint packet)
@@ -196,6 +220,25 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     tile->tile_u_max = lanes_largest(members, tile->u_max.all);
     tile->tile_v_min = -lanes_largest(members, -tile->v_min.all);
     tile->tile_v_max = lanes_largest(members, tile->v_max.all);
+}
+
+// Returns the rectangles, as bits, that the macro-tile may hit. `w_max` is where they end, slack included.
+static inline uint tile_sees(const MacroTile *tile, const SeenRectangles *seen, real w_max)
+{
+    return lanes_bits(
+        (seen->u_min.all <= (real)(tile->tile_u_max)) & ((real)(tile->tile_u_min) <= seen->u_max.all) &
+        (seen->v_min.all <= (real)(tile->tile_v_max)) & ((real)(tile->tile_v_min) <= seen->v_max.all) &
+        (seen->w.all <= (real)(tile->tile_reach_max)) & (w_max >= (real)(0)));
+}
+
+// Returns the rectangles, one per lane, that a packet may hit.
+static inline mask packet_sees(const MacroTile *tile, uint packet, const SeenRectangles *seen)
+{
+    return (seen->u_min.all <= (real)(tile->u_max.each[packet])) &
+           ((real)(tile->u_min.each[packet]) <= seen->u_max.all) &
+           (seen->v_min.all <= (real)(tile->v_max.each[packet])) &
+           ((real)(tile->v_min.each[packet]) <= seen->v_max.all) &
+           (seen->w.all <= (real)(tile->reach_max.each[packet]));
 }
 
 // The rays of a packet, as bits, within a rectangle that they reach.

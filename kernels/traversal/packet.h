@@ -244,10 +244,14 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
     const uint leaves = met.children & node_leaves(node);
     for (uint left = leaves; left != 0; left &= left - 1) {
         uint leaf = lowest_bit(left);
-        if (child_lanes(group, &met, leaf, boxes) == 0) continue;
+        uint hit_by = child_lanes(group, &met, leaf, boxes);
         uint first = ((global const uint *)node->child_index)[leaf];
         uint kind = ((global const uint *)node->child_kind)[leaf];
-        if (intersect_leaf(traversal, scene, ray, kind, first)) group_shrink(group, traversal);
+        if (hit_by == 0 || kind == BVH_EMPTY) continue;
+        const bool is_hit = HAS_SPHERES && (kind & 0xff) == KIND_SPHERES
+                                ? intersect_sphere_block(traversal, scene, ray, first, kind >> 8, hit_by)
+                                : intersect_leaf(traversal, scene, ray, kind, first);
+        if (is_hit) group_shrink(group, traversal);
         if (group->active == 0) return;
     }
     const uint bottom = stack->count;

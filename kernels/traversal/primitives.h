@@ -100,6 +100,75 @@ static inline uint block_first(const Scene *scene, uint block)
     return ((global const uint *)scene->block_places)[block];
 }
 
+#if LANES > 1
+static inline global const scalar *block_row(global const SphereBlock *block, uint row)
+{
+    return (global const scalar *)block->rows + row * LANES;
+}
+
+static inline Vector block_centers(global const SphereBlock *block)
+{
+    return (Vector){real_load(block_row(block, 0)), real_load(block_row(block, 1)),
+                    real_load(block_row(block, 2))};
+}
+
+// Returns the sphere of one lane.
+static inline Sphere block_sphere(const Scene *scene, global const SphereBlock *block, uint lane)
+{
+    const uint id = ((global const uint *)block->ids)[lane];
+    if (RARELY(id & SPHERE_HAS_FLAGS)) return scene->spheres[((global const uint *)block->places)[lane]];
+    scalar4 center_radius = (scalar4)(block_row(block, 0)[lane], block_row(block, 1)[lane],
+                                      block_row(block, 2)[lane], block_row(block, 3)[lane]);
+    return (Sphere){center_radius, (uint4)(id, 0, 0, 0)};
+}
+
+// Returns the spheres, as bits of the first `count` of a block, that one ray may hit. Rejects by what begins
+// the full test, at `certified` with radii enlarged by all that it counts as uncertain.
+static inline uint block_spheres_near(global const SphereBlock *block, uint count, const Ray *ray, uint lane)
+{
+    const Vector origin = vector_of_lane(&ray->origin, lane),
+                 direction = vector_of_lane(&ray->direction, lane),
+                 from = vector_subtract(origin, block_centers(block));
+    const real inverse_squared = real_of_lane(&ray->inverse_squared, lane);
+    real radius = real_load(block_row(block, 3));
+    const real squared_distance = vector_dot(from, from), b = vector_dot(from, direction);
+    mask near = mask_all();
+#if IS_CERTIFIED
+    const real distance = vector_norm1(from) + (real)(3) * radius + vector_norm1(origin),
+               per_distance = real_of_lane(&ray->direction_error, lane) + (real)(32 * UNIT_ROUNDOFF);
+    radius = radius + real_fma(per_distance, distance, real_of_lane(&ray->origin_error, lane));
+#else
+    near = !ray_leaves_sphere(from, direction, real_of_lane(&ray->tmin, lane), radius);
+#endif
+    near = near & !(b * (b * inverse_squared) <
+                    real_fma(-radius, radius, squared_distance * (real)(1 - 32 * UNIT_ROUNDOFF)));
+    return lanes_bits(near) & ((1u << count) - 1);
+}
+
+// Intersects the spheres of a block that are given as bits.
+static inline bool intersect_block_spheres(Traversal *traversal, const Scene *scene, const Ray *ray,
+                                           global const SphereBlock *block, uint spheres)
+{
+    bool found_any = false;
+    for (; spheres != 0; spheres &= spheres - 1) {
+        found_any |= intersect_sphere(traversal, scene, ray, block_sphere(scene, block, lowest_bit(spheres)));
+        if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;
+    }
+    return found_any;
+}
+
+// Intersects the first `count` spheres of a block with the rays of some lanes, given as bits.
+static inline bool intersect_sphere_block(Traversal *traversal, const Scene *scene, const Ray *ray,
+                                          uint index, uint count, uint lanes)
+{
+    global const SphereBlock *block = &scene->sphere_blocks[index];
+    uint near = 0;
+    for (; lanes != 0; lanes &= lanes - 1)
+        near |= block_spheres_near(block, count, ray, lowest_bit(lanes));
+    return intersect_block_spheres(traversal, scene, ray, block, near);
+}
+#endif
+
 // A leaf is count << 8 | kind (BvhNode.child_kind) and its index there.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint index)

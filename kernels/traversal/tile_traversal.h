@@ -9,14 +9,10 @@
 #define TILE_TRAVERSAL_H
 
 #include "traversal/macro_tile.h"
+#include "traversal/sphere_block.h"
 #include "traversal/triangle_block.h"
 
 #if LANES > 1
-
-// The boxes of a node's children, a lane per child, as rectangles seen from w on.
-typedef struct {
-    RealLanes u_min, u_max, v_min, v_max, w;
-} SeenBoxes;
 
 static inline real box_slope_min(real a, real b)
 {
@@ -26,7 +22,7 @@ static inline real box_slope_min(real a, real b)
 }
 
 // Returns the children, as bits, whose boxes the macro-tile may hit.
-static inline uint boxes_view(SeenBoxes *seen, const MacroTile *tile, global const scalar *boxes)
+static inline uint boxes_view(SeenRectangles *seen, const MacroTile *tile, global const scalar *boxes)
 {
     const OriginFrame *frame = &tile->frame;
     global const scalar *low = boxes + BVH_LOW * BVH_WIDTH, *high = boxes + BVH_HIGH * BVH_WIDTH;
@@ -44,18 +40,12 @@ static inline uint boxes_view(SeenBoxes *seen, const MacroTile *tile, global con
     const real steep = (real)(1 / SMALLEST_RATIO);
     real near_inverse = lanes_select(w_min <= slack, steep, reciprocal_estimate(real_max(w_min, slack))),
          far_inverse = reciprocal_estimate(real_max(w_max, slack));
-    real u_min = box_slope_min(u_low * near_inverse, u_low * far_inverse),
-         u_max = -box_slope_min(-u_high * near_inverse, -u_high * far_inverse);
-    real v_min = box_slope_min(v_low * near_inverse, v_low * far_inverse),
-         v_max = -box_slope_min(-v_high * near_inverse, -v_high * far_inverse);
-    seen->u_min.all = u_min;
-    seen->u_max.all = u_max;
-    seen->v_min.all = v_min;
-    seen->v_max.all = v_max;
+    seen->u_min.all = box_slope_min(u_low * near_inverse, u_low * far_inverse);
+    seen->u_max.all = -box_slope_min(-u_high * near_inverse, -u_high * far_inverse);
+    seen->v_min.all = box_slope_min(v_low * near_inverse, v_low * far_inverse);
+    seen->v_max.all = -box_slope_min(-v_high * near_inverse, -v_high * far_inverse);
     seen->w.all = w_min;
-    return lanes_bits((u_min <= (real)(tile->tile_u_max)) & ((real)(tile->tile_u_min) <= u_max) &
-                      (v_min <= (real)(tile->tile_v_max)) & ((real)(tile->tile_v_min) <= v_max) &
-                      (w_min <= (real)(tile->tile_reach_max)) & (w_max >= (real)(0)));
+    return tile_sees(tile, seen, w_max);
 }
 
 // The packets, of those given as bits, whose rectangle overlaps that of a box, a lane per packet.
@@ -68,18 +58,13 @@ static inline uint packets_overlap(const MacroTile *tile, uint packets, const Se
 }
 
 // The same of all children, a lane per child: for each the packets, as bits.
-static inline integer packets_overlap_each(const MacroTile *tile, uint packets, const SeenBoxes *seen)
+static inline integer packets_overlap_each(const MacroTile *tile, uint packets, const SeenRectangles *seen)
 {
     integer overlapping = (integer)(0);
     for (; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
-        mask overlaps = (seen->u_min.all <= (real)(tile->u_max.each[packet])) &
-                        ((real)(tile->u_min.each[packet]) <= seen->u_max.all) &
-                        (seen->v_min.all <= (real)(tile->v_max.each[packet])) &
-                        ((real)(tile->v_min.each[packet]) <= seen->v_max.all) &
-                        (seen->w.all <= (real)(tile->reach_max.each[packet]));
-        overlapping =
-            lanes_select(overlaps, overlapping | (integer)((scalar_integer)1 << packet), overlapping);
+        overlapping = lanes_select(packet_sees(tile, packet, seen),
+                                   overlapping | (integer)((scalar_integer)1 << packet), overlapping);
     }
     return overlapping;
 }
@@ -96,13 +81,6 @@ static inline uint packets_within(const MacroTile *tile, uint packets, const See
     return packets;
 }
 
-// A pending child of a node.
-typedef struct {
-    SeenRectangle seen;
-    uint index, kind; // of BvhNode
-    uint packets;     // that may hit it, as bits
-} TileEntry;
-
 // Prefetches what a visit will read first.
 static inline void entry_prefetch(const Scene *scene, uint kind, uint index)
 {
@@ -110,6 +88,9 @@ static inline void entry_prefetch(const Scene *scene, uint kind, uint index)
         memory_prefetch((global const char *)&scene->nodes[index], sizeof(BvhNode));
     else if (HAS_TRIANGLES && (kind & 0xff) == KIND_TRIANGLES)
         memory_prefetch((global const char *)&scene->triangle_blocks[index], sizeof(TriangleBlock));
+    else if (HAS_SPHERES && (kind & 0xff) == KIND_SPHERES)
+        memory_prefetch((global const char *)&scene->sphere_blocks[index],
+                        sizeof(scene->sphere_blocks->rows) + sizeof(scene->sphere_blocks->ids));
 }
 
 // Intersects the primitives of a leaf with the rays of packets.
@@ -123,14 +104,23 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
     }
 }
 
-// Pushes the children of a node that the packets may hit, the nearest to the common origin last. Returns the
-// number of entries.
-static inline uint tile_visit_node(MacroTile *tile, const Scene *scene, global const BvhNode *node,
-                                   uint packets, TileEntry *entries, uint count)
+// Returns whether a child is visited only after all that are nearer to the common origin: nodes and blocks.
+// Shadow rays do not end at the nearest hit, and gain nothing from that order between blocks of spheres.
+static inline bool child_waits(uint kind, bool is_shadow)
+{
+    return kind == BVH_NODE || (kind & 0xff) == KIND_TRIANGLES ||
+           (!is_shadow && (kind & 0xff) == KIND_SPHERES);
+}
+
+// Visits the children of a node that the packets may hit, or pushes those that wait, the nearest to the
+// common origin last. Returns the number of entries.
+static inline ALWAYS_INLINE uint tile_visit_node(MacroTile *tile, const Scene *scene,
+                                                 global const BvhNode *node, uint packets, TileEntry *entries,
+                                                 uint count, bool is_shadow)
 {
     const uint bottom = count;
     if (tile->has_shrunk) tile_bound_reach(tile);
-    SeenBoxes boxes;
+    SeenRectangles boxes;
     uint children = boxes_view(&boxes, tile, (global const scalar *)node->planes);
     const bool by_packet = popcount(packets) < popcount(children); // the shorter loop runs
     IntegerLanes overlapping;
@@ -146,13 +136,14 @@ static inline uint tile_visit_node(MacroTile *tile, const Scene *scene, global c
         entry.kind = ((global const uint *)node->child_kind)[child];
         entry.packets = tile->active & (by_packet ? (uint)overlapping.each[child]
                                                   : packets_overlap(tile, packets, &entry.seen));
-        // a sphere's first test costs no more than that of its box
-        const bool has_spheres = HAS_SPHERES && entry.kind >> 8 > 0 && (entry.kind & 0xff) == KIND_SPHERES;
-        if (!has_spheres) entry.packets = packets_within(tile, entry.packets, &entry.seen);
-        if (entry.packets == 0) continue;
+        entry.packets = packets_within(tile, entry.packets, &entry.seen);
+        if (entry.packets == 0 || entry.kind == BVH_EMPTY) continue;
         entry.index = ((global const uint *)node->child_index)[child];
-        if (entry.kind != BVH_NODE && (entry.kind & 0xff) != KIND_TRIANGLES) {
-            tile_visit_leaf(tile, scene, &entry, entry.packets);
+        if (!child_waits(entry.kind, is_shadow)) {
+            if (HAS_SPHERES && is_shadow && (entry.kind & 0xff) == KIND_SPHERES)
+                tile_visit_spheres(tile, scene, &entry, entry.packets, true);
+            else
+                tile_visit_leaf(tile, scene, &entry, entry.packets);
             continue;
         }
         entry_prefetch(scene, entry.kind, entry.index);
@@ -178,13 +169,12 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
             entry.packets & tile->active & lanes_bits((real)(entry.seen.w) <= tile->reach_max.all);
         if (packets == 0) continue;
         if (entry.kind == BVH_NODE)
-            count = tile_visit_node(tile, scene, &scene->nodes[entry.index], packets, entries, count);
-#if HAS_TRIANGLES
-        else if ((entry.kind & 0xff) == KIND_TRIANGLES)
-            tile_visit_block(tile, scene, entry.index, entry.kind >> 8, &entry.seen, packets, is_shadow);
-#endif
-        else
-            tile_visit_leaf(tile, scene, &entry, packets);
+            count =
+                tile_visit_node(tile, scene, &scene->nodes[entry.index], packets, entries, count, is_shadow);
+        else if (HAS_TRIANGLES && (entry.kind & 0xff) == KIND_TRIANGLES)
+            tile_visit_triangles(tile, scene, &entry, packets, is_shadow);
+        else if (HAS_SPHERES && !is_shadow)
+            tile_visit_spheres(tile, scene, &entry, packets, false);
     }
 }
 

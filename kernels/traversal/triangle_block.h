@@ -12,14 +12,13 @@
 #include "traversal/macro_tile.h"
 #include "traversal/primitives.h"
 
-#if LANES > 1 && HAS_TRIANGLES
+#if LANES > 1
 
 // The triangles of a block as seen from the common origin, a lane each, in its frame.
 typedef struct {
-    Vector edges[3];  // a x b, b x c and c x a, of the sign with which values inside are positive
-    RealLanes error;  // of the edge values
-    RealLanes w_near; // the w from which it may be hit
-    real u_min, u_max, v_min, v_max;
+    SeenRectangles seen;
+    Vector edges[3]; // a x b, b x c and c x a, of the sign with which values inside are positive
+    RealLanes error; // of the edge values
     // For shadow rays: an upper bound on the triangle's w, LARGEST where it may reach the light; a vertex on
     // the frame's axes, but not from its origin; the normal, to either side.
     RealLanes w_far;
@@ -31,14 +30,6 @@ typedef struct {
 // test.
 #define BLOCKS_TEST_SIDES (!IS_CERTIFIED)
 #define BLOCKS_OCCLUDE    (BLOCKS_TEST_SIDES && !HAS_TRANSMISSION)
-
-// A vertex of all triangles: 0, 1 or 2.
-static inline Vector block_vertices(const OriginFrame *frame, global const TriangleBlock *block, uint vertex)
-{
-    global const scalar *rows = (global const scalar *)block->rows + vertex * (3 * LANES);
-    return (Vector){real_load(rows + frame->u_axis * LANES), real_load(rows + frame->v_axis * LANES),
-                    real_load(rows + frame->w_axis * LANES) * (real)(frame->side)};
-}
 
 // Each component within 2 u of the product of the lengths.
 static inline Vector block_cross(Vector a, Vector b)
@@ -80,10 +71,11 @@ typedef struct {
 static inline BlockVertices block_load(const MacroTile *tile, global const TriangleBlock *block)
 {
     const OriginFrame *frame = &tile->frame;
-    const Vector origin = {(real)(frame->u), (real)(frame->v), (real)(frame->w)};
+    const Vector origin = frame_origin(frame);
+    global const scalar *rows = (global const scalar *)block->rows;
     BlockVertices at;
-    const Vector b = block_vertices(frame, block, 1), c = block_vertices(frame, block, 2);
-    at.vertex = block_vertices(frame, block, 0);
+    const Vector b = frame_load(frame, rows + 3 * LANES), c = frame_load(frame, rows + 6 * LANES);
+    at.vertex = frame_load(frame, rows);
     // not from the differences below: from a far origin these are rounded by more than the edges are long
     at.ab = vector_subtract(b, at.vertex);
     at.bc = vector_subtract(c, b);
@@ -115,15 +107,12 @@ static inline uint block_see(BlockView *view, const MacroTile *tile, const Block
     real a_u = a.x * a_inverse, b_u = b.x * b_inverse, c_u = c.x * c_inverse;
     real a_v = a.y * a_inverse, b_v = b.y * b_inverse, c_v = c.y * c_inverse;
     const real anywhere = (real)(LARGEST), slack = (real)(tile->slack);
-    view->u_min = lanes_select(at->is_near, -anywhere, real_min_of_3(a_u, b_u, c_u));
-    view->u_max = lanes_select(at->is_near, anywhere, real_max_of_3(a_u, b_u, c_u));
-    view->v_min = lanes_select(at->is_near, -anywhere, real_min_of_3(a_v, b_v, c_v));
-    view->v_max = lanes_select(at->is_near, anywhere, real_max_of_3(a_v, b_v, c_v));
-    view->w_near.all = at->low - slack;
-    mask seen = (view->u_min <= (real)(tile->tile_u_max)) & ((real)(tile->tile_u_min) <= view->u_max) &
-                (view->v_min <= (real)(tile->tile_v_max)) & ((real)(tile->tile_v_min) <= view->v_max) &
-                (view->w_near.all <= (real)(tile->tile_reach_max)) & (at->high >= -slack);
-    return lanes_bits(seen) & ((1u << count) - 1);
+    view->seen.u_min.all = lanes_select(at->is_near, -anywhere, real_min_of_3(a_u, b_u, c_u));
+    view->seen.u_max.all = lanes_select(at->is_near, anywhere, real_max_of_3(a_u, b_u, c_u));
+    view->seen.v_min.all = lanes_select(at->is_near, -anywhere, real_min_of_3(a_v, b_v, c_v));
+    view->seen.v_max.all = lanes_select(at->is_near, anywhere, real_max_of_3(a_v, b_v, c_v));
+    view->seen.w.all = at->low - slack;
+    return tile_sees(tile, &view->seen, at->high + slack) & ((1u << count) - 1);
 }
 
 // The error of a vertex across a ray.
@@ -164,12 +153,6 @@ static inline void block_set_edges(BlockView *view, const MacroTile *tile, const
     view->normal = block_cross(at->ab, at->bc);
     view->normal_squared = vector_dot(view->normal, view->normal);
     view->longest = at->longest;
-}
-
-static inline Vector vector_of_lane(const Vector *lanes, uint lane)
-{
-    return (Vector){real_of_lane(&lanes->x, lane), real_of_lane(&lanes->y, lane),
-                    real_of_lane(&lanes->z, lane)};
 }
 
 static inline real edge_value(Vector edge, real u, real v)
@@ -226,7 +209,7 @@ static inline ALWAYS_INLINE uint block_test_rays(MacroTile *tile, const BlockVie
              reach = real_of_lane(&tile->reach[packet], lane);
         real least = real_min_of_3(edge_value(view->edges[0], u, v), edge_value(view->edges[1], u, v),
                                    edge_value(view->edges[2], u, v));
-        uint perhaps = triangles & lanes_bits(!(least < -view->error.all) & (view->w_near.all <= reach));
+        uint perhaps = triangles & lanes_bits(!(least < -view->error.all) & (view->seen.w.all <= reach));
         if (perhaps == 0) continue;
         if (is_shadow && BLOCKS_OCCLUDE &&
             (perhaps & lanes_bits((least > view->error.all) & (view->w_far.all < reach)))) {
@@ -256,7 +239,7 @@ static inline ALWAYS_INLINE uint block_test_triangles(MacroTile *tile, const Blo
         real least = real_min_of_3(edge_value(vector_of_lane(&view->edges[0], lane), u, v),
                                    edge_value(vector_of_lane(&view->edges[1], lane), u, v),
                                    edge_value(vector_of_lane(&view->edges[2], lane), u, v));
-        uint perhaps = lanes_bits(!(least < -error) & ((real)(view->w_near.each[lane]) <= reach));
+        uint perhaps = lanes_bits(!(least < -error) & ((real)(view->seen.w.each[lane]) <= reach));
         if (perhaps == 0) continue;
         if (is_shadow && BLOCKS_OCCLUDE) {
             const uint occluded = lanes_bits((least > error) & ((real)(view->w_far.each[lane]) < reach));
@@ -283,30 +266,26 @@ static inline void triangles_prefetch(const Scene *scene, uint first, uint trian
                         sizeof(Triangle));
 }
 
-// Intersects the triangles of a block with the packets, given as bits, that see its box as `seen`. The full
-// tests come last, when what they read has been prefetched.
-static inline ALWAYS_INLINE void tile_visit_block(MacroTile *tile, const Scene *scene, uint block, uint count,
-                                                  const SeenRectangle *seen, uint packets, bool is_shadow)
+// Intersects the triangles of a block with packets, given as bits. The full tests come last, when what they
+// read has been prefetched.
+static inline ALWAYS_INLINE void tile_visit_triangles(MacroTile *tile, const Scene *scene,
+                                                      const TileEntry *leaf, uint packets, bool is_shadow)
 {
     if (tile->has_shrunk) tile_bound_reach(tile);
     BlockView view;
-    const BlockVertices vertices = block_load(tile, &scene->triangle_blocks[block]);
-    const uint triangles = block_see(&view, tile, &vertices, count);
+    const BlockVertices vertices = block_load(tile, &scene->triangle_blocks[leaf->index]);
+    const uint triangles = block_see(&view, tile, &vertices, leaf->kind >> 8);
     if (triangles == 0) return;
     block_set_edges(&view, tile, &vertices, is_shadow);
-    const uint first = block_first(scene, block);
+    const uint first = block_first(scene, leaf->index);
     uint prefetched = is_shadow ? 0 : triangles; // many of a shadow ray's are missed
     triangles_prefetch(scene, first, prefetched);
     ushort remaining[LANES];
     uint tested = 0;
     for (; packets != 0; packets &= packets - 1) {
-        const uint packet = lowest_bit(packets), rays = rays_within(tile, packet, seen);
+        const uint packet = lowest_bit(packets), rays = rays_within(tile, packet, &leaf->seen);
         if (rays == 0) continue;
-        const uint near = triangles & lanes_bits((view.u_min <= (real)(tile->u_max.each[packet])) &
-                                                 ((real)(tile->u_min.each[packet]) <= view.u_max) &
-                                                 (view.v_min <= (real)(tile->v_max.each[packet])) &
-                                                 ((real)(tile->v_min.each[packet]) <= view.v_max) &
-                                                 (view.w_near.all <= (real)(tile->reach_max.each[packet])));
+        const uint near = triangles & lanes_bits(packet_sees(tile, packet, &view.seen));
         if (near == 0) continue;
         const uint left = popcount(rays) <= popcount(near)
                               ? block_test_rays(tile, &view, packet, rays, near, is_shadow)
