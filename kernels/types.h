@@ -305,8 +305,8 @@ typedef struct {
     // For spots, x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which
     // kernels do not read; z: 1 / (x - y), or 0 for a hard edge.
     scalar4 cone;
-    scalar4
-        fading; // with HAS_FADING_LIGHTS, xyz: the strength is divided by x + y d + z d^2 at the distance d
+    // With HAS_FADING_LIGHTS: the strength is divided by x + y d + z d^2 at the distance d.
+    scalar4 fading;
     uint4 kind; // x: LIGHT_KIND_…
 } Light;
 

@@ -516,7 +516,7 @@ class Test(TestCase):
             "nodes[5].extensions.KHR_lights_punctual.light: must be an integer from 0 to 3: not used",
             "cameras[1]: only the first camera is used",
             "the orthographic camera becomes",
-            "lights of 33.9 in total at the center",
+            "lights of 33.9 in total around the center",
         )
         self.assertEqual(report["lights"], 3)
         self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS"})

@@ -1,6 +1,7 @@
 #include "host/image/display.h"
 #include "host/image/transfer.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -32,8 +33,8 @@ static uint32_t bayer(uint32_t x, uint32_t y)
     return order;
 }
 
-// A display value of 16 bits is 257 times one of 8 bits and a rest, which the order of the pixel rounds up or
-// down. Values that have no rest keep theirs.
+// A display value of 16 bits is 257 times one of 8 bits and a remainder, which the order of the pixel rounds
+// up or down. Multiples of 257 are unchanged.
 static uint8_t dithered(float value, Transfer transfer, uint32_t x, uint32_t y)
 {
     return (uint8_t)((image_quantize(value, transfer, 16) + ((2 * bayer(x, y) + 1) * 257 >> 7)) / 257);
@@ -43,14 +44,14 @@ void display_row(uint8_t *bytes, const float *values, const ImageHeader *header,
 {
     const size_t count = (size_t)header->width * header->channels, value_size = header->bits / 8;
     const double gain =
-        (float)exp2(header->exposure); // rounded, so that the last bits of the host's exp2() do not matter
+        (float)exp2(header->exposure); // rounded: hosts' exp2() differ in the last bits of a double
     const bool is_toned = gain != 1 || header->tone != TONE_NONE;
     float toned[CHUNK];
     for (size_t start = 0, length; start < count; start += length) {
         length = count - start < CHUNK ? count - start : CHUNK;
         const float *chunk = values + start;
         for (size_t i = 0; i < length && is_toned; i++)
-            toned[i] = (float)tone_apply(chunk[i] * gain, header->tone);
+            toned[i] = (float)fmin(tone_apply(chunk[i] * gain, header->tone), FLT_MAX);
         if (is_toned) chunk = toned;
         if (!header->dither) {
             transfer_quantize(bytes + start * value_size, chunk, length, header->transfer, header->bits);

@@ -1,6 +1,7 @@
 #include "host/measure/pilot.h"
 
 #include "host/base/clock.h"
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -250,5 +251,9 @@ void pilot_describe(Text *text, const Pilot *pilot)
                      budget->metric == ERROR_FLIP ? "estimated as " : "", verdict->bound, percent);
     }
     text_appendf(text, "; %zu of %zu pixels", pilot->pixels, pilot->image_pixels);
-    if (budget->metric == ERROR_RMSE) text_appendf(text, ", colors up to %.3g", pilot->color_max);
+    if (budget->metric != ERROR_RMSE) return;
+    if (pilot->color_max <= DBL_MAX)
+        text_appendf(text, ", colors up to %.3g", pilot->color_max);
+    else
+        text_appendf(text, ", which bounds no RMSE: a light that fades may be of any brightness");
 }

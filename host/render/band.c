@@ -53,18 +53,23 @@ static size_t buffer_size(cl_mem buffer)
 static cl_mem film_buffer(Renderer *renderer, size_t size)
 {
     SpareBuffers *spares = &renderer->spares;
-    size_t best = spares->count, largest = 0;
-    for (size_t i = 0; i < spares->count; i++) {
+    size_t best = spares->count, best_size = SIZE_MAX, largest = 0, largest_size = 0;
+    for (size_t i = 0; i < spares->count && best_size > size; i++) {
         const size_t spare = buffer_size(spares->items[i]);
-        if (spare >= size && (best == spares->count || spare < buffer_size(spares->items[best]))) best = i;
-        if (spare > buffer_size(spares->items[largest])) largest = i;
+        if (spare >= size && spare < best_size) {
+            best = i;
+            best_size = spare;
+        }
+        if (spare > largest_size) {
+            largest = i;
+            largest_size = spare;
+        }
     }
-    const size_t taken = best < spares->count ? best : largest;
-    cl_mem buffer = NULL;
-    if (taken < spares->count) {
-        buffer = spares->items[taken];
-        spares->items[taken] = spares->items[--spares->count];
-        if (taken == best) return buffer;
+    const size_t chosen = best < spares->count ? best : largest;
+    if (chosen < spares->count) {
+        cl_mem buffer = spares->items[chosen];
+        spares->items[chosen] = spares->items[--spares->count];
+        if (chosen == best) return buffer;
         buffer_release(buffer);
     }
     return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);

@@ -45,7 +45,8 @@ static bool mesh_transform(Mesh *mesh, const Affine *affine)
         fits &= is_in_range(mesh->vertices[i]);
         if (mesh->normals) mesh->normals[i] = normal_transform(&for_normals, mesh->normals[i]);
     }
-    for (size_t i = 0; i < mesh->triangle_count && affine_determinant(affine) < 0; i++) {
+    const bool is_mirrored = affine_determinant(affine) < 0;
+    for (size_t i = 0; i < mesh->triangle_count && is_mirrored; i++) {
         uint32_t *corners = mesh->triangles[i], second = corners[1];
         corners[1] = corners[2];
         corners[2] = second;
@@ -71,9 +72,11 @@ static bool triangle_transform(Object *object, const Affine *affine)
 static bool keeps_axes(const Affine *affine)
 {
     for (int row = 0; row < 3; row++) {
+        const double *m = affine->rows[row],
+                     rounding = 1e-12 * fmax(fabs(m[0]), fmax(fabs(m[1]), fabs(m[2])));
         int count = 0;
         for (int column = 0; column < 3; column++)
-            count += affine->rows[row][column] != 0;
+            count += fabs(m[column]) > rounding;
         if (count != 1) return false;
     }
     return true;
@@ -188,73 +191,71 @@ static bool paraboloid_transform(Object *object, const Affine *affine)
 
 #define NEEDS_STRAIGHT "needs the same scale in all directions across its axis, and no shear"
 
-// Indexed by ShapeKind. `vectors` and `lengths` are the offsets of members that must stay in range, ended by
-// 0; lengths must stay above 0, or at least 0 where the shape has an alternative to them.
+// Indexed by ShapeKind. `need` is what a transform must fulfill, where it can fail to. Each list of offsets
+// is ended by 0: vectors and lengths must stay within the range, the axis different from 0, and `positive`
+// lengths above 0.
 static const struct {
     bool (*transform)(Object *object, const Affine *affine);
-    const char *need; // where it can fail
-    size_t vectors[4], positive[3], lengths[3];
+    const char *need;
+    size_t vectors[4], axis, positive[3], lengths[4];
 } shapes[SHAPE_MESH] = {
-    {sphere_transform,
-     "needs the same scale in all directions",
-     {offsetof(Object, as.sphere.center)},
-     {offsetof(Object, as.sphere.radius)},
-     {0}},
-    {plane_transform, NULL, {offsetof(Object, as.plane.point)}, {0}, {0}},
-    {disc_transform,
-     "needs the same scale in all directions of its plane",
-     {offsetof(Object, as.disc.center)},
-     {offsetof(Object, as.disc.radius)},
-     {0}},
-    {box_transform, NULL, {offsetof(Object, as.box.min), offsetof(Object, as.box.max)}, {0}, {0}},
-    {cylinder_transform,
-     NEEDS_STRAIGHT,
-     {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
-     {offsetof(Object, as.cylinder.radius)},
-     {0}},
-    {cone_transform,
-     NEEDS_STRAIGHT,
-     {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
-     {0},
-     {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1])}},
+    {sphere_transform, "needs the same scale in all directions",
+     .vectors = {offsetof(Object, as.sphere.center)}, .positive = {offsetof(Object, as.sphere.radius)}},
+    {plane_transform, .vectors = {offsetof(Object, as.plane.point)}},
+    {disc_transform, "needs the same scale in all directions of its plane",
+     .vectors = {offsetof(Object, as.disc.center)}, .positive = {offsetof(Object, as.disc.radius)}},
+    {box_transform, .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)}},
+    {cylinder_transform, NEEDS_STRAIGHT,
+     .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
+     .axis = offsetof(Object, as.cylinder.axis), .positive = {offsetof(Object, as.cylinder.radius)}},
+    {cone_transform, NEEDS_STRAIGHT,
+     .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
+     .axis = offsetof(Object, as.cone.axis),
+     .lengths = {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1]),
+                 offsetof(Object, as.cone.slope)}},
     {triangle_transform,
-     NULL,
-     {offsetof(Object, as.triangle.vertices[0]), offsetof(Object, as.triangle.vertices[1]),
-      offsetof(Object, as.triangle.vertices[2])},
-     {0},
-     {0}},
-    {torus_transform,
-     "needs the same scale in all directions",
-     {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
-     {offsetof(Object, as.torus.major), offsetof(Object, as.torus.minor)},
-     {0}},
-    {paraboloid_transform,
-     NEEDS_STRAIGHT,
-     {offsetof(Object, as.paraboloid.apex), offsetof(Object, as.paraboloid.axis)},
-     {offsetof(Object, as.paraboloid.focal_length)},
-     {offsetof(Object, as.paraboloid.height)}},
+     .vectors = {offsetof(Object, as.triangle.vertices[0]), offsetof(Object, as.triangle.vertices[1]),
+                 offsetof(Object, as.triangle.vertices[2])}},
+    {torus_transform, "needs the same scale in all directions",
+     .vectors = {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
+     .axis = offsetof(Object, as.torus.axis),
+     .positive = {offsetof(Object, as.torus.major), offsetof(Object, as.torus.minor)}},
+    {paraboloid_transform, NEEDS_STRAIGHT,
+     .vectors = {offsetof(Object, as.paraboloid.apex), offsetof(Object, as.paraboloid.axis)},
+     .axis = offsetof(Object, as.paraboloid.axis), .positive = {offsetof(Object, as.paraboloid.focal_length)},
+     .lengths = {offsetof(Object, as.paraboloid.height)}},
 };
+
+// Return the member of an object at an offset.
+static double number_at(const Object *object, size_t offset)
+{
+    return *(const double *)(const void *)((const char *)object + offset);
+}
+
+static Vector3 vector_at(const Object *object, size_t offset)
+{
+    return *(const Vector3 *)(const void *)((const char *)object + offset);
+}
 
 static bool numbers_fit(const Object *object)
 {
-    const char *members = (const char *)object;
-    bool fits = true;
+    bool fits =
+        shapes[object->kind].axis == 0 || !vector_is_zero(vector_at(object, shapes[object->kind].axis));
     for (const size_t *offset = shapes[object->kind].vectors; *offset > 0; offset++)
-        fits &= is_in_range(*(const Vector3 *)(const void *)(members + *offset));
+        fits &= is_in_range(vector_at(object, *offset));
     for (const size_t *offset = shapes[object->kind].positive; *offset > 0; offset++)
-        fits &= *(const double *)(const void *)(members + *offset) > 0 &&
-                *(const double *)(const void *)(members + *offset) <= NUMBER_LARGEST;
+        fits &= number_at(object, *offset) > 0 && number_at(object, *offset) <= NUMBER_LARGEST;
     for (const size_t *offset = shapes[object->kind].lengths; *offset > 0; offset++)
-        fits &= *(const double *)(const void *)(members + *offset) <= NUMBER_LARGEST;
-    const Object *cone = object->kind == SHAPE_CONE ? object : NULL;
-    if (cone && cone->as.cone.finite) fits &= cone->as.cone.radius[0] + cone->as.cone.radius[1] > 0;
-    if (cone) fits &= !vector_is_zero(cone->as.cone.axis);
-    return fits;
+        fits &= number_at(object, *offset) <= NUMBER_LARGEST;
+    const bool is_cone = object->kind == SHAPE_CONE;
+    const double widest = object->as.cone.finite ? object->as.cone.radius[0] + object->as.cone.radius[1]
+                                                 : object->as.cone.slope;
+    return fits && (!is_cone || widest > 0);
 }
 
 const char *object_transform(Scene *scene, Object *object, const Affine *affine)
 {
-    static const char *const out_of_range = "gets numbers of 0 or beyond 1e30";
+    static const char *const out_of_range = "gets a size of 0 or a number beyond 1e30";
     if (object->kind == SHAPE_BOX && !keeps_axes(affine)) box_make_mesh(scene, object);
     if (object->kind == SHAPE_MESH)
         return mesh_transform(&scene->meshes.items[object->as.mesh.index], affine) ? NULL : out_of_range;

@@ -258,6 +258,17 @@ static void signature_add(Tree *tree, uint32_t object, uint32_t events)
     tree->signature = (tree->signature ^ ((object + 1) * PATH_EVENTS + events)) * PATH_FACTOR;
 }
 
+// Returns the part of unpolarized light that a body of this index reflects, by Fresnel's equations.
+static Quad reflectance(Quad cosine, Quad ior, bool entering)
+{
+    const Quad eta = entering ? 1 / ior : ior, squared = 1 - eta * eta * (1 - cosine * cosine);
+    if (squared <= 0) return 1;
+    const Quad behind = QUAD_CALL(sqrt)(squared), near = entering ? 1 : ior, far = entering ? ior : 1;
+    const Quad across = (near * cosine - far * behind) / (near * cosine + far * behind),
+               along = (near * behind - far * cosine) / (near * behind + far * cosine);
+    return (across * across + along * along) / 2;
+}
+
 static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color weight, unsigned bounces_left)
 {
     const Scene *scene = &tree->world->scene;
@@ -302,6 +313,18 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
         reflection += is_total ? transmission : 0;
         if (is_total) reflected_weight = vector_add(reflected_weight, vector_all(transmission));
         transmission = is_total ? 0 : transmission;
+    }
+    if (material->fresnel && !is_total) {
+        const double part = (double)reflectance(-quad3_dot(direction, surface.normal), (Quad)material->ior,
+                                                surface.entering || material->transmission == 0);
+        if (transmission > 0) {
+            reflection += part * transmission;
+            reflected_weight = vector_add(reflected_weight, vector_all(part * transmission));
+            transmission -= part * transmission;
+        } else {
+            reflection *= part;
+            reflected_weight = vector_scale(reflected_weight, part);
+        }
     }
     signature_add(tree, hit.object,
                   (reflection > 0 ? PATH_REFLECTED : 0u) | (transmission > 0 ? PATH_REFRACTED : 0u) |

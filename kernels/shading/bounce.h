@@ -285,8 +285,8 @@ static inline Color3 weight_part(Color3 weight, real part)
     if (HAS_TINTS)
         return (Color3){channel_part(weight.x, part), channel_part(weight.y, part),
                         channel_part(weight.z, part)};
-    const real all = channel_part(weight.x, part);
-    return (Color3){all, all, all};
+    const real scaled = channel_part(weight.x, part);
+    return (Color3){scaled, scaled, scaled};
 }
 
 // Returns the product with a color, whose channels no product rounds to 0.
@@ -312,7 +312,9 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
     mask total = mask_none();
     mask transparent = HAS_TRANSMISSION ? surface->transmission > (real)(0) : mask_none();
     if (HAS_FRESNEL && lanes_any(surface->fresnel)) {
-        real part = fresnel_reflectance(direction, surface->shading_normal, surface->entering, surface->ior);
+        // an opaque body has no inside
+        real part = fresnel_reflectance(direction, surface->shading_normal, surface->entering | !transparent,
+                                        surface->ior);
         kept = lanes_select(surface->fresnel & transparent, part * surface->transmission, kept);
         reflection = lanes_select(surface->fresnel & !transparent, part * reflection, reflection);
     }

@@ -28,9 +28,9 @@ static inline real spot_strength(const Light *light, Vector from_light)
 // Returns the strength that a light has left at a vector's length, never 0.
 static inline real light_fading(const Light *light, Vector to_light)
 {
-    real distance = real_sqrt(vector_dot(to_light, to_light));
-    real divisor = real_fma((real)(light->fading.z), distance, (real)(light->fading.y));
-    divisor = real_max(real_fma(divisor, distance, (real)(light->fading.x)), (real)(SMALLEST_RATIO));
+    real light_distance = real_sqrt(vector_dot(to_light, to_light));
+    real divisor = real_fma((real)(light->fading.z), light_distance, (real)(light->fading.y));
+    divisor = real_max(real_fma(divisor, light_distance, (real)(light->fading.x)), (real)(SMALLEST_RATIO));
     return real_max(real_divide((real)(1), divisor), (real)(SMALLEST_RATIO));
 }
 
@@ -50,13 +50,13 @@ static inline LightRay light_ray(const Light *light, const Surface *surface)
         return to_light;
     }
     Vector position = vector_of(light->position);
-    Vector way = vector_subtract(position, surface->position);
-    to_light.direction = vector_normalize(way);
+    Vector to_position = vector_subtract(position, surface->position);
+    to_light.direction = vector_normalize(to_position);
     to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
     if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
     if (HAS_FADING_LIGHTS) {
-        to_light.fading = light_fading(light, way);
+        to_light.fading = light_fading(light, to_position);
         to_light.strength = to_light.strength * to_light.fading;
     }
     to_light.shadow_ray = ray_make(start, vector_subtract(position, start), (real)(0),

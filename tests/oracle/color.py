@@ -404,12 +404,13 @@ def refracted(hit, direction, rounding):
 def reflectance(hit, cosine):
     """The part of unpolarized light that the surface reflects, by Fresnel's equations."""
     ior = arb(hit.thing.material.ior)
-    there = 1 / ior if hit.entering else ior  # the sine behind the surface over that before it
+    entering = hit.entering or hit.thing.material.transmission == 0
+    there = 1 / ior if entering else ior  # the sine behind the surface over that before it
     squared = 1 - there * there * (1 - cosine * cosine)
     if squared <= 0:
         return arb(1)
     behind = squared.sqrt()
-    near, far = (arb(1), ior) if hit.entering else (ior, arb(1))
+    near, far = (arb(1), ior) if entering else (ior, arb(1))
     across = (near * cosine - far * behind) / (near * cosine + far * behind)
     along = (near * behind - far * cosine) / (near * behind + far * cosine)
     return (across * across + along * along) / 2

@@ -11,11 +11,17 @@
 
 static const double gray = 0.18; // of the background
 
-static Vector3 mesh_center(const Mesh *mesh)
+static Bounds mesh_bounds(const Mesh *mesh)
 {
     Bounds bounds = bounds_empty();
     for (size_t i = 0; i < mesh->vertex_count; i++)
         bounds = bounds_join(bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+    return bounds;
+}
+
+static Vector3 mesh_center(const Mesh *mesh)
+{
+    const Bounds bounds = mesh_bounds(mesh);
     return vector_scale(vector_add(bounds.min, bounds.max), 0.5);
 }
 
@@ -79,7 +85,7 @@ static bool light_is_sound(const Light *light)
            (light->kind != LIGHT_SPOT || has_cone);
 }
 
-// A file's fading may be anything; what no light has is left out.
+// Clears a fading that is negative, out of range or zero.
 static void fading_check(Light *light)
 {
     double sum = 0;
@@ -92,30 +98,33 @@ static void fading_check(Light *light)
     light_fold_fading(light);
 }
 
-// Returns the largest channel of what arrives at a point.
-static double light_arriving(const Light *light, Vector3 point)
+// Returns the largest channel of what arrives at a point, or at `least` from the light if that is farther.
+static double light_arriving(const Light *light, Vector3 point, double least)
 {
-    const double d = vector_length(vector_subtract(light->position, point));
+    const double d = fmax(vector_length(vector_subtract(light->position, point)), least);
     const double divisor = light->fading[0] + d * (light->fading[1] + d * light->fading[2]);
     return vector_largest(light->color) / (light_fades(light) ? fmax(divisor, 1 / NUMBER_MAX) : 1);
 }
 
 // Adds the lights. If they would make the image white or black, they are scaled.
-static void lights_add(Scene *scene, const MeshView *view, Vector3 center, Report *report)
+static void lights_add(Scene *scene, const MeshView *view, Report *report)
 {
     const double brightest = 4, darkest = 0x1p-6;
+    const Bounds bounds = mesh_bounds(&scene->meshes.items[0]);
+    const Vector3 center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+    const double radius = vector_length(vector_subtract(bounds.max, bounds.min)) / 2;
     double sum = 0;
     for (size_t i = 0; i < view->lights.count; i++) {
         Light light = view->lights.items[i];
         fading_check(&light);
         if (!light_is_sound(&light)) continue;
         array_push(scene->lights, light);
-        sum += light_arriving(&light, center);
+        sum += light_arriving(&light, center, light.kind == LIGHT_DIRECTIONAL ? 0 : radius);
     }
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
     report_warning(
         report, MESSAGE_WHOLE_FILE,
-        "lights of %.3g in total at the center, which would show little but white or black: scaled to 1",
+        "lights of %.3g in total around the center, which would show little but white or black: scaled to 1",
         sum);
     for (size_t i = 0; i < scene->lights.count; i++)
         scene->lights.items[i].color = vector_scale(scene->lights.items[i].color, 1 / sum);
@@ -151,7 +160,7 @@ static void scene_show(Scene *scene, const MeshView *view, const char *path, Rep
     if (!view->has_camera || !camera_is_sound(&scene->camera))
         scene->camera = camera_around(mesh, center, upward(path));
     scene->background = vector_all(gray);
-    lights_add(scene, view, center, report);
+    lights_add(scene, view, report);
     if (scene->lights.count == 0) lights_around(scene);
 }
 

@@ -60,7 +60,9 @@ static bool name_read(const char *name, uint32_t *rgb)
 
 static bool not_a_color_report(YamlReader *reader, const Field *field, const YamlNode *node)
 {
-    const char *text = yaml_text(&reader->tree, node), *names[NAMED_COUNT];
+    const char *expected = "a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red", *names[NAMED_COUNT];
+    if (node->kind != YAML_SCALAR) return expected_report(reader, field->name, expected, node);
+    const char *text = yaml_text(&reader->tree, node);
     for (size_t i = 0; i < NAMED_COUNT; i++)
         names[i] = named_colors[i].name;
     const char *nearest = strlen(text) <= WORD_SHOWN ? text_nearest(text, names, NAMED_COUNT) : NULL;
@@ -68,11 +70,8 @@ static bool not_a_color_report(YamlReader *reader, const Field *field, const Yam
         return report_error(&reader->report, node->offset,
                             "'%s' must be a color, not '%s': did you mean '%s'?", field->name, text, nearest);
     // `color: #ff8000` ends before its comment.
-    const bool is_empty = text[0] == '\0' && node->kind == YAML_SCALAR;
-    return expected_report(reader, field->name,
-                           is_empty ? "a color (one that begins with # needs quotes, '#ff8000')"
-                                    : "a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red",
-                           node);
+    if (text[0] == '\0') expected = "a color (one that begins with # needs quotes, '#ff8000')";
+    return expected_report(reader, field->name, expected, node);
 }
 
 // Whether a number of the file, without its sign, is written as display values are: digits alone, at most
@@ -82,8 +81,8 @@ static bool is_display_value(const char *text, double value)
     return text[strspn(text, "0123456789")] == '\0' && value <= 255;
 }
 
-// Reports three values from 0 to 255 (one, if the node is a scalar) that exceed `most`, which a linear color
-// hardly does. Returns whether there are none.
+// Reports three values from 0 to 255 (one, if the node is a scalar) that exceed `most`, which is
+// unlikely for a linear color. Returns whether there are none.
 static bool color_is_linear(YamlReader *reader, const Field *field, const YamlNode *node, double most,
                             const Color *color)
 {

@@ -39,7 +39,7 @@ typedef struct {
         Definition *items;
         size_t count, capacity;
     } definitions;
-    bool has_fixed_pattern; // which a transform does not move; was warned of
+    bool warned_of_pattern; // that a transform does not move
     size_t copy_count;      // see COPIES_MAX in groups.c
 } YamlReader;
 

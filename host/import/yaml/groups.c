@@ -8,9 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The most objects that instances copy. Four triangles of a mesh count as one object, and a member of a group
-// that is read again, through an alias, as GROUP_COST of them. Bounds the cost of a hostile file.
-enum { COPIES_MAX = 1 << 22, GROUP_COST = 16 };
+// The most objects that definitions have and instances copy. Four triangles of a mesh count as one object, a
+// box as four, and a member of a group that is read again, through an alias, as GROUP_COST of them. Bounds
+// the cost of a hostile file, as DEFINITIONS_MAX does.
+enum { COPIES_MAX = 1 << 22, GROUP_COST = 16, DEFINITIONS_MAX = 1000 };
 
 static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
 {
@@ -19,15 +20,15 @@ static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
     if (reader->copy_count > largest) return false; // was reported
     reader->copy_count += count;
     return reader->copy_count <= largest ||
-           report_error(
-               &reader->report, node->offset,
-               "instances and repeated groups make more than %d objects, or four times as many triangles",
-               COPIES_MAX);
+           report_error(&reader->report, node->offset,
+                        "definitions, instances and repeated groups have more than %d objects, or four times "
+                        "as many triangles",
+                        COPIES_MAX);
 }
 
 // Returns whether the look of the object depends on where or how it lies in the world, so that a transform
 // leaves it behind: images on spheres have poles along y, other patterns fixed places.
-static bool pattern_stays(const Scene *scene, const Object *object, const Affine *affine)
+static bool pattern_ignores_transform(const Scene *scene, const Object *object, const Affine *affine)
 {
     const Material *material = &scene->materials.items[object->material];
     const double(*m)[4] = affine->rows;
@@ -44,10 +45,10 @@ void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affi
     for (size_t i = first; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
         const ShapeKind kind = object->kind;
-        if (!reader->has_fixed_pattern && pattern_stays(scene, object, affine)) {
+        if (!reader->warned_of_pattern && pattern_ignores_transform(scene, object, affine)) {
             report_warning(&reader->report, transform->offset,
                            "checkers and images other than those of meshes do not move with their objects");
-            reader->has_fixed_pattern = true;
+            reader->warned_of_pattern = true;
         }
         const char *why = object_transform(scene, object, affine);
         if (!why) continue;
@@ -72,13 +73,13 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
         !copies_add(reader, GROUP_COST * (1 + (size_t)group.objects->child_count), mapping))
         return;
     const size_t first = reader->scene->objects.count;
-    yaml_read_object_list(reader, "objects", group.objects);
+    yaml_read_object_list(reader, group.objects, false);
     const YamlNode *transform = field_node(reader, mapping, "transform");
     if (transform != mapping) yaml_transform_objects(reader, first, &group.transform, transform);
 }
 
 // Moves the scene's objects and meshes from the given indices on to a definition.
-static Definition definition_take(YamlReader *reader, const char *name, size_t first_object,
+static Definition definition_move(YamlReader *reader, const char *name, size_t first_object,
                                   size_t first_mesh)
 {
     Scene *scene = reader->scene;
@@ -106,6 +107,17 @@ static const Definition *definition_find(const YamlReader *reader, const char *n
     return NULL;
 }
 
+// A box may become a mesh of 12 triangles.
+static size_t definition_cost(const Definition *definition)
+{
+    size_t triangles = 0, cost = 1;
+    for (size_t i = 0; i < definition->mesh_count; i++)
+        triangles += definition->meshes[i].triangle_count;
+    for (size_t i = 0; i < definition->object_count; i++)
+        cost += definition->objects[i].kind == SHAPE_BOX ? 4 : 1;
+    return cost + triangles / 4;
+}
+
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 {
     static const Field fields[] = {{"objects", read_node, 0, FORM_ANY, REQUIRED, NULL}};
@@ -125,10 +137,16 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
             report_error(&reader->report, key->offset, "'%.*s' is given twice", WORD_SHOWN, name);
             continue;
         }
-        if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL))
-            yaml_read_object_list(reader, "objects", objects);
-        const Definition definition = definition_take(reader, name, first_object, first_mesh);
+        if (reader->definitions.count == DEFINITIONS_MAX) {
+            report_error(&reader->report, key->offset, "more than %d definitions", DEFINITIONS_MAX);
+            return;
+        }
+        if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL) &&
+            copies_add(reader, GROUP_COST * (1 + (size_t)objects->child_count), value))
+            yaml_read_object_list(reader, objects, false);
+        const Definition definition = definition_move(reader, name, first_object, first_mesh);
         array_push(reader->definitions, definition);
+        copies_add(reader, definition_cost(&definition), value);
     }
 }
 
@@ -160,14 +178,6 @@ static const Definition *definition_named(YamlReader *reader, const YamlNode *no
     unknown_report(reader, node, "definition", names, count);
     free(names);
     return NULL;
-}
-
-static size_t definition_cost(const Definition *definition)
-{
-    size_t triangles = 0;
-    for (size_t i = 0; i < definition->mesh_count; i++)
-        triangles += definition->meshes[i].triangle_count;
-    return 1 + definition->object_count + triangles / 4;
 }
 
 void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)

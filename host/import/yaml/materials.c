@@ -75,19 +75,19 @@ static bool read_texture(YamlReader *reader, const Field *field, const YamlNode 
     return texture > 0;
 }
 
-// Takes a color whose channels lie in the field's range. Sets the largest and the tint.
+// Takes a factor or a color in the field's range. Sets the largest channel and the tint.
 static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *node, double *largest,
                         Color *tint)
 {
-    Color channels;
-    const bool is_name =
-        node->kind == YAML_SCALAR && !strchr("+-.0123456789", yaml_text(&reader->tree, node)[0]);
+    Color channels = {0, 0, 0};
+    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
     *tint = vector_all(0);
-    if (node->kind == YAML_SCALAR && !is_name) return read_number(reader, field, node, largest);
-    if (!(is_name ? read_strength : read_vector)(reader, field, node, &channels)) return false;
+    if (text[0] != '\0' && strchr("+-.0123456789", text[0])) return read_number(reader, field, node, largest);
+    if (!read_strength(reader, field, node, &channels)) return false;
     *largest = vector_largest(channels);
     *tint = color_tint(channels);
-    return true;
+    return *largest <= field->range->high ||
+           report_error(&reader->report, node->offset, "'%s' must be %s", field->name, field->range->must);
 }
 
 static bool read_reflection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)

@@ -240,8 +240,8 @@ static void shape_read(YamlReader *reader, ShapeKind kind, const YamlNode *mappi
 static void object_read(YamlReader *reader, const YamlNode *item)
 {
     static const char *const names[] = {SCENE_SHAPE_LIST(SHAPE_WORD) "group", "instance"};
-    static void (*const others[])(YamlReader *, const YamlNode *) = {yaml_read_mesh, yaml_read_group,
-                                                                     yaml_read_instance};
+    static void (*const compound_readers[])(YamlReader *, const YamlNode *) = {
+        yaml_read_mesh, yaml_read_group, yaml_read_instance};
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
     size_t kind = 0;
@@ -252,16 +252,16 @@ static void object_read(YamlReader *reader, const YamlNode *item)
     else if (kind < SHAPE_MESH)
         shape_read(reader, (ShapeKind)kind, mapping);
     else
-        others[kind - SHAPE_MESH](reader, mapping);
+        compound_readers[kind - SHAPE_MESH](reader, mapping);
 }
 
-void yaml_read_object_list(YamlReader *reader, const char *name, const YamlNode *list)
+void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_progress)
 {
     if (list->kind != YAML_SEQUENCE) {
-        expected_report(reader, name, "a list", list);
+        expected_report(reader, "objects", "a list", list);
         return;
     }
-    Stage *stage = reader->options->stage;
+    Stage *stage = shows_progress ? reader->options->stage : NULL;
     size_t done = 0, mesh_count = SIZE_MAX;
     for (const YamlNode *item = yaml_first(&reader->tree, list); item && !report_is_full(&reader->report);
          item = yaml_next(&reader->tree, item)) {

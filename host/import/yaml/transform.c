@@ -6,6 +6,9 @@
 // The forms of a transform.
 enum { FORM_STEPS = FORM_FIRST, FORM_MATRIX = FORM_SECOND };
 
+// Bounds the cost of a hostile file.
+enum { STEPS_MAX = 64 };
+
 typedef struct {
     Vector3 angles, axis; // degrees about x, y and z; or, unless it is zero, about the axis
     double angle;
@@ -71,23 +74,27 @@ static bool step_read(YamlReader *reader, const Field *field, const YamlNode *no
     const Rotation *rotation = &steps.rotation;
     *affine = affine_of_steps(steps.scale, rotation->angles, steps.translate);
     if (vector_is_zero(rotation->axis)) return true;
+    const Vector3 none = {0, 0, 0};
+    const Affine scaled = affine_of_steps(steps.scale, none, none);
     Affine turn = affine_about(rotation->axis, rotation->angle);
-    *affine = affine_of_steps(steps.scale, rotation->angles, rotation->angles);
     turn.rows[0][3] = steps.translate.x;
     turn.rows[1][3] = steps.translate.y;
     turn.rows[2][3] = steps.translate.z;
-    *affine = affine_multiply(&turn, affine);
+    *affine = affine_multiply(&turn, &scaled);
     return true;
 }
 
-// The range lets cofactors and the shapes' numbers be far from underflow and overflow.
+// Whether each number is at most NUMBER_MAX and no row is nearly within the plane of the other two.
 static bool has_inverse(const Affine *affine)
 {
-    double largest = 0;
-    for (int row = 0; row < 3; row++)
+    double lengths = 1;
+    for (int row = 0; row < 3; row++) {
+        const double *m = affine->rows[row];
         for (int column = 0; column < 4; column++)
-            largest = fmax(largest, fabs(affine->rows[row][column]));
-    return largest <= NUMBER_MAX && fabs(affine_determinant(affine)) >= 1e-90;
+            if (!(fabs(m[column]) <= NUMBER_MAX)) return false;
+        lengths *= hypotenuse(hypotenuse(m[0], m[1]), m[2]);
+    }
+    return lengths >= 1e-89 && fabs(affine_determinant(affine)) > 1e-12 * lengths;
 }
 
 bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -97,6 +104,9 @@ bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node
         if (!step_read(reader, field, node, affine)) return false;
     } else {
         *affine = affine_identity;
+        if (node->child_count > STEPS_MAX)
+            return report_error(&reader->report, node->offset, "'%s' has more than %d steps", field->name,
+                                STEPS_MAX);
         for (const YamlNode *item = yaml_first(&reader->tree, node); item;
              item = yaml_next(&reader->tree, item)) {
             Affine step;

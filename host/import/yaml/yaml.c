@@ -72,7 +72,7 @@ static void document_read(YamlReader *reader)
         yaml_read_materials(reader, document.materials);
     reader->places = places_open(reader->report.source);
     if (document.definitions) yaml_read_definitions(reader, document.definitions);
-    if (document.objects) yaml_read_object_list(reader, "objects", document.objects);
+    if (document.objects) yaml_read_object_list(reader, document.objects, true);
     yaml_definitions_free(reader);
     places_close(&reader->places);
 }

@@ -25,8 +25,8 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node);
 void yaml_read_lights(YamlReader *reader, const YamlNode *node);
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping); // the value of `mesh:`
 
-// Reads a list of objects, which is the value of the key `name`. Progress is shown for that of the scene.
-void yaml_read_object_list(YamlReader *reader, const char *name, const YamlNode *list);
+// Reads the list of objects of a scene, which shows progress, of a group or of a definition.
+void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_progress);
 
 // Reads the `define` mapping; its names are then known to yaml_read_instance.
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node);
