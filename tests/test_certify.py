@@ -37,6 +37,16 @@ objects:
   - sphere: {center: [0, 0, 0], radius: 1, material: {color: [1, 0, 0]}}
   - sphere: {center: [0, 0, -1e-9], radius: 1, material: {color: [0, 0, 1]}}
 """
+# What Fresnel's equations decide: glass, plastic seen against its normal, and a metal's tint next to them.
+FRESNEL = """\
+camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
+background: [0.3, 0.5, 0.9]
+lights: [{point: {position: [3, 5, -5], intensity: 20, falloff: inverse_square}}]
+objects:
+  - plane: {point: [0, 0, 0], normal: [0, -1, 0], material: {color: [0.5, 0.4, 0.3], reflection: 1, ior: 1.3, fresnel: true}}
+  - sphere: {center: [-1, 1, 0], radius: 1, material: {diffuse: 0.1, transmission: 0.9, ior: 1.5, fresnel: true}}
+  - box: {min: [0.4, 0, -0.5], max: [1.6, 1, 0.5], material: {diffuse: 0.1, reflection: [0.9, 0.7, 0.3]}}
+"""
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -66,6 +76,13 @@ class Certify(TestCase):
                 self.assertIn(name, row["reason"])
         self.assertEqual(self.glint(f"certify strong.yaml {SMALL}").stdout.count("unavailable: "), 4 - HAS_DOUBLE)
         self.refuses(f"certify strong.yaml {SMALL} --precision double,single", "single")
+
+    def test_fresnel(self):
+        """Neither a path nor a color differs from the exact ones, at all precisions that take Fresnel's equations."""
+        write("fresnel.yaml", FRESNEL)
+        for name, row in self.certify("fresnel.yaml", "--precision single,strict" + ",double" * HAS_DOUBLE).items():
+            self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
+            self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_parallel_mirrors(self):

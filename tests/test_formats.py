@@ -1,5 +1,8 @@
 #!/usr/bin/env -S python3 -B
-"""Reports in the formats of other programs: each is read by its own reader and agrees with --json."""
+"""Reports in the formats of other programs: each is read by its own reader and agrees with --json.
+Sanitizers see the same writers in test_json.
+
+run_tests: sanitize-long-only"""
 import csv
 import io
 import json
