@@ -90,11 +90,6 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
     return true;
 }
 
-static bool vector_fits(Vector3 v, double largest)
-{
-    return fabs(v.x) <= largest && fabs(v.y) <= largest && fabs(v.z) <= largest;
-}
-
 typedef struct {
     const FlatArray *array;
     double largest;
@@ -127,9 +122,9 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
     bool is_double = settings->precision == PRECISION_DOUBLE;
     double largest = is_double ? DBL_MAX : FLT_MAX;
     CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
-    bool fits = vector_fits(scene->background, largest) && vector_fits(scene->ambient, largest) &&
-                vector_fits(basis.forward, largest) && vector_fits(basis.right, largest) &&
-                vector_fits(basis.up, largest);
+    bool fits = vector_is_within(scene->background, largest) && vector_is_within(scene->ambient, largest) &&
+                vector_is_within(basis.forward, largest) && vector_is_within(basis.right, largest) &&
+                vector_is_within(basis.up, largest);
     for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)
         fits = !compiled->changed[kind] || array_fits(&compiled->arrays[kind], largest);
     if (fits) return true;

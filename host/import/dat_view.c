@@ -162,8 +162,7 @@ bool dat_spotlight(DatReader *reader)
 static Vector3 objects_center(const DatReader *reader)
 {
     const Bounds *bounds = &reader->bounds;
-    return bounds_is_empty(bounds) ? reader->scene->camera.look_at
-                                   : vector_scale(vector_add(bounds->min, bounds->max), 0.5);
+    return bounds_is_empty(bounds) ? reader->scene->camera.look_at : bounds_center(*bounds);
 }
 
 // Moves an orthographic camera so far back that its lines of sight are nearly parallel at the objects. Its

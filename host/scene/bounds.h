@@ -60,6 +60,11 @@ static inline Bounds bounds_of_disc(Vector3 center, Vector3 normal, double radiu
     return bounds_around(center, vector_scale(circle_half_extents(vector_normalize(normal)), radius));
 }
 
+static inline Vector3 bounds_center(Bounds bounds)
+{
+    return vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+}
+
 static inline double bounds_half_area(Bounds bounds)
 {
     Vector3 size = vector_subtract(bounds.max, bounds.min);

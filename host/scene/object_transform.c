@@ -7,11 +7,6 @@
 
 static const double NUMBER_LARGEST = 1e30; // of scene files
 
-static bool is_in_range(Vector3 v)
-{
-    return fabs(v.x) <= NUMBER_LARGEST && fabs(v.y) <= NUMBER_LARGEST && fabs(v.z) <= NUMBER_LARGEST;
-}
-
 static void *items_copy(const void *items, size_t count, size_t size)
 {
     return items ? memcpy(memory_allocate(count, size), items, count * size) : NULL;
@@ -42,7 +37,7 @@ static bool mesh_transform(Mesh *mesh, const Affine *affine)
     bool fits = true;
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         mesh->vertices[i] = affine_point(affine, mesh->vertices[i]);
-        fits &= is_in_range(mesh->vertices[i]);
+        fits &= vector_is_within(mesh->vertices[i], NUMBER_LARGEST);
         if (mesh->normals) mesh->normals[i] = normal_transform(&for_normals, mesh->normals[i]);
     }
     const bool is_mirrored = affine_determinant(affine) < 0;
@@ -242,7 +237,7 @@ static bool numbers_fit(const Object *object)
     bool fits =
         shapes[object->kind].axis == 0 || !vector_is_zero(vector_at(object, shapes[object->kind].axis));
     for (const size_t *offset = shapes[object->kind].vectors; *offset > 0; offset++)
-        fits &= is_in_range(vector_at(object, *offset));
+        fits &= vector_is_within(vector_at(object, *offset), NUMBER_LARGEST);
     for (const size_t *offset = shapes[object->kind].positive; *offset > 0; offset++)
         fits &= number_at(object, *offset) > 0 && number_at(object, *offset) <= NUMBER_LARGEST;
     for (const size_t *offset = shapes[object->kind].lengths; *offset > 0; offset++)

@@ -56,6 +56,12 @@ static inline double vector_largest(Vector3 a)
     return fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
 }
 
+// Returns whether no component's magnitude exceeds `largest`; false for NaN.
+static inline bool vector_is_within(Vector3 a, double largest)
+{
+    return fabs(a.x) <= largest && fabs(a.y) <= largest && fabs(a.z) <= largest;
+}
+
 static inline double vector_dot(Vector3 a, Vector3 b)
 {
     return a.x * b.x + a.y * b.y + a.z * b.z;

@@ -15,11 +15,6 @@ enum { TRIANGLES_MAX = 1 << 28 };
 // Cutting a polygon takes time with the square of its corners: some 30 s for this sum.
 static const size_t squared_corners_max = (size_t)1 << 31;
 
-static bool is_in_range(Vector3 v)
-{
-    return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
-}
-
 static bool indices_are_sound(MeshDraft *draft)
 {
     for (DraftPart part = 0; part < DRAFT_PART_COUNT; part++) {
@@ -62,10 +57,10 @@ static bool positions_are_sound(MeshDraft *draft)
 {
     bool all = true;
     for (size_t i = 0; i < draft->positions.count; i++)
-        all &= is_in_range(draft->positions.items[i]);
+        all &= vector_is_within(draft->positions.items[i], NUMBER_MAX);
     const DraftIndices *corners = &draft->corners[DRAFT_POSITION];
     for (size_t i = 0; i < corners->count && !all; i++)
-        if (!is_in_range(draft->positions.items[corners->items[i]]))
+        if (!vector_is_within(draft->positions.items[corners->items[i]], NUMBER_MAX))
             return position_fails(draft, corners->items[i]);
     return true;
 }
@@ -76,12 +71,12 @@ static void parts_repair(MeshDraft *draft)
     size_t uv_count = 0, normal_count = 0;
     for (size_t i = 0; i < draft->uvs.count; i++) {
         double *uv = draft->uvs.items[i];
-        if (is_in_range((Vector3){uv[0], uv[1], 0})) continue;
+        if (vector_is_within((Vector3){uv[0], uv[1], 0}, NUMBER_MAX)) continue;
         uv[0] = uv[1] = 0;
         uv_count++;
     }
     for (size_t i = 0; i < draft->normals.count; i++) {
-        if (is_in_range(draft->normals.items[i])) continue;
+        if (vector_is_within(draft->normals.items[i], NUMBER_MAX)) continue;
         draft->normals.items[i] = (Vector3){0, 0, 0};
         normal_count++;
     }
@@ -204,7 +199,7 @@ static void vectors_transform(MeshDraft *draft, const Affine *affine)
         draft->positions.items[i] = affine_point(affine, draft->positions.items[i]);
     for (size_t i = 0; i < draft->normals.count; i++) {
         const Vector3 normal = vector_normalize(affine_direction(&for_normals, draft->normals.items[i]));
-        draft->normals.items[i] = is_in_range(normal) ? normal : (Vector3){0, 0, 0};
+        draft->normals.items[i] = vector_is_within(normal, NUMBER_MAX) ? normal : (Vector3){0, 0, 0};
     }
 }
 

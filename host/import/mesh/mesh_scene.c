@@ -21,8 +21,7 @@ static Bounds mesh_bounds(const Mesh *mesh)
 
 static Vector3 mesh_center(const Mesh *mesh)
 {
-    const Bounds bounds = mesh_bounds(mesh);
-    return vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+    return bounds_center(mesh_bounds(mesh));
 }
 
 // Returns the upward direction: z in STL by custom, y in other formats.
@@ -70,17 +69,13 @@ static void lights_around(Scene *scene)
                ((Light){.kind = LIGHT_DIRECTIONAL, .color = {0.25, 0.25, 0.25}, .direction = fill}));
 }
 
-static bool is_sound(Vector3 v)
-{
-    return fabs(v.x) <= NUMBER_MAX && fabs(v.y) <= NUMBER_MAX && fabs(v.z) <= NUMBER_MAX;
-}
-
 static bool light_is_sound(const Light *light)
 {
     const bool has_cone = light->half_angle > 0 && light->half_angle < 180 && light->penumbra >= 0 &&
                           light->penumbra <= light->half_angle;
-    return light->kind <= LIGHT_SPOT && is_sound(light->position) && is_sound(light->direction) &&
-           is_sound(light->color) && vector_is_zero(vector_min(light->color, vector_all(0))) &&
+    return light->kind <= LIGHT_SPOT && vector_is_within(light->position, NUMBER_MAX) &&
+           vector_is_within(light->direction, NUMBER_MAX) && vector_is_within(light->color, NUMBER_MAX) &&
+           vector_is_zero(vector_min(light->color, vector_all(0))) &&
            (light->kind == LIGHT_POINT || !vector_is_zero(light->direction)) &&
            (light->kind != LIGHT_SPOT || has_cone);
 }
@@ -111,7 +106,7 @@ static void lights_add(Scene *scene, const MeshView *view, Report *report)
 {
     const double brightest = 4, darkest = 0x1p-6;
     const Bounds bounds = mesh_bounds(&scene->meshes.items[0]);
-    const Vector3 center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
+    const Vector3 center = bounds_center(bounds);
     const double radius = vector_length(vector_subtract(bounds.max, bounds.min)) / 2;
     double sum = 0;
     for (size_t i = 0; i < view->lights.count; i++) {
@@ -146,9 +141,10 @@ static void camera_set(Scene *scene, const MeshView *view, Vector3 center, Repor
 
 static bool camera_is_sound(const Camera *camera)
 {
-    return is_sound(camera->position) && is_sound(camera->look_at) && is_sound(camera->up) &&
-           !vectors_equal(camera->position, camera->look_at) && camera->field_axis <= FIELD_HORIZONTAL &&
-           camera->half_tangent > 0 && camera->half_tangent <= NUMBER_MAX && camera->frame_aspect >= 0 &&
+    return vector_is_within(camera->position, NUMBER_MAX) && vector_is_within(camera->look_at, NUMBER_MAX) &&
+           vector_is_within(camera->up, NUMBER_MAX) && !vectors_equal(camera->position, camera->look_at) &&
+           camera->field_axis <= FIELD_HORIZONTAL && camera->half_tangent > 0 &&
+           camera->half_tangent <= NUMBER_MAX && camera->frame_aspect >= 0 &&
            camera->frame_aspect <= NUMBER_MAX;
 }
 
