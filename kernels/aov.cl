@@ -25,7 +25,7 @@ typedef struct {
 static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
                                   uint light_count, global int *doubts)
 {
-    Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
+    Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, SAMPLE_CENTER, tile->inside);
     Hit hit = closest_hit(scene, &ray);
     Surface surface = visible_surface(scene, &ray, &hit);
     const mask found = hit_found(&hit);

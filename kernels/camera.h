@@ -2,6 +2,7 @@
 #ifndef CAMERA_H
 #define CAMERA_H
 
+#include "sampling.h"
 #include "scene.h"
 #include "shapes/certain.h"
 
@@ -9,19 +10,35 @@ typedef struct {
     integer x, y; // counted in the whole image from the top left
 } Pixels;
 
-// Returns the ray through a point of each pixel. dx and dy run from -1 to 1 across the pixel, and 0 is the
-// center. Coordinates are half pixels from the image's center, 2 i + 1 - width, which are exact and
-// odd-symmetric, so that a mirrored scene gives the mirrored image bit for bit.
+// Returns the ray of sample `index`, through a point of each pixel. dx and dy run from -1 to 1 across the
+// pixel, and 0 is the center. Coordinates are half pixels from the image's center, 2 i + 1 - width, which are
+// exact and odd-symmetric, so that a mirrored scene gives the mirrored image bit for bit.
 static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, scalar dx, scalar dy,
-                             mask active)
+                             uint index, mask active)
 {
+    Sample sample;
+    if (HAS_LENS || HAS_AREA_LIGHTS) sample = sample_of_pixels(pixels.x, pixels.y, index);
     real x = real_from_integer(pixels.x * 2 + 1 - (integer)((scalar_integer)header->image.x)) + dx;
     real y = real_from_integer((integer)((scalar_integer)header->image.y) - 1 - pixels.y * 2) + dy;
-    Vector direction = vector_fma(vector_of(header->right), x,
-                                  vector_fma(vector_of(header->up), y, vector_of(header->forward)));
-    Ray ray = ray_make_unit(vector_of(header->eye), vector_normalize(direction), active);
+    Vector origin = vector_of(header->eye), direction = vector_of(header->forward);
+    bool has_lens = HAS_LENS && header->lens_right.w > 0;
+    bool is_orthographic = HAS_ORTHOGRAPHIC && header->lens_up.w != 0;
+    Vector right = vector_of(header->right), up = vector_of(header->up);
+    if (is_orthographic)
+        origin = vector_fma(right, x, vector_fma(up, y, origin));
+    else
+        direction = vector_fma(right, x, vector_fma(up, y, direction));
+    if (has_lens) {
+        SquarePoint point = disc_of_square(sample_point(&sample, SAMPLED_LENS));
+        Vector offset = vector_fma(vector_of(header->lens_right), point.x,
+                                   vector_scale(vector_of(header->lens_up), point.y));
+        direction = vector_fma(direction, (real)(header->lens_right.w), vector_negate(offset));
+        origin = vector_add(origin, offset);
+    }
+    Ray ray = ray_make_unit(origin, vector_normalize(direction), active);
+    if (HAS_AREA_LIGHTS) ray.sample = sample;
     if (IS_CERTIFIED) ray.direction_error = (real)(CAMERA_DIRECTION_ERROR * UNIT_ROUNDOFF);
-    ray_set_common_origin(&ray, COMMON_ORIGIN_EYE, mask_none());
+    if (!has_lens && !is_orthographic) ray_set_common_origin(&ray, COMMON_ORIGIN_EYE, mask_none());
     return ray;
 }
 

@@ -11,6 +11,9 @@
     FEATURE(DIRECTIONAL_LIGHTS, ) \
     FEATURE(SPOT_LIGHTS, )        \
     FEATURE(FADING_LIGHTS, )      \
+    FEATURE(AREA_LIGHTS, )        \
+    FEATURE(LENS, )               \
+    FEATURE(ORTHOGRAPHIC, )       \
     FEATURE(CHECKERS, )           \
     FEATURE(IMAGES, )             \
     FEATURE(REFLECTION, )         \

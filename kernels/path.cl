@@ -7,7 +7,7 @@
 static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths,
                                             global int *doubts)
 {
-    Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, tile->inside);
+    Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, SAMPLE_CENTER, tile->inside);
     ShadedHit hits[1];
     unsigned_integer signature;
     mask doubt;

@@ -30,7 +30,7 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
     for (uint sample = first_sample; sample < last_sample; sample++) {
         for (uint i = 0; i < PACKETS; i++) {
             rays[i] = camera_ray(scene->header, tiles[i].pixels, offsets[2 * sample], offsets[2 * sample + 1],
-                                 tiles[i].inside);
+                                 sample, tiles[i].inside);
             ray_counter_add(scene, RAYS_CAMERA, rays[i].active);
         }
         if (PACKETS > 1) rays_shade(scene, rays, PACKETS, hits);

@@ -298,6 +298,10 @@ enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADO
 
 enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
 
+// The area that a light shines from: a rectangle or an ellipse around its position, or the half of a sphere
+// that faces the surface.
+enum { LIGHT_AREA_NONE, LIGHT_AREA_RECTANGLE, LIGHT_AREA_ELLIPSE, LIGHT_AREA_SPHERE };
+
 typedef struct {
     scalar4 color;     // w: the largest of its channels
     scalar4 position;  // relative to the eye; point and spot
@@ -307,21 +311,30 @@ typedef struct {
     scalar4 cone;
     // With HAS_FADING_LIGHTS: the strength is divided by x + y d + z d^2 at the distance d.
     scalar4 fading;
-    uint4 kind; // x: LIGHT_KIND_…
+    // With HAS_AREA_LIGHTS: from the center of a rectangle or an ellipse to the middles of two sides,
+    // relative to the direction for directional lights; across_u.w: a sphere's radius.
+    scalar4 across_u, across_v;
+    uint4 kind; // x: LIGHT_KIND_…, y: LIGHT_AREA_…
 } Light;
 
 typedef struct {
     scalar4 background, ambient;
     // A camera ray runs from the eye along forward + x right + y up, with x and y in half pixels from the
     // image's center. The eye is the origin, except in a preview of a scene compiled for another eye.
+    //
+    // With HAS_LENS and lens_right.w > 0, the distance of the focal plane, it runs from a point of the lens
+    // to where the ray from the lens' center meets that plane; lens_right and lens_up lead from the center to
+    // the edge. With HAS_ORTHOGRAPHIC and lens_up.w = 1 it runs along forward, from the eye + x right + y up.
     scalar4 eye, forward, right, up;
+    scalar4 lens_right, lens_up;
     scalar4 bounds;                  // those of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
     scalar4 bounds_low, bounds_high; // its corners
     // The corners of a box around all points where a transparent object may touch an opaque one. Low is above
     // high if there are no such points.
     scalar4 contact_low, contact_high;
     // x: width of a sample's share of a pixel, at distance 1. y: the first rival of every hit at `certified`:
-    // the largest scalar, or its negative if no bound holds and so every hit is uncertain.
+    // the largest scalar, or its negative if no bound holds and so every hit is uncertain. z: with
+    // HAS_ORTHOGRAPHIC, that width at any distance, or 0.
     scalar4 sample;
     uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: largest depth

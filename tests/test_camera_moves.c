@@ -125,6 +125,9 @@ static void check_yaml(const Camera *camera)
     assert_int_equal(read->field_axis, camera->field_axis);
     if (read->half_tangent != camera->half_tangent)
         fail_msg("%.17g read as %.17g from %s", camera->half_tangent, read->half_tangent, text_c(&text));
+    assert_int_equal(read->orthographic, camera->orthographic);
+    assert_true(read->lens_radius == camera->lens_radius);
+    if (camera->lens_radius > 0) assert_true(read->focal_distance == camera->focal_distance);
     scene_free(&scene);
     text_free(&text);
 }
@@ -141,6 +144,12 @@ static void yaml_gives_the_same_camera(void **state)
         camera.position = vector_scale(camera.position, 1.0 + 1.0 / i);
         check_yaml(&camera);
     }
+    Camera lens = camera;
+    lens.lens_radius = 0.1;
+    lens.focal_distance = 1.0 / 3;
+    check_yaml(&lens);
+    lens.orthographic = true;
+    check_yaml(&lens);
     camera.half_tangent = portable_tangent(50 * (M_PI / 360));
     camera.position = (Vector3){0.1, 1e300, -40};
     Text text = {0};

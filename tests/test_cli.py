@@ -533,7 +533,7 @@ class Trace(CliTestCase):
             write("glass.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [5, 5, 5]}}]\n"
                   f"objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {material}}}}}]\n")
             command = f"render glass.yaml {SMALL} --precision certified -o glass.ppm"
-            self.refuses(command, "'fresnel', whose parts have no error bound") if refused else self.glint(command)
+            self.refuses(command, "'fresnel', which has no error bound") if refused else self.glint(command)
 
     def test_certified(self):
         """A hit, a miss, a hit beyond the end and one at it, and a tangent, which nothing decides."""

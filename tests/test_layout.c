@@ -34,6 +34,8 @@ typedef struct {
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, ambient)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, eye)                            \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, lens_right)                     \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, lens_up)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, right)                          \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, up)                             \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, bounds)                         \
@@ -86,6 +88,8 @@ typedef struct {
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \
     REALS(FLAT_LIGHTS, Light, FlatLight, cone)                                   \
     REALS(FLAT_LIGHTS, Light, FlatLight, fading)                                 \
+    REALS(FLAT_LIGHTS, Light, FlatLight, across_u)                               \
+    REALS(FLAT_LIGHTS, Light, FlatLight, across_v)                               \
     INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)                                \
     INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
     INTEGERS(FLAT_TEXELS, Texel, Texel, color)

@@ -18,19 +18,24 @@
 // Neither is a whole number of tiles of any width.
 enum { WIDTH = 71, HEIGHT = 41 };
 
-static Scene every_shape;
+static Scene every_shape, sampled;
 
 static int variants_open(void **state)
 {
     every_shape = scene_of_file("tests/scenes/every_shape.yaml");
+    sampled = scene_of_file("tests/scenes/sampled.yaml");
     return probe_open(state);
 }
 
 static int variants_close(void **state)
 {
     scene_free(&every_shape);
+    scene_free(&sampled);
     return probe_close(state);
 }
+
+// Points of areas depend on the pixel, so that a mirrored image has others.
+#define SAMPLED_FEATURES (FEATURE_AREA_LIGHTS | FEATURE_LENS | FEATURE_ORTHOGRAPHIC)
 
 // Renders with the settings' features unchanged.
 static Film render(const Scene *scene, const RenderSettings *settings)
@@ -48,8 +53,10 @@ static void scene_has_every_feature(void **state)
 {
     (void)state;
     // test_textures has textures, which a mirror image would have to mirror
-    assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES,
+    assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
+                         SAMPLED_FEATURES,
                      FEATURE_ALL);
+    assert_int_equal(features_of(&sampled) & SAMPLED_FEATURES, FEATURE_AREA_LIGHTS | FEATURE_LENS);
 }
 
 static void lanes_agree(void **state)
@@ -139,6 +146,14 @@ static const struct {
      SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_SPOT_LIGHTS, SCENE_HEAD
      "lights: [{spot: {position: [2, 3, -4], look_at: [0, 0.5, 0], angle: 12, penumbra: 5}}]\n" SPHERE},
+    {FEATURE_SPHERES | FEATURE_POINT_LIGHTS | FEATURE_AREA_LIGHTS,
+     SCENE_HEAD "lights: [{sphere: {center: [2, 3, -4], radius: 0.5}}]\n" SPHERE},
+    {FEATURE_SPHERES | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_AREA_LIGHTS,
+     SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2], angle: 5}}]\n" SPHERE},
+    {FEATURE_SPHERES | FEATURE_LENS, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], aperture: "
+                                     "0.4, focus: 4}\nambient: 0.5\n" SPHERE},
+    {FEATURE_SPHERES | FEATURE_ORTHOGRAPHIC,
+     "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], height: 4}\nambient: 0.5\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_CHECKERS,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
                 "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
@@ -263,6 +278,38 @@ static void regions_are_cuts_of_the_whole(void **state)
     film_free(&whole);
 }
 
+// The points of areas are those of the pixel and the sample, wherever and whenever they are computed.
+static void points_of_areas_agree(void **state)
+{
+    (void)state;
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
+    settings.sample_count = 3;
+    settings.lanes = 1;
+    Film expected = render(&sampled, &settings);
+    assert_int_equal(film_count_faulty(&expected), 0);
+    for (const uint32_t *lanes = tested_lanes(probe_compute.device); *++lanes;) {
+        settings.lanes = *lanes;
+        Film film = render(&sampled, &settings);
+        same_and_freed(&film, &expected, "lanes");
+    }
+    Scene large = scene_scaled(&sampled, 0x1p20);
+    Film grown = render(&large, &settings);
+    same_and_freed(&grown, &expected, "scaled");
+    scene_scaled_free(&large);
+    settings.band_rows = 7;
+    settings.band_seconds = 1e-9;
+    Film apart = render(&sampled, &settings);
+    same_and_freed(&apart, &expected, "launches of samples");
+    settings.region_x = 13;
+    settings.region_y = 5;
+    settings.region_width = 31;
+    settings.region_height = 21;
+    Film part = render(&sampled, &settings), cut = film_cut(&expected, 13, 5, 31, 21);
+    same_and_freed(&part, &cut, "region");
+    film_free(&cut);
+    film_free(&expected);
+}
+
 // Hard case R7 (docs/verify.md).
 static void mirror_gives_the_mirrored_image(void **state)
 {
@@ -294,6 +341,7 @@ int main(void)
         cmocka_unit_test(bands_agree),
         cmocka_unit_test(launches_of_samples_agree),
         cmocka_unit_test(regions_are_cuts_of_the_whole),
+        cmocka_unit_test(points_of_areas_agree),
         cmocka_unit_test(mirror_gives_the_mirrored_image),
     };
     return cmocka_run_group_tests(tests, variants_open, variants_close);

@@ -24,7 +24,7 @@ static Rounding rounding_from(Vector3 eye, const CompileSettings *settings)
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
 {
-    if (!materials_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages) ||
+    if (!features_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages) ||
         !textures_load(compiled, scene, settings, messages))
         return false;
     const Rounding rounding = rounding_from(eye_of(scene, settings), settings);
@@ -118,7 +118,7 @@ bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettin
         return true;
     }
     compiled->bvh_seconds = 0;
-    if (!materials_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages))
+    if (!features_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages))
         return false;
     const bool is_near = eye_shift(compiled, scene, settings);
     if (is_near ? !numbers_fit(compiled, scene, settings, messages)

@@ -48,6 +48,10 @@ FeatureSet features_of(const Scene *scene)
         set |= light_features[scene->lights.items[i].kind];
     for (size_t i = 0; i < scene->lights.count; i++)
         if (light_fades(&scene->lights.items[i])) set |= FEATURE_FADING_LIGHTS;
+    for (size_t i = 0; i < scene->lights.count; i++)
+        if (scene->lights.items[i].area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
+    if (scene->camera.lens_radius > 0) set |= FEATURE_LENS;
+    if (scene->camera.orthographic) set |= FEATURE_ORTHOGRAPHIC;
     return set;
 }
 

@@ -27,6 +27,8 @@ static double first_rival(const CompiledScene *compiled, const CompileSettings *
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
+    const double lens_radius = scene->camera.lens_radius;
+    const double sample_width = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count);
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
         .ambient = scalar4_of(scene->ambient, 0),
@@ -34,13 +36,17 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .forward = scalar4_of(basis.forward, 0),
         .right = scalar4_of(basis.right, 0),
         .up = scalar4_of(basis.up, 0),
+        .lens_right = scalar4_of(vector_scale(vector_normalize(basis.right), lens_radius),
+                                 lens_radius > 0 ? scene->camera.focal_distance : 0),
+        .lens_up = scalar4_of(vector_scale(vector_normalize(basis.up), lens_radius),
+                              scene->camera.orthographic ? 1 : 0),
         .bounds = center_and_half_extent(&compiled->bvh_bounds),
         .bounds_low = scalar4_of(compiled->bvh_bounds.min, 0),
         .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),
         .contact_low = scalar4_within_floats(compiled->contact.min),
         .contact_high = scalar4_within_floats(compiled->contact.max),
-        .sample = {2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count),
-                   first_rival(compiled, settings), 0, 0},
+        .sample = {sample_width, first_rival(compiled, settings),
+                   scene->camera.orthographic ? sample_width : 0, 0},
         .image = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,

@@ -4,6 +4,9 @@
 _Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL == LIGHT_KIND_DIRECTIONAL &&
                    (int)LIGHT_SPOT == LIGHT_KIND_SPOT,
                "kinds of lights have the kernels' numbers");
+_Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT_AREA_RECTANGLE &&
+                   (int)AREA_ELLIPSE == LIGHT_AREA_ELLIPSE && (int)AREA_SPHERE == LIGHT_AREA_SPHERE,
+               "areas of lights have the kernels' numbers");
 
 // 1 - cos of an angle in degrees, without cancellation.
 static double versine(double degrees)
@@ -19,7 +22,11 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
-                                .kind.x = (uint32_t)light->kind};
+                                .kind = {.x = (uint32_t)light->kind, .y = (uint32_t)light->area}};
+        const double unit =
+            light->kind == LIGHT_DIRECTIONAL ? 1 / sqrt(vector_dot(light->direction, light->direction)) : 1;
+        lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), light->radius);
+        lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
         lights[i].fading =
             (scalar4){light_fades(light) ? light->fading[0] : 1, light->fading[1], light->fading[2], 0};
         if (light->kind != LIGHT_DIRECTIONAL)

@@ -63,12 +63,24 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
         names[0], farthest.size, names[1], smallest.size, precision_names[settings->precision]);
 }
 
-bool materials_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages)
+bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages)
 {
-    if (!settings->certifies || !(features_of(scene) & FEATURE_FRESNEL)) return true;
-    return message_error(messages,
-                         "a material has 'fresnel', whose parts have no error bound: choose a precision "
-                         "other than certified");
+    static const struct {
+        FeatureSet feature;
+        const char *text;
+    } unbounded[] = {
+        {FEATURE_FRESNEL, "a material has 'fresnel'"},
+        {FEATURE_AREA_LIGHTS, "a light has an area"},
+        {FEATURE_LENS, "the camera has an 'aperture'"},
+        {FEATURE_ORTHOGRAPHIC, "the camera is orthographic"},
+    };
+    const FeatureSet features = settings->certifies ? features_of(scene) : 0;
+    for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)
+        if (features & unbounded[i].feature)
+            return message_error(messages,
+                                 "%s, which has no error bound: choose a precision other than certified",
+                                 unbounded[i].text);
+    return true;
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,

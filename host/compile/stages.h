@@ -13,8 +13,8 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
 // units.c: scene units per unit of length on the device, a power of two; 1 for most scenes.
 double scene_unit(const Scene *scene, const CompileSettings *settings);
 
-// limits.c: false with a message if `certified` has no bounds for a material.
-bool materials_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages);
+// limits.c: false with a message if `certified` has no error bounds for a feature of the scene.
+bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages);
 
 // limits.c: false with a message where the square of a light's distance overflows the precision. The scene is
 // in the device's unit.

@@ -15,6 +15,8 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     for (size_t i = 0; i < scene->lights.count; i++) {
         change(&scene->lights.items[i].position, factor);
         change(&scene->lights.items[i].direction, factor);
+        change(&scene->lights.items[i].across[0], factor);
+        change(&scene->lights.items[i].across[1], factor);
     }
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
@@ -33,12 +35,16 @@ static void vector_grow(Vector3 *vector, double factor)
 void scene_scale(Scene *scene, double factor)
 {
     scene_for_each_vector(scene, vector_grow, factor);
+    scene->camera.lens_radius *= factor;
+    scene->camera.focal_distance *= factor;
+    if (scene->camera.orthographic) scene->camera.half_tangent *= factor;
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
         for (const size_t *offset = shape_ops[object->kind]->lengths; *offset > 0; offset++)
             *(double *)(void *)((char *)object + *offset) *= factor;
     }
     for (size_t i = 0; i < scene->lights.count; i++) {
+        scene->lights.items[i].radius *= factor;
         scene->lights.items[i].fading[1] /= factor;
         scene->lights.items[i].fading[2] /= factor * factor;
     }

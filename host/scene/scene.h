@@ -16,11 +16,19 @@ typedef enum { FIELD_VERTICAL, FIELD_HORIZONTAL } FieldAxis;
 typedef struct {
     Vector3 position, look_at, up; // look_at differs from position; up may be zero or parallel to the view
     FieldAxis field_axis;
-    double half_tangent; // tan(field / 2) along field_axis, > 0; half the frame over the focal length
+    // tan(field / 2) along field_axis, > 0: half the frame over the focal length. With parallel rays, half
+    // the frame itself.
+    double half_tangent;
     double frame_aspect; // width over height of the frame, or 0 where the file gives none
+    bool orthographic;   // rays are parallel to the view
+    // 0: all distances are in focus. With a lens the plane across the view at focal_distance > 0 is.
+    double lens_radius, focal_distance;
 } Camera;
 
 typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
+
+// What a light shines from: its position, a rectangle or an ellipse around it, or a sphere.
+typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE } LightArea;
 
 typedef struct {
     LightKind kind;
@@ -29,6 +37,11 @@ typedef struct {
     Vector3 direction; // directional: where the light travels; spot: look_at - position; not unit
     // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
     double half_angle, penumbra;
+    LightArea area;
+    // From the center of a rectangle or an ellipse to the middles of two sides; for a directional light
+    // across `direction`, and relative to its length.
+    Vector3 across[2];
+    double radius; // of a sphere
     // point, spot: unless the latter two are 0, the strength is divided by fading[0] + fading[1] d +
     // fading[2] d^2 at the distance d
     double fading[3];

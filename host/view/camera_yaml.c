@@ -65,7 +65,17 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
     vector_write(text, "position", camera->position);
     vector_write(text, "look_at", camera->look_at);
     vector_write(text, "up", camera->up);
-    if (camera->field_axis == FIELD_VERTICAL) {
+    if (camera->lens_radius > 0) {
+        text_appendf(text, "aperture: ");
+        number_write(text, 2 * camera->lens_radius);
+        text_appendf(text, ", focus: ");
+        number_write(text, camera->focal_distance);
+        text_appendf(text, ", ");
+    }
+    if (camera->orthographic) {
+        text_appendf(text, "height: ");
+        number_write(text, 2 * camera->half_tangent);
+    } else if (camera->field_axis == FIELD_VERTICAL) {
         text_appendf(text, "fov: ");
         number_write(text, field_of_view(camera->half_tangent));
     } else {

@@ -11,6 +11,7 @@ typedef struct {
     Color3 weight;
     uint depth;
     real travelled; // distance from the eye along the path
+    Sample sample;  // with HAS_AREA_LIGHTS
     // At `certified`, the errors as in a Ray:
     real origin_error, start_error, direction_error;
     integer left;
@@ -27,6 +28,7 @@ static inline Ray bounce_ray(const Bounce *bounce)
 {
     Ray ray = ray_make_unit(bounce->origin, bounce->direction, bounce_is_active(bounce));
     if (HAS_IMAGES) ray.travelled = bounce->travelled;
+    if (HAS_AREA_LIGHTS) ray.sample = bounce->sample;
     if (IS_CERTIFIED) {
         ray.origin_error = bounce->origin_error;
         ray.tmin = -bounce->start_error;
@@ -336,6 +338,10 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
             reflected->weight = weight_part(weight, reflection + kept);
     }
     if (HAS_IMAGES) reflected->travelled = refracted->travelled = surface->travelled;
+    if (HAS_AREA_LIGHTS) {
+        reflected->sample = sample_after_bounce(surface->sample, false);
+        refracted->sample = sample_after_bounce(surface->sample, true);
+    }
     return total;
 }
 

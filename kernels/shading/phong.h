@@ -34,22 +34,47 @@ static inline real light_fading(const Light *light, Vector to_light)
     return real_max(real_divide((real)(1), divisor), (real)(SMALLEST_RATIO));
 }
 
+// Returns the vector from the center of a light's area to the surface's sample of it. A sphere is seen as a
+// disc, whose points are lifted to the sphere.
+static inline Vector light_area_offset(const Light *light, uint index, const Surface *surface)
+{
+    SquarePoint point = sample_point(&surface->sample, SAMPLED_LIGHTS + index);
+    if (light->kind.y != LIGHT_AREA_RECTANGLE) point = disc_of_square(point);
+    if (light->kind.y != LIGHT_AREA_SPHERE)
+        return vector_fma(vector_of(light->across_u), point.x,
+                          vector_scale(vector_of(light->across_v), point.y));
+    // Neighboring directions have neighboring bases, or a pixel's samples would not complement each other:
+    // only at this axis, along which no scene is built, the basis is not continuous.
+    const Vector axis = {(real)(0.37f), (real)(0.48f), (real)(0.79f)};
+    Vector toward = vector_normalize(vector_subtract(surface->position, vector_of(light->position)));
+    Vector u = vector_normalize(vector_cross(toward, axis)), v = vector_cross(toward, u);
+    real height =
+        real_sqrt(real_max(real_fma(-point.x, point.x, real_fma(-point.y, point.y, (real)(1))), (real)(0)));
+    Vector offset = vector_fma(u, point.x, vector_fma(v, point.y, vector_scale(toward, height)));
+    return vector_scale(offset, (real)(light->across_u.w));
+}
+
 // The shadow ray to a point or spot light is not normalized: the light is at t = 1. It ends 32 u before, so
 // that a surface on which the light lies does not occlude it.
-static inline LightRay light_ray(const Light *light, const Surface *surface)
+static inline LightRay light_ray(const Light *light, uint index, const Surface *surface)
 {
+    bool has_area = HAS_AREA_LIGHTS && light->kind.y != LIGHT_AREA_NONE;
     LightRay to_light;
     Vector start = secondary_ray_origin(surface, false);
     to_light.strength = to_light.fading = (real)(1);
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
+        if (has_area)
+            to_light.direction =
+                vector_normalize(vector_add(to_light.direction, light_area_offset(light, index, surface)));
         to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
         to_light.shadow_ray =
             ray_make(start, to_light.direction, (real)(0), (real)(LARGEST), surface_found(surface));
         return to_light;
     }
     Vector position = vector_of(light->position);
+    if (has_area) position = vector_add(position, light_area_offset(light, index, surface));
     Vector to_position = vector_subtract(position, surface->position);
     to_light.direction = vector_normalize(to_position);
     to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
@@ -251,7 +276,7 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
                                           Ray *shadow_ray)
 {
     Light light = scene->lights[index];
-    LightRay to_light = light_ray(&light, surface);
+    LightRay to_light = light_ray(&light, index, surface);
     LightVisibility visibility;
     visibility.fraction = to_light.strength;
     visibility.lit = surface_found(surface) & (to_light.facing > (real)(0)) & (to_light.strength > (real)(0));
@@ -260,7 +285,8 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     if (IS_CERTIFIED) skips_culling = light_set_errors(&light, surface, &to_light, &visibility);
     visibility.reflected = phong_reflect(surface, &to_light, to_light.shadow_ray.active);
     *shadow_ray = to_light.shadow_ray;
-    if (light.kind.x != LIGHT_KIND_DIRECTIONAL)
+    bool has_area = HAS_AREA_LIGHTS && light.kind.y != LIGHT_AREA_NONE;
+    if (light.kind.x != LIGHT_KIND_DIRECTIONAL && !has_area)
         ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index, skips_culling);
     ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
     return visibility;

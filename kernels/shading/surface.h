@@ -35,6 +35,7 @@ typedef struct {
     real reflection, transmission, ior;
     Color3 reflection_tint, specular_tint; // with HAS_TINTS
     mask fresnel;                          // with HAS_FRESNEL
+    Sample sample;                         // with HAS_AREA_LIGHTS
     mask entering;                         // the ray runs into the solid, against its outward normal
     real travelled;                        // distance from the eye along the path
     // At `certified`, bounds on the distance of the position from the exact one; on that of the shading
@@ -332,6 +333,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         surface.ior = (real)(1);
     }
     if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
+    if (HAS_AREA_LIGHTS) surface.sample = ray->sample;
     if (IS_CERTIFIED) {
         surface_set_place_error(&surface, ray, hit);
         surface.eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);

@@ -161,6 +161,7 @@ static inline Vector texture_color(const Scene *scene, uint kind, const Material
 {
     real cosine = real_max(fabs(vector_dot(point->normal, ray->direction)), (real)(0x1p-10f));
     real width = travelled * (real)(scene->header->sample.x);
+    if (HAS_ORTHOGRAPHIC && scene->header->sample.z > 0) width = (real)(scene->header->sample.z);
     RealLanes u = {coordinates.u}, v = {coordinates.v},
               footprint = {real_divide(width * coordinates.density, cosine)};
     RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};

@@ -4,6 +4,7 @@
 
 #include "numerics/vector.h"
 
+#include "sampling.h"
 #include "types.h"
 
 // A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
@@ -19,6 +20,7 @@ typedef struct {
     real tmin, tmax; // hits lie strictly between
     mask active;     // lanes that carry a ray
     real travelled;  // distance from the eye to the origin, for texture filtering
+    Sample sample;   // with HAS_AREA_LIGHTS
     // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|
     uint common_origin;
     real cull_slack; // at `certified`: ray_cull_slack
@@ -113,6 +115,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     ray.tmin = tmin;
     ray.tmax = tmax;
     if (HAS_IMAGES) ray.travelled = (real)(0);
+    if (HAS_AREA_LIGHTS) ray.sample = (Sample){SAMPLE_CENTER, (word)(0)};
     ray.common_origin = COMMON_ORIGIN_NONE;
     if (IS_CERTIFIED) {
         ray.origin_error = ray.direction_error = (real)(0);

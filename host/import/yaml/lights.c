@@ -1,13 +1,16 @@
 #include "host/base/array.h"
 #include "host/import/yaml/yaml.h"
+#include "host/scene/portable.h"
 
 #include <string.h>
 
 static const Range range_half_turn = {0, 180, true, "greater than 0 and less than 180"};
+static const Range range_sky_angle = {0, 90, false, "from 0 to 90"};
 
 typedef struct {
     Light light;
-    double intensity;
+    double intensity, angle;
+    Vector3 edges[2], normal;
 } LightFields;
 
 // Takes `inverse_square`, or what divides the strength at a distance d: constant + linear d + quadratic d^2.
@@ -49,6 +52,7 @@ static const Field point_fields[] = {
 
 static const Field directional_fields[] = {
     {"direction", read_direction, offsetof(LightFields, light.direction), FORM_ANY, REQUIRED, NULL},
+    {"angle", read_number, offsetof(LightFields, angle), FORM_ANY, OPTIONAL, &range_sky_angle},
     COLOR,
 };
 
@@ -59,6 +63,34 @@ static const Field spot_fields[] = {
     {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED, NULL},
     {"angle", read_number, offsetof(LightFields, light.half_angle), FORM_ANY, REQUIRED, &range_half_turn},
     {"penumbra", read_number, offsetof(LightFields, light.penumbra), FORM_ANY, OPTIONAL, &range_not_negative},
+    {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, OPTIONAL, &range_not_negative},
+    FALLOFF,
+    COLOR,
+};
+
+static const Field sphere_fields[] = {
+    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
+    {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
+    FALLOFF,
+    COLOR,
+};
+
+static bool read_edges(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 2, "two vectors", read_direction, sizeof(Vector3), target);
+}
+
+static const Field rectangle_fields[] = {
+    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
+    {"edges", read_edges, offsetof(LightFields, edges), FORM_ANY, REQUIRED, NULL},
+    FALLOFF,
+    COLOR,
+};
+
+static const Field disc_fields[] = {
+    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
+    {"normal", read_direction, offsetof(LightFields, normal), FORM_ANY, REQUIRED, NULL},
+    {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
     FALLOFF,
     COLOR,
 };
@@ -75,34 +107,73 @@ static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
     return true;
 }
 
+// Two vectors of this length across a direction and each other.
+static void across_set(Vector3 across[2], Vector3 direction, double length)
+{
+    const Vector3 axis = vector_normalize(direction);
+    const Vector3 u = vector_normalize(vector_cross(axis, vector_least_aligned_axis(axis)));
+    across[0] = vector_scale(u, length);
+    across[1] = vector_scale(vector_cross(axis, u), length);
+}
+
+// Sets the light's area.
+static void area_set(LightFields *read)
+{
+    Light *light = &read->light;
+    if (light->kind == LIGHT_DIRECTIONAL && read->angle > 0) {
+        const double length = sqrt(vector_dot(light->direction, light->direction));
+        across_set(light->across, light->direction, length * portable_tangent(read->angle * (M_PI / 360)));
+        light->area = AREA_ELLIPSE;
+    } else if (light->area == AREA_ELLIPSE) {
+        across_set(light->across, read->normal, light->radius);
+    } else if (light->area == AREA_RECTANGLE) {
+        light->across[0] = vector_scale(read->edges[0], 0.5);
+        light->across[1] = vector_scale(read->edges[1], 0.5);
+    } else if (light->radius > 0) {
+        light->area = AREA_SPHERE;
+    }
+}
+
+#define FIELDS(fields) fields, COUNT_OF(fields)
 static const struct {
+    const char *name;
+    LightKind kind;
+    LightArea area;
     const Field *fields;
     size_t field_count;
 } light_kinds[] = {
-    [LIGHT_POINT] = {point_fields, COUNT_OF(point_fields)},
-    [LIGHT_DIRECTIONAL] = {directional_fields, COUNT_OF(directional_fields)},
-    [LIGHT_SPOT] = {spot_fields, COUNT_OF(spot_fields)},
+    {"point", LIGHT_POINT, AREA_NONE, FIELDS(point_fields)},
+    {"directional", LIGHT_DIRECTIONAL, AREA_NONE, FIELDS(directional_fields)},
+    {"spot", LIGHT_SPOT, AREA_NONE, FIELDS(spot_fields)},
+    {"sphere", LIGHT_POINT, AREA_SPHERE, FIELDS(sphere_fields)},
+    {"rectangle", LIGHT_POINT, AREA_RECTANGLE, FIELDS(rectangle_fields)},
+    {"disc", LIGHT_POINT, AREA_ELLIPSE, FIELDS(disc_fields)},
 };
-
-static const char *const light_names[COUNT_OF(light_kinds)] = {"point", "directional", "spot"};
 
 static void light_read(YamlReader *reader, const YamlNode *item)
 {
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one light, such as `point: {...}`", &key, &mapping)) return;
-    size_t kind = 0;
-    while (kind < COUNT_OF(light_names) && strcmp(yaml_text(&reader->tree, key), light_names[kind]) != 0)
-        kind++;
-    if (kind == COUNT_OF(light_names)) {
-        unknown_report(reader, key, "light", light_names, COUNT_OF(light_names));
+    const char *names[COUNT_OF(light_kinds)];
+    size_t row = COUNT_OF(light_kinds);
+    for (size_t i = 0; i < COUNT_OF(light_kinds); i++) {
+        names[i] = light_kinds[i].name;
+        if (strcmp(yaml_text(&reader->tree, key), names[i]) == 0) row = i;
+    }
+    if (row == COUNT_OF(light_kinds)) {
+        unknown_report(reader, key, "light", names, COUNT_OF(light_kinds));
         return;
     }
-    LightFields fields = {.light = {.kind = (LightKind)kind, .color = {1, 1, 1}}, .intensity = 1};
+    LightFields fields = {
+        .light = {.kind = light_kinds[row].kind, .color = {1, 1, 1}, .area = light_kinds[row].area},
+        .intensity = 1,
+    };
     Form form;
-    if (!fields_read(reader, mapping, light_names[kind], light_kinds[kind].fields,
-                     light_kinds[kind].field_count, &fields, &form))
+    if (!fields_read(reader, mapping, names[row], light_kinds[row].fields, light_kinds[row].field_count,
+                     &fields, &form))
         return;
-    if (kind == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
+    if (fields.light.kind == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
+    area_set(&fields);
     fields.light.color = vector_scale(fields.light.color, fields.intensity);
     light_fold_fading(&fields.light);
     array_push(reader->scene->lights, fields.light);

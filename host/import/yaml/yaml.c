@@ -9,12 +9,36 @@
 
 typedef struct {
     Camera camera;
-    double fov_degrees, focal_length, frame[2];
+    double fov_degrees, focal_length, frame[2], height, aperture;
+    Vector3 focus; // the point, unless camera.focal_distance is set
 } CameraFields;
 
 static bool read_frame(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
+}
+
+// Takes a distance or a point.
+static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    CameraFields *read = target;
+    if (node->kind != YAML_SCALAR) return read_vector(reader, field, node, &read->focus);
+    Field distance = *field;
+    distance.range = &range_positive;
+    return read_number(reader, &distance, node, &read->camera.focal_distance);
+}
+
+// Sets the lens. `focus` is its key, or the camera's mapping.
+static void camera_set_lens(YamlReader *reader, const CameraFields *read, const YamlNode *focus)
+{
+    Camera *camera = &reader->scene->camera;
+    camera->lens_radius = read->aperture / 2;
+    if (camera->focal_distance > 0) return;
+    const Vector3 view = vector_subtract(camera->look_at, camera->position);
+    camera->focal_distance =
+        vector_dot(vector_subtract(read->focus, camera->position), vector_normalize(view));
+    if (camera->focal_distance <= 0)
+        report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
 }
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
@@ -27,16 +51,26 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_SECOND, REQUIRED,
          &range_positive},
         {"frame", read_frame, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
+        {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
+        {"aperture", read_number, offsetof(CameraFields, aperture), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"focus", read_focus, 0, FORM_ANY, OPTIONAL, NULL},
     };
-    CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
+    CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50, .focus = vector_all(NAN)};
     Form form;
     if (!fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read, &form)) return;
     Camera *camera = &reader->scene->camera;
     *camera = read.camera;
-    if (vector_is_zero(vector_subtract(camera->look_at, camera->position)))
+    if (vector_is_zero(vector_subtract(camera->look_at, camera->position))) {
         report_error(&reader->report, field_node(reader, node, "look_at")->offset,
                      "'look_at' must differ from 'position'");
-    if (form == FORM_FIRST) {
+        return;
+    }
+    if (isnan(read.focus.x)) read.focus = camera->look_at;
+    camera_set_lens(reader, &read, field_node(reader, node, "focus"));
+    if (form == FORM_THIRD) {
+        camera->orthographic = true;
+        camera->half_tangent = read.height / 2;
+    } else if (form == FORM_FIRST) {
         camera->field_axis = FIELD_VERTICAL;
         camera->half_tangent = portable_tangent(read.fov_degrees * (M_PI / 360));
     } else {

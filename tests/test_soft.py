@@ -1,0 +1,121 @@
+#!/usr/bin/env -S python3 -B
+"""Soft shadows, the lens and parallel rays against what geometry says, and how the error falls with the samples."""
+import math
+
+import glint
+from glint import IS_LONG, TestCase, main, npy_read, need_device, skip_all, write
+
+PRECISIONS = "single", "strict", "double"
+
+
+def cap(x):
+    """The part of a disc of radius 1 on the side of a chord at x that holds the center if x is above 0."""
+    x = min(max(x, -1), 1)
+    return 0.5 + (x * math.sqrt(1 - x * x) + math.asin(x)) / math.pi
+
+
+class Soft(TestCase):
+    def row(self, text, size, options="", **run):
+        """The red channel of the middle row."""
+        write("soft.yaml", text)
+        self.glint(f"render soft.yaml --quiet --size {size[0]}x{size[1]} -o soft.npy {options}", **run)
+        values = npy_read("soft.npy")[2]
+        middle = size[1] // 2
+        return [values[middle * size[0] + column][0] for column in range(size[0])]
+
+    def penumbra(self, light, options):
+        """The part of the light that arrives on a floor behind the edge of a wall that ends at x = 0, a tenth of the way up
+        to the light, which is far above, at x from -0.2 to 0.2."""
+        camera = "camera: {position: [0, 50, 0], look_at: [0, 0, 0], up: [0, 0, 1], height: 0.025}\nlights:\n"
+        floor = "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+        # seen from above, x grows to the left
+        wall = "  - box: {min: [-1000, 100, -1000], max: [0, 101, 1000]}\n"
+        size, head = (80, 5), f"{camera}  - {light}\n{floor}"
+        under = head + wall
+        return self.row(under, size, options)[::-1], self.row(head, size, options)[::-1]
+
+    def test_shadows(self):
+        """The penumbra of each light: as the part of its area beyond the edge."""
+        # at 1000 up an area of half-width 1.8 has a penumbra of half-width 0.2 behind an edge at 100
+        lights = {
+            "rectangle: {center: [0, 1000, 0], edges: [[3.6, 0, 0], [0, 0, 9]]}": lambda x: min(max(0.5 + x / 2, 0), 1),
+            "disc: {center: [0, 1000, 0], normal: [0, 1, 0], radius: 1.8}": cap,
+            "sphere: {center: [0, 1000, 0], radius: 1.8}": cap,
+            "spot: {position: [0, 1000, 0], look_at: [0, 0, 0], angle: 20, radius: 1.8}": cap,
+            # tan(angle / 2) = 0.2 / 100
+            "directional: {direction: [0, -2, 0], angle: 0.229182812}": cap,
+        }
+        for light, expected in lights.items():
+            for precision in PRECISIONS if IS_LONG else ["strict"]:
+                with self.subTest(light, precision=precision):
+                    dark, full = self.penumbra(light, f"--samples 1024 --precision {precision}")
+                    for i, value in enumerate(dark):
+                        x = (2 * i + 1 - len(dark)) / len(dark)
+                        self.assertAlmostEqual(full[i], 1, delta=2e-3)
+                        # a directional light's wall is 1 thick
+                        self.assertAlmostEqual(value, expected(x), delta=0.02, msg=(i, x))
+
+    def test_error_falls(self):
+        """As low-discrepancy points promise, faster than with the root of the samples, by which random ones' error falls."""
+        light = "rectangle: {center: [0, 1000, 0], edges: [[3.6, 0, 0], [0, 0, 9]]}"
+        errors = []
+        for samples in 16, 256:
+            dark, _ = self.penumbra(light, f"--samples {samples} --precision strict")
+            exact = [min(max(0.5 + (2 * i + 1 - len(dark)) / len(dark) / 2, 0), 1) for i in range(len(dark))]
+            errors.append(math.sqrt(sum((a - b) ** 2 for a, b in zip(dark, exact)) / len(dark)))
+        self.assertLess(errors[1], errors[0] / 5.5, errors)
+
+    def test_focus(self):
+        """An edge beyond the focal plane is blurred by the part of the lens that sees past it; one in it is sharp."""
+        # the wall ends at x = 0, its distance is 10
+        text = ("camera: {{position: [0, 0, 10], look_at: [0, 0, 0], fov: 2, aperture: 0.2, focus: {focus}}}\n"
+                "ambient: 1\nbackground: 0\nobjects: [{{box: {{min: [0, -90, -1e-6], max: [90, 90, 0]}}}}]\n")
+        size = 64, 64
+        half = 10 * math.tan(math.radians(1))
+        for focus, blur in ("5", 0.1), ("20", 0.05), ("[7, 8, 5]", 0.1), ("[0, 0, 0]", 0):
+            with self.subTest(focus):
+                row = self.row(text.format(focus=focus), size, "--samples 1024 --precision strict")
+                for i, value in enumerate(row):
+                    x = (2 * i + 1 - size[0]) / size[0] * half
+                    exact = cap(x / blur) if blur else float(x > 0)
+                    # a pixel is a fifth of the sharper blur wide
+                    self.assertAlmostEqual(value, exact, delta=0.03, msg=(i, x))
+
+    def test_no_lens(self):
+        """Without an aperture `focus` changes nothing."""
+        text = "camera: {{position: [1, 2, 6], look_at: [0, 0, 0]{}}}\nlights: [{{point: {{position: [3, 4, 5]}}}}]\n" + \
+               "objects: [{{sphere: {{center: [0, 0, 0], radius: 1}}}}]\n"
+        plain = self.row(text.format(""), (32, 32))
+        self.assertEqual(self.row(text.format(", focus: 3, aperture: 0"), (32, 32)), plain)
+
+    def test_parallel_rays(self):
+        """Pixels lie evenly on the scene, at every distance; the window's height is that of the image."""
+        write("soft.yaml", "camera: {position: [1, 2, 6], look_at: [1, 2, 0], height: 3}\n"
+              "objects: [{plane: {point: [0, 0, 1], normal: [0.3, 0.2, 1]}}]\n")
+        for precision in PRECISIONS:
+            with self.subTest(precision=precision):
+                self.glint(f"render soft.yaml --quiet --size 40x30 --aov position,ray --precision {precision} -o soft.npy")
+                positions, rays = npy_read("soft.position.npy")[2], npy_read("soft.ray.npy")[2]
+                for row in range(30):
+                    for column in range(40):
+                        x, y, _ = positions[40 * row + column]
+                        self.assertEqual(tuple(rays[40 * row + column]), (0, 0, -1))
+                        self.assertAlmostEqual(x, 1 + (2 * column - 39) / 60 * 3, delta=1e-5)
+                        self.assertAlmostEqual(y, 2 - (2 * row - 29) / 60 * 3, delta=1e-5)
+
+    def test_certified_refuses(self):
+        """An area, a lens and parallel rays, whose errors have no bound."""
+        camera = "camera: {{position: [0, 0, 5], look_at: [0, 0, 0]{}}}\nlights: [{}]\nobjects: []\n"
+        point, command = "point: {position: [0, 5, 0]}", "render soft.yaml --size 8x8 --precision certified -o soft.npy"
+        for key, light, message in (("", "{sphere: {center: [0, 5, 0], radius: 1}}", "a light has an area, "),
+                                    (", aperture: 1", f"{{{point}}}", "the camera has an 'aperture', "),
+                                    (", height: 1", f"{{{point}}}", "the camera is orthographic, ")):
+            write("soft.yaml", camera.format(key, light))
+            self.refuses(command, f"{message}which has no error bound: choose a precision other than certified")
+
+
+if __name__ == "__main__":
+    if glint.IS_SANITIZED:
+        skip_all("sanitizers do not see kernels")
+    need_device()
+    main()
