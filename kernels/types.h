@@ -319,6 +319,10 @@ typedef struct {
 
 typedef struct {
     scalar4 background, ambient;
+    // With HAS_SKY the background is that of directions across the unit vector sky_up. sky_above and
+    // sky_below are added for unit directions along and against it, and in between by the cosine.
+    // sky_up.w: the largest magnitude of their channels.
+    scalar4 sky_up, sky_above, sky_below;
     // A camera ray runs from the eye along forward + x right + y up, with x and y in half pixels from the
     // image's center. The eye is the origin, except in a preview of a scene compiled for another eye.
     //

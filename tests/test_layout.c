@@ -32,6 +32,9 @@ typedef struct {
 #define MEMBER_LIST(REALS, INTEGERS)                                             \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, background)                     \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, ambient)                        \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_up)                         \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_above)                      \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_below)                      \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, eye)                            \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, lens_right)                     \

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Soft shadows, the lens and parallel rays against what geometry says, and how the error falls with the samples."""
+"""Soft shadows, the lens, parallel rays and the sky against what geometry says, and how the error falls with the samples."""
 import math
 
 import glint
@@ -102,6 +102,29 @@ class Soft(TestCase):
                         self.assertEqual(tuple(rays[40 * row + column]), (0, 0, -1))
                         self.assertAlmostEqual(x, 1 + (2 * column - 39) / 60 * 3, delta=1e-5)
                         self.assertAlmostEqual(y, 2 - (2 * row - 29) / 60 * 3, delta=1e-5)
+
+    def test_sky(self):
+        """The colors of the poles, blended by the cosine; its mean is the ambient light."""
+        colors = {"horizon": (0.5, 0.25, 1), "zenith": (0, 0.5, 2), "nadir": (1, 0.75, 0)}
+        given = ", ".join(f"{name}: {list(color)}" for name, color in colors.items())
+        write("soft.yaml", "camera: {position: [0, 0, 5], look_at: [3, 2, 0], fov: 150}\n"
+              f"background: {{{given}, up: [0, 0.6, 0.8]}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1}}}}]\n")
+        for precision in (*PRECISIONS, "certified"):
+            with self.subTest(precision=precision):
+                self.glint(f"render soft.yaml --quiet --size 24x16 --aov ray,object --precision {precision} -o soft.npy")
+                pixels, rays, objects = (npy_read(f"soft{name}.npy")[2] for name in ("", ".ray", ".object"))
+                seen = {0.6 * ray[1] + 0.8 * ray[2] > 0 for ray in rays}
+                self.assertIn(0, objects)
+                for pixel, ray, number in zip(pixels, rays, objects):
+                    height = 0.6 * ray[1] + 0.8 * ray[2]
+                    pole = colors["zenith" if height > 0 else "nadir"]
+                    for channel in range(3):
+                        level = colors["horizon"][channel]
+                        exact = level + abs(height) * (pole[channel] - level)
+                        if number == 0:
+                            exact = level / 2 + (colors["zenith"][channel] + colors["nadir"][channel]) / 4
+                        self.assertAlmostEqual(pixel[channel], exact, delta=1e-6)
+                self.assertEqual(seen, {True, False})
 
     def test_certified_refuses(self):
         """An area, a lens and parallel rays, whose errors have no bound."""

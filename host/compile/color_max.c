@@ -33,7 +33,8 @@ double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32
     // refracted, what rays with one bounce less see
     for (uint32_t left = 0; left <= bounces; left++) {
         const Color before = seen;
-        seen = vector_max(seen, scene->background);
+        seen =
+            vector_max(seen, vector_max(scene->background, vector_max(scene->sky.zenith, scene->sky.nadir)));
         for (size_t i = 0; i < scene->materials.count; i++) {
             const Material *material = &scene->materials.items[i];
             const Color passed = vector_scale(before, material->reflection + material->transmission);

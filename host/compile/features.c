@@ -51,6 +51,7 @@ FeatureSet features_of(const Scene *scene)
     for (size_t i = 0; i < scene->lights.count; i++)
         if (scene->lights.items[i].area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
     if (scene->camera.lens_radius > 0) set |= FEATURE_LENS;
+    if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;
     if (scene->camera.orthographic) set |= FEATURE_ORTHOGRAPHIC;
     return set;
 }

@@ -29,9 +29,16 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     const double lens_radius = scene->camera.lens_radius;
     const double sample_width = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count);
+    const bool has_sky = !vector_is_zero(scene->sky.up);
+    const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
+                below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
         .ambient = scalar4_of(scene->ambient, 0),
+        .sky_up = scalar4_of(has_sky ? vector_normalize(scene->sky.up) : scene->sky.up,
+                             fmax(vector_largest(above), vector_largest(below))),
+        .sky_above = scalar4_of(above, 0),
+        .sky_below = scalar4_of(below, 0),
         .eye = scalar4_of(compiled->eye_offset, 0),
         .forward = scalar4_of(basis.forward, 0),
         .right = scalar4_of(basis.right, 0),

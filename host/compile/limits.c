@@ -135,6 +135,7 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
     double largest = is_double ? DBL_MAX : FLT_MAX;
     CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     bool fits = vector_is_within(scene->background, largest) && vector_is_within(scene->ambient, largest) &&
+                vector_is_within(scene->sky.zenith, largest) && vector_is_within(scene->sky.nadir, largest) &&
                 vector_is_within(basis.forward, largest) && vector_is_within(basis.right, largest) &&
                 vector_is_within(basis.up, largest);
     for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)

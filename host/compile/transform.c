@@ -12,6 +12,7 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     change(&scene->camera.position, factor);
     change(&scene->camera.look_at, factor);
     change(&scene->camera.up, factor);
+    change(&scene->sky.up, factor);
     for (size_t i = 0; i < scene->lights.count; i++) {
         change(&scene->lights.items[i].position, factor);
         change(&scene->lights.items[i].direction, factor);

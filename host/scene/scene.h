@@ -184,6 +184,12 @@ typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 typedef struct {
     Camera camera;
     Color background, ambient;
+    // The background of the directions along `up`, against it, and, by the cosine, of those in between;
+    // `background` is that of those across it. Nothing where `up` is zero.
+    struct {
+        Vector3 up;
+        Color zenith, nadir;
+    } sky;
     struct {
         Light *items;
         size_t count, capacity;

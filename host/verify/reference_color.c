@@ -181,10 +181,20 @@ static ReferenceColor surface_color(const ReferenceScene *world, const Surface *
     return sum;
 }
 
+// The color of a direction of any length.
+static Color background_color(const Scene *scene, Quad3 direction)
+{
+    if (vector_is_zero(scene->sky.up)) return scene->background;
+    const double height = (double)quad3_dot(quad3_unit(direction), quad3_unit(quad3(scene->sky.up)));
+    const Color farthest = height > 0 ? scene->sky.zenith : scene->sky.nadir;
+    return vector_add(scene->background,
+                      vector_scale(vector_subtract(farthest, scene->background), fabs(height)));
+}
+
 ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_hit(scene, ray);
-    if (!hit.found) return (ReferenceColor){scene->background, (double)hit.margin};
+    if (!hit.found) return (ReferenceColor){background_color(scene, ray->direction), (double)hit.margin};
     const ReferenceScene world = {*scene, NULL};
     Surface surface = surface_at(&world, ray, &hit, 0, NULL);
     return surface_color(&world, &surface, (double)hit.margin, NULL);
@@ -276,7 +286,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
     if (!hit.found) {
         tree->has_first = true;
         tree->margin = fmin(tree->margin, (double)hit.margin);
-        tree->sum = vector_add(tree->sum, vector_multiply(scene->background, weight));
+        tree->sum = vector_add(tree->sum, vector_multiply(background_color(scene, ray->direction), weight));
         signature_add(tree, UINT32_MAX, 0);
         return;
     }

@@ -15,16 +15,30 @@ typedef struct {
     real color_error;
 } ShadedHit;
 
+// Returns what a ray of unit direction sees where it hits nothing.
+static inline Color3 background_color(global const SceneHeader *header, Vector direction)
+{
+    Color3 color = vector_of(header->background);
+    if (!HAS_SKY) return color;
+    const real zero = (real)(0);
+    real height = vector_dot(direction, vector_of(header->sky_up));
+    color = vector_fma(vector_of(header->sky_above), real_max(height, zero), color);
+    return vector_fma(vector_of(header->sky_below), real_max(-height, zero), color);
+}
+
 // Sets the surface that a packet's rays hit and what it reflects of ambient light. Returns whether any lane
 // hit one.
 static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
     if (IS_CERTIFIED) traversal_judge(traversal);
     hit->surface.object = traversal->hit.object;
-    hit->color = vector_of(scene->header->background);
+    hit->color = background_color(scene->header, ray->direction);
     if (IS_CERTIFIED) {
         hit->doubt = traversal->hit.doubt;
         hit->color_error = (real)(0);
+        if (HAS_SKY)
+            hit->color_error =
+                (real)(scene->header->sky_up.w) * (ray->direction_error + (real)(16 * UNIT_ROUNDOFF));
     }
     mask found = surface_found(&hit->surface);
     if (!lanes_any(found)) return false;

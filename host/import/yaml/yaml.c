@@ -81,7 +81,40 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 }
 
 typedef struct {
-    Color background, ambient;
+    Color horizon;
+    Vector3 up;
+    Color zenith, nadir;
+} Background;
+
+// Takes a color, or those of the sky.
+static bool read_background(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    static const Field fields[] = {
+        {"horizon", read_strength, offsetof(Background, horizon), FORM_ANY, REQUIRED, NULL},
+        {"zenith", read_strength, offsetof(Background, zenith), FORM_ANY, REQUIRED, NULL},
+        {"nadir", read_strength, offsetof(Background, nadir), FORM_ANY, OPTIONAL, NULL},
+        {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL, NULL},
+    };
+    Background *background = target;
+    if (node->kind != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
+    background->up = (Vector3){0, 1, 0};
+    background->nadir = vector_all(NAN);
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), background, NULL)) return false;
+    if (isnan(background->nadir.x)) background->nadir = background->horizon;
+    return true;
+}
+
+// Returns the mean over all directions.
+static Color background_mean(const Background *background)
+{
+    if (vector_is_zero(background->up)) return vector_all(0);
+    const Color poles = vector_add(background->zenith, background->nadir);
+    return vector_add(vector_scale(background->horizon, 0.5), vector_scale(poles, 0.25));
+}
+
+typedef struct {
+    Background background;
+    Color ambient;
     const YamlNode *camera, *lights, *materials, *definitions, *objects;
 } Document;
 
@@ -89,17 +122,21 @@ static void document_read(YamlReader *reader)
 {
     static const Field fields[] = {
         {"camera", read_node, offsetof(Document, camera), FORM_ANY, REQUIRED, NULL},
-        {"background", read_strength, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
+        {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
         {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
         {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
         {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL, NULL},
         {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL, NULL},
         {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL, NULL},
     };
-    Document document = {0};
+    Document document = {.ambient = vector_all(NAN)};
     fields_read(reader, reader->tree.nodes.items, "scene", fields, COUNT_OF(fields), &document, NULL);
-    reader->scene->background = document.background;
-    reader->scene->ambient = document.ambient;
+    Scene *scene = reader->scene;
+    scene->background = document.background.horizon;
+    scene->sky.up = document.background.up;
+    scene->sky.zenith = document.background.zenith;
+    scene->sky.nadir = document.background.nadir;
+    scene->ambient = isnan(document.ambient.x) ? background_mean(&document.background) : document.ambient;
     if (document.camera) yaml_read_camera(reader, document.camera);
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them
