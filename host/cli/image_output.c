@@ -174,6 +174,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
             text_appendf(&value, "%s%s", set->bytes, set->next ? "\n" : "");
         notes_add(notes, "Set", text_c(&value));
     }
+    if (output->scene->is_animated) NOTE("Frame", "%g", output->scene->frame);
     NOTE_EACH("Device", "%s", report->device->name);
     NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
     NOTE("Precision", "%s", precision_names[settings->precision]);

@@ -266,8 +266,10 @@ void messages_print(MessageList *messages, const char *path)
 
 SceneOptions scene_options_of(const CommonOptions *common)
 {
-    return (SceneOptions){
-        .lenient = common->lenient, .overrides = common->overrides, .override_count = common->override_count};
+    return (SceneOptions){.lenient = common->lenient,
+                          .overrides = common->overrides,
+                          .override_count = common->override_count,
+                          .frame = common->frame};
 }
 
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common)

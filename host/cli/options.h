@@ -25,6 +25,7 @@ typedef struct {
     uint32_t work_group[2];               // 0 if not given
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
+    double frame; // of an animated scene
 } CommonOptions;
 
 // getopt_long values of long options. A command's other options start at OPTION_OWN.

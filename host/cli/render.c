@@ -208,12 +208,29 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
+        if (options.frame_count > 1 && !scene.is_animated && options.common.frame == options.first_frame)
+            fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options.scene);
         open->reference_selector = options.common.reference_device;
         if (render_devices_open(open, &options.common))
             status = scene_render(&options, &scene, open, ranks, &times);
     }
     scene_free(&scene);
     return status;
+}
+
+// Returns the path of a frame's image. The caller frees it.
+static char *frame_path_make(const RenderOptions *options, uint32_t frame)
+{
+    const char *output = options->output.path;
+    if (output) {
+        const FramePlace place = frame_place_of(output);
+        if (!place.start) return memory_copy_text(output);
+        return text_format("%.*s%0*u%s", (int)(place.start - output), output, place.digits, frame, place.end);
+    }
+    char *name = image_output_default_path(options->scenes[0]);
+    char *path = text_format("%.*s-%04u.png", (int)(strlen(name) - strlen(".png")), name, frame);
+    free(name);
+    return path;
 }
 
 // Returns the path of a scene's image. The caller frees it.
@@ -243,7 +260,8 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
 
 struct RenderCommand {
     RenderOptions options;
-    char **paths; // one path of an image per scene
+    size_t count; // images: scenes, or frames of one
+    char **paths; // one of each
     RenderDevices open;
     int status;
 };
@@ -255,9 +273,12 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
     if (*status != OPTIONS_READ) return NULL;
     RenderCommand *command = memory_allocate_zeroed(1, sizeof *command);
     command->options = options;
-    command->paths = memory_allocate(options.scene_count, sizeof *command->paths);
-    for (size_t i = 0; i < options.scene_count; i++)
-        command->paths[i] = path_make(&options, options.scenes[i]);
+    command->count = options.frame_count > 0 ? options.frame_count : options.scene_count;
+    command->paths = memory_allocate(command->count, sizeof *command->paths);
+    for (size_t i = 0; i < command->count; i++)
+        command->paths[i] = options.frame_count > 0
+                                ? frame_path_make(&options, options.first_frame + (uint32_t)i)
+                                : path_make(&options, options.scenes[i]);
     if (paths_differ(command->paths, &options)) return command;
     render_command_close(command);
     *status = EXIT_USER;
@@ -304,12 +325,12 @@ void render_command_choose_device(RenderCommand *command, size_t number)
 
 size_t render_command_count(const RenderCommand *command)
 {
-    return command->options.scene_count;
+    return command->count;
 }
 
 const char *render_command_scene(const RenderCommand *command, size_t index)
 {
-    return command->options.scenes[index];
+    return command->options.scenes[command->options.frame_count > 0 ? 0 : index];
 }
 
 const char *render_command_path(const RenderCommand *command, size_t index)
@@ -326,7 +347,10 @@ bool render_command_open_devices(RenderCommand *command)
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
 {
     RenderDevices *open = &command->open;
-    command->options.scene = command->options.scenes[index];
+    RenderOptions *options = &command->options;
+    options->scene = render_command_scene(command, index);
+    if (options->frame_count > 0) options->common.frame = options->first_frame + (double)index;
+    if (options->skips_existing && access(command->paths[index], F_OK) == 0) return EXIT_DONE;
     render_devices_rest(open);
     progress_end_at_once(); // nothing checks the flag while a scene is read
     if (progress_interrupted()) return EXIT_INTERRUPTED;
@@ -353,7 +377,7 @@ static bool continues_after(int status)
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
 {
     bool continues = continues_after(command->status);
-    for (size_t i = first; i < command->options.scene_count && continues; i++) {
+    for (size_t i = first; i < command->count && continues; i++) {
         const int status = render_command_run(command, i, ranks);
         render_command_note(command, status);
         continues = continues_after(status);
@@ -371,7 +395,7 @@ void render_command_drop_devices(RenderCommand *command)
 int render_command_close(RenderCommand *command)
 {
     const int status = render_devices_close(&command->open, command->status);
-    for (size_t i = 0; i < command->options.scene_count; i++)
+    for (size_t i = 0; i < command->count; i++)
         free(command->paths[i]);
     free(command->paths);
     free(command);

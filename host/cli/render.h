@@ -17,11 +17,11 @@ bool render_command_spares_scenes(RenderCommand *command);
 // Opens the devices before the first scene is read. Returns false with a message if there is none.
 bool render_command_open_devices(RenderCommand *command);
 
-size_t render_command_count(const RenderCommand *command); // the number of scenes
+size_t render_command_count(const RenderCommand *command); // the number of images: scenes, or frames of one
 const char *render_command_scene(const RenderCommand *command, size_t index);
-const char *render_command_path(const RenderCommand *command, size_t index); // the scene's image
+const char *render_command_path(const RenderCommand *command, size_t index); // the image
 
-// Renders one scene and returns its exit status. `ranks` may be NULL.
+// Renders one image and returns its exit status. `ranks` may be NULL.
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);
 // Returns whether the last scene or the settings did not fit a device. That is the user's mistake if all
 // devices are alike.

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/stat.h>
 
 enum {
@@ -21,6 +22,8 @@ enum {
     OPTION_DITHER,
     OPTION_BOUNCES,
     OPTION_CHECKPOINT,
+    OPTION_FRAMES,
+    OPTION_SKIP_EXISTING,
     OPTION_QUIET
 };
 
@@ -39,6 +42,8 @@ static const struct option long_options[] = {
     {"dither", no_argument, NULL, OPTION_DITHER},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
+    {"frames", required_argument, NULL, OPTION_FRAMES},
+    {"skip-existing", no_argument, NULL, OPTION_SKIP_EXISTING},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
     SET_LONG_OPTION,
@@ -76,6 +81,9 @@ static const char help_text[] =
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command resumes where an earlier one ended\n"
+                    "      --frames A[-B]    of an animation; -o has a place for the number (default: "
+                    "NAME-%04d.png)\n"
+                    "      --skip-existing   render only images that do not exist\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
@@ -95,6 +103,49 @@ static bool region_read(const char *value, uint32_t region[4])
     fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n",
             value);
     return false;
+}
+
+enum { FRAMES_MAX = 1000000 };
+
+// Reads a frame's number and moves behind it.
+static bool frame_read(const char **at, uint32_t *frame)
+{
+    char *end;
+    const unsigned long number = strtoul(*at, &end, 10);
+    const bool is_valid = **at >= '0' && **at <= '9' && number < FRAMES_MAX;
+    *frame = (uint32_t)number;
+    *at = end;
+    return is_valid;
+}
+
+static bool frames_read(const char *value, RenderOptions *options)
+{
+    const char *at = value;
+    bool is_valid = frame_read(&at, &options->first_frame);
+    uint32_t last = options->first_frame;
+    if (is_valid && *at == '-') {
+        at++;
+        is_valid = frame_read(&at, &last);
+    }
+    options->frame_count = last - options->first_frame + 1;
+    if (is_valid && *at == '\0' && last >= options->first_frame) return true;
+    fprintf(stderr, "glint: --frames: expected A or A-B with 0 <= A <= B < %d, not \"%s\"\n", FRAMES_MAX,
+            value);
+    return false;
+}
+
+FramePlace frame_place_of(const char *pattern)
+{
+    const char *slash = strrchr(pattern, '/');
+    const char *start = strchr(slash ? slash + 1 : pattern, '%');
+    if (!start) return (FramePlace){0};
+    const char *end = start + 1;
+    int digits = 0;
+    if (*end == '0' && end[1] >= '1' && end[1] <= '9') {
+        digits = end[1] - '0';
+        end += 2;
+    }
+    return *end == 'd' ? (FramePlace){start, end + 1, digits} : (FramePlace){0};
 }
 
 static bool exposure_read(const char *value, double *exposure)
@@ -168,6 +219,11 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     case OPTION_CHECKPOINT:
         options->checkpoint = value;
         return true;
+    case OPTION_FRAMES:
+        return frames_read(value, options);
+    case OPTION_SKIP_EXISTING:
+        options->skips_existing = true;
+        return true;
     case OPTION_QUIET:
         options->quiet = true;
         return true;
@@ -182,16 +238,25 @@ static bool is_folder(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-// Rejects options that suit one scene alone. Returns false with a message.
+// Rejects options that suit one image alone. Returns false with a message.
 static bool several_fit(const RenderOptions *options)
 {
-    const char *const folder = options->output.path;
-    if (options->checkpoint)
-        option_usage_fault("render", "--checkpoint takes one scene, but several are given");
+    const char *const path = options->output.path;
+    const bool has_scenes = options->scene_count > 1;
+    if (options->frame_count > 0 && has_scenes)
+        option_usage_fault("render", "--frames takes one scene, but several are given");
+    else if (options->checkpoint)
+        option_usage_fault(
+            "render", has_scenes ? "--checkpoint takes one scene, but several are given"
+                                 : "--checkpoint takes one frame; --skip-existing continues with the rest");
     else if (options->timing == TIMING_JSON)
-        option_usage_fault("render", "--timing=json takes one scene, but several are given");
-    else if (folder && !is_folder(folder))
+        option_usage_fault("render", has_scenes ? "--timing=json takes one scene, but several are given"
+                                                : "--timing=json takes one frame, but several are given");
+    else if (has_scenes && path && !is_folder(path))
         option_usage_fault("render", "--output of several scenes must be a folder");
+    else if (!has_scenes && path && !frame_place_of(path).start)
+        option_usage_fault("render", "--output of several frames needs a place for the number, such as "
+                                     "image-%04d.png");
     else
         return true;
     return false;
@@ -219,7 +284,8 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
     if (!display_fits(&options->output)) return EXIT_USER;
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
-    return options->scene_count == 1 || several_fit(options) ? OPTIONS_READ : EXIT_USER;
+    const bool is_one = options->scene_count == 1 && options->frame_count <= 1;
+    return is_one || several_fit(options) ? OPTIONS_READ : EXIT_USER;
 }
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)

@@ -11,17 +11,27 @@ typedef struct {
     size_t scene_count;
     const char *scene; // the one that is rendered
     const char *checkpoint;
-    ImageOutputOptions output; // with several scenes, its path is their folder
+    ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
     uint32_t width, height;    // 0 if not given
     uint32_t sample_count, bounce_count;
-    uint32_t region[4]; // x, y, width, height
-    bool has_region, has_transfer, quiet;
+    uint32_t region[4];                // x, y, width, height
+    uint32_t first_frame, frame_count; // of an animation; a count of 0 if not given
+    bool has_region, has_transfer, quiet, skips_existing;
     ErrorBudget budget; // a limit of 0 means none
     TimingStyle timing;
 } RenderOptions;
 
 // Returns OPTIONS_READ, or the exit status if help was requested or a usage fault was printed.
 int render_options_read(RenderOptions *options, int argument_count, char **arguments);
+
+// Where a pattern of names has the frame's number: the directive %d, or %0Nd for at least N digits.
+typedef struct {
+    const char *start, *end; // of the directive; NULL if there is none
+    int digits;
+} FramePlace;
+
+// Finds the directive in the name of a file, not in those of its folders.
+FramePlace frame_place_of(const char *pattern);
 
 // Sets the settings for one scene. Chooses the size and region if the options leave them open. Returns false
 // with a message if the options do not fit the scene.

@@ -92,6 +92,8 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
         scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
         for (const Source *set = scene->overrides; set; set = set->next)
             scene->text_hash = hash_bytes(scene->text_hash, set->bytes, set->length + 1);
+        if (scene->is_animated)
+            scene->text_hash = hash_bytes(scene->text_hash, &options->frame, sizeof options->frame);
     }
     text_free(&text);
     return read;

@@ -219,6 +219,8 @@ typedef struct {
     Text text;          // what was read from it: for messages about them, see scene_source
     uint64_t text_hash; // of the file's bytes and the overrides; hash_bytes
     Source *overrides;  // what replaced values of the file, PATH=VALUE each, in order; NULL if none
+    bool is_animated;   // values depend on
+    double frame;       // the frame, which the options named
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;

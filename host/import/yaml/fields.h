@@ -41,6 +41,7 @@ typedef struct {
     } definitions;
     bool warned_of_pattern; // that a transform does not move
     size_t copy_count;      // see COPIES_MAX in groups.c
+    size_t key_count;       // see KEYS_MAX in animation.c
 } YamlReader;
 
 typedef struct Field Field;

@@ -2,6 +2,7 @@
 #include "host/import/yaml/yaml.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
+#include "host/import/yaml/animation.h"
 #include "host/import/yaml/overrides.h"
 #include "host/scene/portable.h"
 
@@ -9,7 +10,7 @@
 
 typedef struct {
     Camera camera;
-    double fov_degrees, focal_length, frame[2], height, aperture;
+    double fov_degrees, focal_length, frame[2], height, aperture, turn;
     Vector3 focus; // the point, unless camera.focal_distance is set
 } CameraFields;
 
@@ -41,6 +42,18 @@ static void camera_set_lens(YamlReader *reader, const CameraFields *read, const 
         report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
 }
 
+// Turns the position about `up` through look_at, counterclockwise seen from above (Rodrigues).
+static void camera_turn(Camera *camera, double degrees)
+{
+    const double angle = fmod(degrees, 360) * (M_PI / 180), cosine = portable_cosine(angle);
+    const Vector3 axis = vector_normalize(camera->up),
+                  from = vector_subtract(camera->position, camera->look_at);
+    const Vector3 along = vector_scale(axis, vector_dot(axis, from) * (1 - cosine));
+    const Vector3 across = vector_scale(vector_cross(axis, from), portable_sine(angle));
+    camera->position =
+        vector_add(camera->look_at, vector_add(vector_add(vector_scale(from, cosine), across), along));
+}
+
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 {
     static const Field fields[] = {
@@ -52,6 +65,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
          &range_positive},
         {"frame", read_frame, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
         {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
+        {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL, NULL},
         {"aperture", read_number, offsetof(CameraFields, aperture), FORM_ANY, OPTIONAL, &range_not_negative},
         {"focus", read_focus, 0, FORM_ANY, OPTIONAL, NULL},
     };
@@ -65,6 +79,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
                      "'look_at' must differ from 'position'");
         return;
     }
+    if (read.turn != 0) camera_turn(camera, read.turn);
     if (isnan(read.focus.x)) read.focus = camera->look_at;
     camera_set_lens(reader, &read, field_node(reader, node, "focus"));
     if (form == FORM_THIRD) {
@@ -159,7 +174,8 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
                          .options = options,
                          .default_material = UINT32_MAX};
     stage_begin(options->stage, "reading", source->file, source->length);
-    if (yaml_tree_read(&reader.tree, &reader.report, options->stage) && yaml_override(&reader))
+    if (yaml_tree_read(&reader.tree, &reader.report, options->stage) && yaml_override(&reader) &&
+        yaml_animate(&reader))
         document_read(&reader);
     if (scene->textures.count > 0) {
         scene->file = memory_copy_text(source->file);

@@ -1,0 +1,112 @@
+#!/usr/bin/env -S python3 -B
+"""Frames of an animation: each is the image of the scene with that frame's values."""
+import math
+import os
+
+import glint
+from glint import SPHERE, TestCase, main, need_device, npy_read, png_read, read, write
+
+SCENE = """
+camera: {{position: [0, 1, 6], look_at: [0, 0, 0], fov: {fov}}}
+ambient: 0.3
+lights: [{{point: {{position: {light}, intensity: {intensity}}}}}]
+objects:
+  - sphere: {{center: [0, 0, 0], radius: {radius}, material: {{color: red}}}}
+  - box: {{min: [1, 0, 0], max: [2, 1, 1], transform: {{rotate: {turn}}}}}
+"""
+KEYS = {"fov": "{keys: {2: 40, 6: 50}}", "light": "{keys: {0: [4, 4, 4], 4: [-4, 4, 4], 8: [4, 4, 4]}}",
+        "intensity": "{keys: {0: 1, 8: 0}, ease: smooth}", "radius": "{keys: {0: 1, 3: 0.5, 6: 0.75}, ease: step}",
+        "turn": "{keys: {0: [0, 0, 0], 8: [0, 90, 0]}}"}
+RENDER = "--size 32x18 --quiet --lanes 1"
+
+
+class Frames(TestCase):
+    def test_values(self):
+        """Before the first key, at keys, between and behind them."""
+        write("moving.yaml", SCENE.format(**KEYS))
+        self.glint(f"render moving.yaml --frames 0-9 {RENDER} -o f%d.npy")
+        for frame, values in {
+            0: ("40", "[4, 4, 4]", "1", "1", "[0, 0, 0]"),
+            2: ("40", "[0, 4, 4]", "0.84375", "1", "[0, 22.5, 0]"),
+            3: ("42.5", "[-2, 4, 4]", "0.68359375", "0.5", "[0, 33.75, 0]"),
+            5: ("47.5", "[-2, 4, 4]", "0.31640625", "0.5", "[0, 56.25, 0]"),
+            6: ("50", "[0, 4, 4]", "0.15625", "0.75", "[0, 67.5, 0]"),
+            9: ("50", "[4, 4, 4]", "0", "0.75", "[0, 90, 0]"),
+        }.items():
+            with self.subTest(frame):
+                fixed = dict(zip(("fov", "light", "intensity", "radius", "turn"), values))
+                write("fixed.yaml", SCENE.format(**fixed))
+                self.glint(f"render fixed.yaml {RENDER} -o fixed.npy")
+                self.assertSameBytes(f"f{frame}.npy", "fixed.npy")
+        self.assertNotEqual(npy_read("f4.npy"), npy_read("f5.npy"))
+
+    def test_turn(self):
+        """The camera goes round the point that it looks at, about `up`, in equal steps and back to where it was."""
+        scene = ("camera: {{position: {position}, look_at: [1, 2, 3], up: [0, 0, 2]{turn}}}\n"
+                 "objects: [{{box: {{min: [0, 1, 2], max: [2, 2.5, 4]}}}}]\n")
+        write("moving.yaml", scene.format(position="[1, -4, 5]", turn=", turn: {keys: {0: 0, 12: 360}}"))
+        self.glint(f"render moving.yaml --frames 0-12 {RENDER} --precision double --aov t -o f%02d.npy")
+        for frame in range(13):
+            angle = math.radians(30 * frame)
+            position = [1 + 6 * math.sin(angle), 2 - 6 * math.cos(angle), 5]
+            write("fixed.yaml", scene.format(position=position, turn=""))
+            self.glint(f"render fixed.yaml {RENDER} --precision double --aov t -o fixed.npy")
+            for a, b in zip(npy_read(f"f{frame:02}.t.npy")[2], npy_read("fixed.t.npy")[2]):
+                self.assertTrue(a == b or abs(a - b) < 1e-9, (frame, a, b))
+        self.assertSameBytes("f00.npy", "f12.npy")
+
+    def test_names(self):
+        write("moving.yaml", SCENE.format(**KEYS))
+        os.makedirs("a%d", exist_ok=True)
+        for option, names in (("", ["moving-0007.png", "moving-0008.png"]), ("-o a%d/x%03dy.png", ["a%d/x007y.png", "a%d/x008y.png"]),
+                              ("-o z%d.exr", ["z7.exr", "z8.exr"])):
+            with self.subTest(option):
+                self.glint(f"render moving.yaml --frames 7-8 {RENDER} {option}")
+                for name in names:
+                    self.assertTrue(os.path.exists(name), name)
+        self.assertEqual(png_read("moving-0007.png")[2]["Frame"], "7")
+        self.glint(f"render moving.yaml --frames 3 {RENDER} -o one.png")
+        self.assertEqual(png_read("one.png")[2]["Frame"], "3")
+        self.assertNotIn("Frame", png_read(self.still())[2])
+
+    def still(self):
+        write("still.yaml", SPHERE)
+        self.glint(f"render still.yaml {RENDER} -o still.png")
+        return "still.png"
+
+    def test_skip_existing(self):
+        """Images of frames and of scenes that exist are left as they are."""
+        write("moving.yaml", SCENE.format(**KEYS))
+        write("s1.png", "kept")
+        process = self.glint("render moving.yaml --frames 0-2 --size 32x18 --lanes 1 --skip-existing -o s%d.png")
+        self.assertEqual(process.stderr, "glint: wrote s0.png\nglint: wrote s2.png\n")
+        self.assertEqual(read("s1.png"), "kept")
+        write("still.yaml", SPHERE)
+        write("still.png", "kept")
+        process = self.glint("render moving.yaml still.yaml --size 32x18 --lanes 1 --skip-existing")
+        self.assertEqual((process.stderr, read("still.png")), ("glint: wrote moving.png\n", "kept"))
+
+    def test_refused(self):
+        write("moving.yaml", SCENE.format(**KEYS))
+        write("still.yaml", SPHERE)
+        for options, message in {
+            "--frames 0-3 -o a.png": "needs a place for the number, such as image-%04d.png",
+            "--frames 0-3 -o %d/a.png": "needs a place for the number",
+            "--frames 0-3 -o %5d.png": "needs a place for the number",
+            "--frames 3-2": "--frames: expected A or A-B",
+            "--frames -1": "--frames: expected A or A-B",
+            "--frames 1x": "--frames: expected A or A-B",
+            "--frames 0-1000000": "--frames: expected A or A-B",
+            "--frames 0-3 still.yaml": "--frames takes one scene",
+            "--frames 0-3 --checkpoint c": "--checkpoint takes one frame; --skip-existing",
+            "--frames 0-3 --timing=json": "--timing=json takes one frame",
+        }.items():
+            self.refuses(f"render moving.yaml {RENDER} {options}", message)
+        process = self.glint(f"render still.yaml --frames 0-1 {RENDER}")
+        self.assertEqual(process.stderr, "glint: warning: 'still.yaml' has no keys: all frames are alike\n")
+
+
+if __name__ == "__main__":
+    if not glint.IS_SANITIZED:
+        need_device()
+    main()
