@@ -20,6 +20,7 @@
     FEATURE(REFLECTION, )         \
     FEATURE(TRANSMISSION, )       \
     FEATURE(TINTS, )              \
+    FEATURE(EMISSION, )           \
     FEATURE(FRESNEL, )            \
     FEATURE(EYE_POWERS, )         \
     FEATURE(BVH, )

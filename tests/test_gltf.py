@@ -401,8 +401,12 @@ class Test(TestCase):
         write("s.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nobjects:\n  - mesh: {file: b.gltf}\n")
         gltf = Gltf(cameras=[{"type": "perspective", "perspective": {"yfov": 1, "znear": 1}}])
         gltf.square(node={"camera": 0}, material=gltf.add("materials", emissiveFactor=[1, 1, 1]))
+        gltf.add("images", bufferView=gltf.view(QUADRANTS), mimeType="image/png")
+        gltf.add("textures", source=0)
+        unlit = gltf.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}}, extensions={"KHR_materials_unlit": {}})
+        gltf.square(WHOLE, material=unlit)
         gltf.write("b.gltf")
-        self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[0]: only glint render FILE shows emission", "no lights")
+        self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[1]: only glint render FILE shows emission by a texture", "no lights")
 
     def test_losses_of_materials_are_named(self):
         """One loss for each material; the first is that of Khronos' MultiUVTest."""

@@ -84,6 +84,7 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_tint)               \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, specular_tint)                 \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, emission)                      \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \

@@ -100,7 +100,8 @@ static void test_tints(void **state)
         scene_of_text("a.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
                                 "materials:\n"
                                 "  gold: {reflection: [0.5, 0.4, 0], specular: [1, 2, 4], fresnel: true}\n"
-                                "  gray: {reflection: [0.5, 0.5, 0.5], specular: 2}\n");
+                                "  gray: {reflection: [0.5, 0.5, 0.5], specular: 2}\n"
+                                "  lamp: {emission: [30, 2.5, 0]}\n");
     const Material *gold = &scene.materials.items[0], *gray = gold + 1;
     assert_number(gold->reflection, 0.5);
     assert_vector(gold->reflection_tint, 1, 0.8, 0);
@@ -112,6 +113,8 @@ static void test_tints(void **state)
     assert_vector(tint_factors(gray->reflection_tint), 1, 1, 1);
     assert_number(gray->specular, 2);
     assert_false(gray->fresnel);
+    assert_vector(gray->emission, 0, 0, 0);
+    assert_vector(gray[1].emission, 30, 2.5, 0);
     scene_free(&scene);
 }
 

@@ -136,6 +136,8 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_REFLECTION | FEATURE_TINTS, SCENE_HEAD
      "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {reflection: [0.9, 0.5, 0]}}},\n"
      "  {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}]\n"},
+    {FEATURE_SPHERES | FEATURE_EMISSION, SCENE_HEAD
+     "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {emission: [0.9, 3, 0]}}}]\n"},
     {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_FRESNEL, SCENE_HEAD
      "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
      "  material: {transmission: 0.9, fresnel: true}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},

@@ -6,7 +6,7 @@
 // What the rounding of shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
 
-// Returns what a material reflects at most: of the ambient light, and of all lights at once.
+// Returns what a material emits and reflects at most: of the ambient light, and of all lights at once.
 static Color material_color_max(const CompiledScene *compiled, const Scene *scene, const Material *material,
                                 Color light_sum)
 {
@@ -16,7 +16,7 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
     const Color ambient = vector_scale(vector_multiply(scene->ambient, color), material->ambient);
     const Color factor =
         vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular));
-    return vector_add(ambient, vector_multiply(light_sum, factor));
+    return vector_add(vector_add(material->emission, ambient), vector_multiply(light_sum, factor));
 }
 
 double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces)

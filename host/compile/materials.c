@@ -37,6 +37,7 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
                                             part_of_light(material->transmission), material->ior, 0},
             .reflection_tint = scalar4_of(tint_factors(material->reflection_tint), material->fresnel),
             .specular_tint = scalar4_of(tint_factors(material->specular_tint), 0),
+            .emission = scalar4_of(material->emission, 0),
             .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
         };
         if (material->checker) // the remainders are exact, quotients far from the origin are not

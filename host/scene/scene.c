@@ -47,22 +47,9 @@ void material_set_opacity(Material *material, double opacity)
     material->diffuse = vector_scale(material->diffuse, opacity);
     material->specular *= opacity;
     material->reflection *= opacity;
+    material->emission = vector_scale(material->emission, opacity);
     material->transmission = 1 - opacity;
     material->ior = 1;
-}
-
-// The color becomes the emission, and the diffuse factors restore the color. A channel that does not emit
-// gets a color that no image resolves, because a factor cannot restore one from 0.
-void material_set_emission(Material *material, Color emission)
-{
-    const Color seen = {material->color.x * material->diffuse.x, material->color.y * material->diffuse.y,
-                        material->color.z * material->diffuse.z};
-    const double largest = vector_largest(emission);
-    if (largest == 0) return;
-    material->color = vector_max(emission, vector_all(0x1p-20 * largest));
-    material->diffuse =
-        (Color){seen.x / material->color.x, seen.y / material->color.y, seen.z / material->color.z};
-    material->ambient = 1;
 }
 
 uint32_t scene_add_material(Scene *scene, const Material *material, const char *name)

@@ -66,6 +66,7 @@ typedef struct {
     double shininess;                // Phong's power, >= 0
     double reflection, transmission; // weights of the reflected and the refracted ray, the largest channel's
     Color reflection_tint, specular_tint; // the channels over the largest, or 0 where they are equal
+    Color emission;                       // added to what the surface shows; lights nothing else
     bool fresnel; // the surface reflects a part of `transmission`, or of `reflection` without it
     double ior;
     bool full_shadow; // casts a full shadow even if transparent
@@ -259,9 +260,6 @@ Color tint_factors(Color tint);
 // Makes a material pass the fraction 1 - opacity of the light from behind, unbent, and dims what the surface
 // itself shows by the opacity.
 void material_set_opacity(Material *material, double opacity);
-// Makes a material without a texture emit light that illuminates nothing else, in a scene whose ambient light
-// is (1, 1, 1), where it replaces the material's ambient light.
-void material_set_emission(Material *material, Color emission);
 
 enum { IMAGE_SIDE_MAX = 1 << 20 }; // in pixels
 

@@ -173,7 +173,9 @@ static ReferenceColor surface_color(const ReferenceScene *world, const Surface *
     const Scene *scene = &world->scene;
     Color base = surface->base;
     Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
-    ReferenceColor sum = {vector_scale(ambient, surface->material->ambient), margin};
+    const Color own =
+        vector_add(vector_scale(ambient, surface->material->ambient), surface->material->emission);
+    ReferenceColor sum = {own, margin};
     for (size_t i = 0; i < scene->lights.count; i++) {
         const bool is_lit = add_light(world, &scene->lights.items[i], surface, &sum);
         if (shadows) shadows[i] = !is_lit;

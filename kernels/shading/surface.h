@@ -29,7 +29,7 @@ typedef struct {
     Vector to_eye;         // unit, back along the ray
     real error;            // bound on the position's distance from the true surface
     real refracted_offset; // how far behind the surface a refracted ray starts
-    Color3 ambient;        // the ambient light that it reflects
+    Color3 ambient;        // the ambient light that it reflects, and its emission
     Color3 diffuse;        // the factor by which it reflects a light that it faces
     real specular, shininess;
     real reflection, transmission, ior;
@@ -254,8 +254,10 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
                                         const Material *material, Color3 color)
 {
     scalar4 bounces = material->reflection_transmission_ior;
-    Color3 ambient = vector_scale(vector_of(scene->header->ambient), (real)(material->color.w));
-    surface->ambient = vector_select(lanes, color_multiply(ambient, color), surface->ambient);
+    Color3 ambient =
+        color_multiply(vector_scale(vector_of(scene->header->ambient), (real)(material->color.w)), color);
+    if (HAS_EMISSION) ambient = vector_add(ambient, vector_of(material->emission));
+    surface->ambient = vector_select(lanes, ambient, surface->ambient);
     Color3 diffuse = color_multiply(vector_of(material->diffuse), color);
     surface->diffuse = vector_select(lanes, diffuse, surface->diffuse);
     surface->specular = lanes_select(lanes, (real)(material->diffuse.w), surface->specular);

@@ -441,7 +441,7 @@ def trace(scene, beam, rounding, bounces):
     material, u = hit.thing.material, rounding.u
     base = checker_color(hit, rounding, scene.eye) if material.checker else material.color
     total = Sum()
-    total.add([i * material.ambient * c for i, c in zip(scene.ambient, base or scene.ambient)], 0.0)
+    total.add([i * material.ambient * c + e for i, c, e in zip(scene.ambient, base or scene.ambient, material.emission)], 0.0)
     total.error = 3 * rounding.arithmetic * u * max(as_float(x) for x in total.color)
     shadows = [lit(scene, light, hit, base or material.color, rounding, total) for light in scene.lights]
     if None in shadows or base is None:

@@ -32,6 +32,7 @@ class Material:
         self.ambient, self.shininess = number("ambient", 1), number("shininess", 32)
         self.reflection, self.transmission = channels("reflection", 0), number("transmission", 0)
         self.ior, self.fresnel = number("ior", 1.5), given.get("fresnel", False)
+        self.emission = channels("emission", 0)
         self.checker = None
         if "checker" in given:
             self.checker = [color(c) for c in given["checker"]["colors"]]

@@ -27,7 +27,6 @@ enum {
     LOSES_SKINS,
     LOSES_MORPHS,
     LOSES_VERTEX_COLORS,
-    LOSES_EMISSION,
     LOSES_TEXTURES,
     LOSES_TEXTURE_PLACE,
     LOSES_UV_TURN,
@@ -168,22 +167,15 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
 static Material material_of(Importer *importer, const struct aiMaterial *from)
 {
     Material material = material_default();
-    const bool is_scene = importer->draft->import->view != NULL;
-    const Color specular = color_of(importer, from, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0}),
-                emission = color_of(importer, from, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
+    const Color specular = color_of(importer, from, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
+    material.emission = color_of(importer, from, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
     material.color = color_of(importer, from, AI_MATKEY_COLOR_DIFFUSE, material.color);
     // assimp gives Lambertian materials a specular color, which they do not have
     int shading = aiShadingMode_Phong;
     aiGetMaterialIntegerArray(from, AI_MATKEY_SHADING_MODEL, &shading, NULL);
     if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
     material.shininess = number_of(importer, from, AI_MATKEY_SHININESS, NUMBER_MAX, material.shininess);
-    if (is_scene) material.ambient = 0;
-    if (is_scene && !vector_is_zero(emission)) {
-        material_set_emission(&material, emission);
-        importer->draft->scene->ambient = vector_all(1);
-    } else if (!vector_is_zero(emission)) {
-        lose(importer, LOSES_EMISSION, "only glint render FILE shows emission: lit by the lights instead");
-    }
+    if (importer->draft->import->view) material.ambient = 0;
     const double opacity = number_of(importer, from, AI_MATKEY_OPACITY, 1, 1),
                  ior = number_of(importer, from, AI_MATKEY_REFRACTI, NUMBER_MAX, 0);
     if (opacity < 1) material_set_opacity(&material, opacity);
@@ -208,8 +200,6 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
     Scene *scene = importer->draft->scene;
     to->scene_index[0] = to->scene_index[1] = scene_add_material(scene, &material, name.data);
     if (to->texture == 0) return;
-    if (importer->draft->import->view && material.ambient > 0)
-        lose(importer, LOSES_EMISSION, "emission in addition to a texture is not shown");
     const Color color = material.color, diffuse = material.diffuse;
     material.texture = to->texture;
     memcpy(material.texture_wrap, wraps, sizeof wraps);

@@ -21,7 +21,7 @@ static const char magic[8] = "glntmsh";
 typedef struct {
     char magic[8];
     uint64_t is_read, message_count, texture_count, material_count, has_normals, has_uvs;
-    uint64_t has_camera, light_count, glows; // its materials need an ambient light of 1
+    uint64_t has_camera, light_count;
     Camera camera;
     uint64_t counts[6]; // of the arrays
 } ReplyHeader;
@@ -38,7 +38,7 @@ typedef struct {
 } ReplyMessage;
 
 typedef struct {
-    Color color, diffuse;
+    Color color, diffuse, emission;
     double ambient, specular, shininess, transmission, ior;
     uint32_t texture, wraps[2];
     char name[64];
@@ -113,6 +113,7 @@ static void materials_write(FILE *reply, const Scene *scene)
         const Material *from = &scene->materials.items[i];
         ReplyMaterial material = {.color = from->color,
                                   .diffuse = from->diffuse,
+                                  .emission = from->emission,
                                   .ambient = from->ambient,
                                   .specular = from->specular,
                                   .shininess = from->shininess,
@@ -131,7 +132,6 @@ static void reply_write(FILE *reply, MeshDraft *draft, bool is_read)
                           .message_count = draft->import->report->messages->count,
                           .texture_count = draft->scene->textures.count,
                           .material_count = draft->scene->materials.count,
-                          .glows = !vector_is_zero(draft->scene->ambient),
                           .has_normals = draft->is_shared[DRAFT_NORMAL],
                           .has_uvs = draft->is_shared[DRAFT_UV]};
     const ReplyArrays arrays = arrays_of(draft);
@@ -244,7 +244,8 @@ static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count, const 
     for (uint64_t i = 0; i < count; i++) {
         ReplyMaterial from;
         if (fread(&from, sizeof from, 1, reply) != 1 || !color_is_sound(from.color) ||
-            !color_is_sound(from.diffuse) || !number_is_sound(from.ambient) || from.texture > texture_count ||
+            !color_is_sound(from.diffuse) || !color_is_sound(from.emission) ||
+            !number_is_sound(from.ambient) || from.texture > texture_count ||
             from.wraps[0] > TEXTURE_MIRRORED || from.wraps[1] > TEXTURE_MIRRORED ||
             !number_is_sound(from.specular) || !number_is_sound(from.shininess) ||
             !(from.transmission >= 0 && from.transmission <= 1) || !(from.ior > 0 && from.ior <= NUMBER_MAX))
@@ -253,6 +254,7 @@ static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count, const 
         Material material = material_default();
         material.color = from.color;
         material.diffuse = from.diffuse;
+        material.emission = from.emission;
         material.ambient = from.ambient;
         material.texture = from.texture > 0 ? textures[from.texture - 1] : 0;
         for (int axis = 0; axis < 2; axis++)
@@ -281,7 +283,6 @@ static bool view_read(MeshDraft *draft, FILE *reply, const ReplyHeader *header)
         view->has_camera = true;
         view->camera = header->camera;
     }
-    if (view && header->glows) draft->scene->ambient = vector_all(1);
     return true;
 }
 

@@ -20,7 +20,8 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
     [GLTF_ANIMATION] = "animations are not played: nodes stand as the file has them",
     [GLTF_VIEW] = "cameras and lights of a mesh are not used: those of the scene are",
     [GLTF_CAMERAS] = "only the first camera is used",
-    [GLTF_EMISSION] = "only glint render FILE shows emission and unlit materials: lit by the lights instead",
+    [GLTF_EMISSION] =
+        "only glint render FILE shows emission by a texture and unlit textures: lit by the lights instead",
     [GLTF_EMISSIVE_TEXTURE] = "emission next to a different texture is not shown",
     [GLTF_UNLIT_TINT] = "the factors of an emitted texture become their mean",
     [GLTF_METAL_TEXTURE] = "the texture of metal and roughness is not used: the factors are",

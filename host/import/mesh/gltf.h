@@ -31,6 +31,7 @@ typedef struct {
     double uv_rows[2][3];    // from the file's texture coordinates to those of the texture
     TextureWrap wraps[2];    // along u and v
     double textured_ambient; // the ambient factor with the texture
+    bool texture_emits;      // by that factor, in place of the emission
     uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
 } GltfMaterial;
 

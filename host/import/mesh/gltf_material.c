@@ -192,47 +192,52 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const Surface *surface, 
     if (surface->base_texture.json) gltf_lose(gltf, GLTF_METAL_COLOR, item);
 }
 
-// Emission is shown as the reflection of an ambient light of 1, which no other material of the scene
-// reflects.
+// Textures emit light as the reflection of an ambient light of 1, which no other material of the scene
+// reflects. Returns false with a warning for a mesh of a scene that has its own ambient light.
+static bool texture_can_emit(Gltf *gltf, const GltfItem *item, GltfMaterial *material, double ambient)
+{
+    material->texture_emits = gltf->draft->import->view != NULL;
+    if (material->texture_emits) {
+        gltf->draft->scene->ambient = vector_all(1);
+        material->textured_ambient = ambient;
+    } else {
+        gltf_lose(gltf, GLTF_EMISSION, item);
+    }
+    return material->texture_emits;
+}
+
 static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surface, GltfMaterial *material)
 {
     Material *look = &material->look;
-    const bool is_scene = gltf->draft->import->view != NULL;
-    const double strength = surface->emissive_strength;
-    const double emission[3] = {surface->emissive[0] * strength, surface->emissive[1] * strength,
-                                surface->emissive[2] * strength};
-    const bool emits = mean_of(emission) > 0;
-    look->ambient = is_scene ? 0 : look->diffuse.x;
-    material->textured_ambient = look->ambient * mean_of(surface->base);
-    if (!emits && !surface->is_unlit) return;
-    if (!is_scene) {
-        gltf_lose(gltf, GLTF_EMISSION, item);
-        return;
-    }
-    gltf->draft->scene->ambient = vector_all(1);
+    const double strength = surface->emissive_strength, *base = surface->base;
+    const Color emission = {surface->emissive[0] * strength, surface->emissive[1] * strength,
+                            surface->emissive[2] * strength};
+    look->ambient = gltf->draft->import->view ? 0 : look->diffuse.x;
+    material->textured_ambient = look->ambient * mean_of(base);
     if (surface->is_unlit) {
-        const double *base = surface->base;
+        if (material->texture > 0 && !texture_can_emit(gltf, item, material, mean_of(base))) return;
         if (material->texture > 0 && (base[0] != base[1] || base[1] != base[2]))
             gltf_lose(gltf, GLTF_UNLIT_TINT, item);
-        look->ambient = 1;
-        material->textured_ambient = mean_of(base);
+        look->emission = look->color;
+        look->ambient = look->specular = look->reflection = 0;
         look->diffuse = vector_all(0);
-        look->specular = look->reflection = 0;
         return;
     }
+    if (vector_is_zero(emission)) return;
     // an emissive texture is shown if it is the only texture or gives the base color
     const json_t *own = json_object_get(surface->emissive_texture.json, "index"),
                  *other = json_object_get(surface->base_texture.json, "index");
-    if (own && !other && mean_of(surface->base) == 0)
-        texture_read(gltf, &surface->emissive_texture, material);
-    const bool is_shown = material->texture > 0 && own && (!other || json_equal(own, other));
-    if (is_shown) {
-        if (emission[0] != emission[1] || emission[1] != emission[2]) gltf_lose(gltf, GLTF_UNLIT_TINT, item);
-        material->textured_ambient = mean_of(emission);
-    } else if (own || material->texture > 0) {
+    if (!own) {
+        look->emission = emission;
+        return;
+    }
+    if (!other && mean_of(base) == 0) texture_read(gltf, &surface->emissive_texture, material);
+    if (material->texture == 0 || (other && !json_equal(own, other))) {
         gltf_lose(gltf, GLTF_EMISSIVE_TEXTURE, item);
-    } else {
-        material_set_emission(look, (Color){emission[0], emission[1], emission[2]});
+    } else if (texture_can_emit(gltf, item, material,
+                                mean_of((double[]){emission.x, emission.y, emission.z}))) {
+        look->emission = emission;
+        if (!vector_is_zero(color_tint(emission))) gltf_lose(gltf, GLTF_UNLIT_TINT, item);
     }
 }
 
@@ -257,6 +262,7 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
         material->textured_ambient *= 1 - transmission;
         look->specular = opaque.specular;
         look->reflection = opaque.reflection;
+        look->emission = opaque.emission;
         if (surface->base_texture.json || mean_of(surface->base) < 1) gltf_lose(gltf, GLTF_GLASS_COLOR, item);
         if (surface->thickness > 0 && surface->ior > 0) look->ior = surface->ior;
     }
@@ -304,6 +310,7 @@ uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_texture
     if (is_textured) {
         look.texture = material->texture;
         look.ambient = material->textured_ambient;
+        if (material->texture_emits) look.emission = vector_all(0);
         memcpy(look.texture_wrap, material->wraps, sizeof look.texture_wrap);
         look.diffuse = (Color){look.diffuse.x * look.color.x, look.diffuse.y * look.color.y,
                                look.diffuse.z * look.color.z};

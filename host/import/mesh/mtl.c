@@ -138,6 +138,11 @@ static void specular_read(MtlReader *reader, MtlMaterial *material)
     if (color_of_line(reader, &color)) material->material.specular = (color.x + color.y + color.z) / 3;
 }
 
+static void emission_read(MtlReader *reader, MtlMaterial *material)
+{
+    color_of_line(reader, &material->material.emission);
+}
+
 static void shininess_read(MtlReader *reader, MtlMaterial *material)
 {
     number_of_line(reader, &range_not_negative, &material->material.shininess);
@@ -220,8 +225,7 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
     free(path);
 }
 
-// Reads and ignores numbers, with a warning unless they have the value that means no effect: no emission, no
-// filter.
+// Reads and ignores numbers, with a warning unless they have the value that means no effect: no filter.
 static void neutral_read(MtlReader *reader, Word word, double neutral)
 {
     double numbers[3] = {neutral, neutral, neutral};
@@ -243,7 +247,7 @@ static const struct {
 } statements[] = {
     {"newmtl", name_read}, {"Kd", diffuse_read},         {"Ks", specular_read}, {"Ns", shininess_read},
     {"Ni", ior_read},      {"Tr", transparency_read},    {"d", dissolve_read},  {"map_Kd", texture_read},
-    {"Ka", nothing_read},  {"illum", illumination_read},
+    {"Ka", nothing_read},  {"illum", illumination_read}, {"Ke", emission_read},
 };
 
 static void line_read(MtlReader *reader)
@@ -259,9 +263,7 @@ static void line_read(MtlReader *reader)
             statements[i].read(reader, material);
         return;
     }
-    if (word_is(word, "Ke"))
-        neutral_read(reader, word, 0);
-    else if (word_is(word, "Tf"))
+    if (word_is(word, "Tf"))
         neutral_read(reader, word, 1);
     else
         unused_note(&reader->unused, &reader->report, word, "is not used");

@@ -116,6 +116,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},
         {"transmission", read_number, offsetof(Material, transmission), FORM_ANY, OPTIONAL, &range_unit},
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
+        {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL, NULL},
         {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL, NULL},
     };
     Material material = material_default();
