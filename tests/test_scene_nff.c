@@ -68,7 +68,7 @@ static void test_materials(void **state)
     assert_number(matte->transmission, 0);
     assert_number(glass->transmission, 0.9);
     assert_number(glass->ior, 1.5);
-    assert_true(glass->full_shadow);
+    assert_int_equal(glass->shadow, SHADOW_FULL);
     assert_int_equal(complete.objects.items[1].material, 0);
     assert_int_equal(complete.objects.items[2].material, 1);
 }

@@ -55,6 +55,41 @@ class Soft(TestCase):
                         # a directional light's wall is 1 thick
                         self.assertAlmostEqual(value, expected(x), delta=0.02, msg=(i, x))
 
+    def test_lamps(self):
+        """Visible lights show their color, and change no other pixel: they cast no shadows."""
+        camera = "camera: {position: [0, 2.5, 8], look_at: [0, 1.5, 0], fov: 45}\nlights:\n"
+        lights = [("sphere: {{center: [-2.2, 2.5, 0], radius: 0.4, color: [1, 0.75, 0.5]{}}}", (1, 0.75, 0.5)),
+                  ("rectangle: {{center: [2.5, 3.5, -1], edges: [[1.5, 0, 0], [0, 1, 0.3]], intensity: 0.5{}}}", (0.5, 0.5, 0.5)),
+                  ("disc: {{center: [0, 4, 1], normal: [0, -1, 0.4], radius: 0.6, color: [4, 0, 1]{}}}", (4, 0, 1))]
+        objects = ("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n  - sphere: {center: [-2, 0.7, 1], radius: 0.7}\n"
+                   "  - box: {min: [0, 0, 0], max: [1, 2, 1]}\n")
+        for precision in PRECISIONS:
+            with self.subTest(precision=precision):
+                for name, key in ("hidden", ""), ("shown", ", visible: true"):
+                    write(f"{name}.yaml", camera + "".join(f"  - {text.format(key)}\n" for text, _ in lights) + objects)
+                    self.glint(f"render {name}.yaml --quiet --size 96x64 --aov object --precision {precision} -o {name}.npy")
+                hidden, shown, numbers = (npy_read(f"{name}.npy")[2] for name in ("hidden", "shown", "shown.object"))
+                # the rectangle is two triangles
+                lamps = {3: 0, 4: 1, 5: 1, 6: 2}
+                self.assertEqual(set(numbers) & lamps.keys(), lamps.keys())
+                for before, after, number in zip(hidden, shown, numbers):
+                    self.assertEqual(after, lights[lamps[number]][1] if number in lamps else before)
+
+    def test_no_shadow(self):
+        """A material may cast none, next to others that do."""
+        text = ("camera: {{position: [0, 5, 9], look_at: [0, 0, 0]}}\nlights: [{{point: {{position: [0, 9, 0]}}}}]\nobjects:\n"
+                "  - plane: {{point: [0, 0, 0], normal: [0, 1, 0]}}\n  - sphere: {{center: [-2, 2, 0], radius: 1}}\n"
+                "  - sphere: {{center: [2, 2, 0], radius: 1, material: {{shadow: {}}}}}\n")
+        dark = {}
+        for shadow in "true", "false":
+            write("soft.yaml", text.format(shadow))
+            self.glint("render soft.yaml --quiet --size 64x48 --aov object,shadow -o soft.npy")
+            floor = zip(npy_read("soft.object.npy")[2], npy_read("soft.shadow.npy")[2])
+            flags = [number == 0 and light == 1 for number, light in floor]
+            dark[shadow] = [sum(flags[i] for i in range(len(flags)) if (i % 64 < 32) == left) for left in (True, False)]
+        self.assertEqual(dark["false"], [dark["true"][0], 0])
+        self.assertGreater(dark["true"][1], 20)
+
     def test_error_falls(self):
         """As low-discrepancy points promise, faster than with the root of the samples, by which random ones' error falls."""
         light = "rectangle: {center: [0, 1000, 0], edges: [[3.6, 0, 0], [0, 0, 9]]}"

@@ -75,6 +75,10 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_ORTHOGRAPHIC, "the camera is orthographic"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;
+    for (size_t i = 0; i < scene->materials.count && settings->certifies; i++)
+        if (scene->materials.items[i].shadow == SHADOW_NONE)
+            return message_error(messages, "a material casts no shadow, which has no error bound: choose a "
+                                           "precision other than certified");
     for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)
         if (features & unbounded[i].feature)
             return message_error(messages,

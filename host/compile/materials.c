@@ -38,7 +38,7 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             .reflection_tint = scalar4_of(tint_factors(material->reflection_tint), material->fresnel),
             .specular_tint = scalar4_of(tint_factors(material->specular_tint), 0),
             .emission = scalar4_of(material->emission, 0),
-            .optical_depth = optical_depth_of(material->full_shadow ? 0 : material->transmission),
+            .optical_depth = optical_depth_of(material_passing(material)),
         };
         if (material->checker) // the remainders are exact, quotients far from the origin are not
             materials[i].grid = (scalar4){fmod(eye.x, 2 * size) / size, fmod(eye.y, 2 * size) / size,

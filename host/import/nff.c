@@ -183,7 +183,7 @@ static bool read_material(NffReader *reader)
     material.ambient = diffuse;
     material.diffuse = (Color){diffuse, diffuse, diffuse};
     material.reflection = material.specular;
-    material.full_shadow = true;
+    material.shadow = SHADOW_FULL;
     reader->material = scene_add_material(reader->scene, &material, "");
     return true;
 }

@@ -84,6 +84,54 @@ void scene_add_object(Scene *scene, Object object, const Material *material)
     array_push(scene->objects, object);
 }
 
+double material_passing(const Material *material)
+{
+    if (material->shadow == SHADOW_OF_TRANSMISSION) return material->transmission;
+    return material->shadow == SHADOW_NONE ? 1 : 0;
+}
+
+static void lamp_add(Scene *scene, const Light *light, uint32_t material)
+{
+    const Vector3 u = light->across[0], v = light->across[1], center = light->position;
+    Object lamp = {.kind = SHAPE_SPHERE, .material = material};
+    if (light->area == AREA_SPHERE) {
+        lamp.as.sphere.center = center;
+        lamp.as.sphere.radius = light->radius;
+        array_push(scene->objects, lamp);
+        return;
+    }
+    if (light->area == AREA_ELLIPSE) {
+        lamp.kind = SHAPE_DISC;
+        lamp.as.disc.center = center;
+        lamp.as.disc.normal = vector_cross(vector_normalize(u), vector_normalize(v));
+        lamp.as.disc.radius = light->radius;
+        array_push(scene->objects, lamp);
+        return;
+    }
+    const Vector3 first = vector_subtract(center, vector_add(u, v)),
+                  last = vector_add(center, vector_add(u, v));
+    for (int side = -1; side <= 1; side += 2) {
+        lamp.kind = SHAPE_TRIANGLE;
+        lamp.as.triangle.vertices[0] = first;
+        lamp.as.triangle.vertices[1] = vector_add(center, vector_scale(vector_subtract(u, v), side));
+        lamp.as.triangle.vertices[2] = last;
+        array_push(scene->objects, lamp);
+    }
+}
+
+void scene_add_lamps(Scene *scene)
+{
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        if (!light->is_visible || light->area == AREA_NONE) continue;
+        Material material = material_default();
+        material.color = vector_all(0);
+        material.emission = light->color;
+        material.shadow = SHADOW_NONE;
+        lamp_add(scene, light, scene_add_material(scene, &material, ""));
+    }
+}
+
 size_t object_primitive_count(const Scene *scene, const Object *object)
 {
     return object->kind == SHAPE_MESH ? scene->meshes.items[object->as.mesh.index].triangle_count : 1;

@@ -41,7 +41,8 @@ typedef struct {
     // From the center of a rectangle or an ellipse to the middles of two sides; for a directional light
     // across `direction`, and relative to its length.
     Vector3 across[2];
-    double radius; // of a sphere
+    double radius;   // of a sphere
+    bool is_visible; // the area is an object that shows `color` and casts no shadow
     // point, spot: unless the latter two are 0, the strength is divided by fading[0] + fading[1] d +
     // fading[2] d^2 at the distance d
     double fading[3];
@@ -58,6 +59,9 @@ void light_fold_fading(Light *light);
 // How a texture on a mesh continues beyond its edges.
 typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap;
 
+// What a shadow ray loses at a surface: what is not transmitted, all, or nothing.
+typedef enum { SHADOW_OF_TRANSMISSION, SHADOW_FULL, SHADOW_NONE } ShadowKind;
+
 typedef struct {
     Color color;
     double ambient;                  // ka
@@ -69,7 +73,7 @@ typedef struct {
     Color emission;                       // added to what the surface shows; lights nothing else
     bool fresnel; // the surface reflects a part of `transmission`, or of `reflection` without it
     double ior;
-    bool full_shadow; // casts a full shadow even if transparent
+    ShadowKind shadow;
     bool checker;
     Color checker_colors[2];     // in place of color
     double checker_size;         // side of a square, > 0, in scene units
@@ -227,6 +231,12 @@ typedef struct {
 } Scene;
 
 void scene_free(Scene *scene); // and zeroes
+
+// Returns the part of the light that a surface lets through to what it shadows.
+double material_passing(const Material *material);
+
+// Adds the objects of visible lights.
+void scene_add_lamps(Scene *scene);
 
 // Returns the material's index.
 uint32_t scene_add_material(Scene *scene, const Material *material, const char *name);

@@ -101,13 +101,13 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     // a light before the shading normal but behind the surface
     const Quad height = quad3_dot(surface->geometric, to_light);
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(height) * surface->scale));
-    if (height <= 0) strength *= material->full_shadow ? 0 : material->transmission;
+    if (height <= 0) strength *= material_passing(material);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Material *medium = &scene->materials.items[object->material];
         ReferenceHit blocker = reference_scene_hit_object(world, i, &shadow, surface->index);
         sum->margin = fmin(sum->margin, (double)blocker.margin);
-        if (blocker.found) strength *= medium->full_shadow ? 0 : medium->transmission;
+        if (blocker.found) strength *= material_passing(medium);
     }
     double diffuse = (double)(strength * facing);
     Quad highlight_part =

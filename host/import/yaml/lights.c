@@ -68,9 +68,15 @@ static const Field spot_fields[] = {
     COLOR,
 };
 
+#define VISIBLE                                                                                              \
+    {                                                                                                        \
+        "visible", read_boolean, offsetof(LightFields, light.is_visible), FORM_ANY, OPTIONAL, NULL           \
+    }
+
 static const Field sphere_fields[] = {
     {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
     {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
+    VISIBLE,
     FALLOFF,
     COLOR,
 };
@@ -83,6 +89,7 @@ static bool read_edges(YamlReader *reader, const Field *field, const YamlNode *n
 static const Field rectangle_fields[] = {
     {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
     {"edges", read_edges, offsetof(LightFields, edges), FORM_ANY, REQUIRED, NULL},
+    VISIBLE,
     FALLOFF,
     COLOR,
 };
@@ -91,6 +98,7 @@ static const Field disc_fields[] = {
     {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
     {"normal", read_direction, offsetof(LightFields, normal), FORM_ANY, REQUIRED, NULL},
     {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
+    VISIBLE,
     FALLOFF,
     COLOR,
 };

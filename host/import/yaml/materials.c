@@ -102,6 +102,14 @@ static bool read_specular(YamlReader *reader, const Field *field, const YamlNode
     return read_tinted(reader, field, node, &material->specular, &material->specular_tint);
 }
 
+static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    bool has_shadow;
+    if (!read_boolean(reader, field, node, &has_shadow)) return false;
+    *(ShadowKind *)target = has_shadow ? SHADOW_OF_TRANSMISSION : SHADOW_NONE;
+    return true;
+}
+
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
@@ -118,6 +126,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
         {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL, NULL},
         {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL, NULL},
+        {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL, NULL},
     };
     Material material = material_default();
     if (node) fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);

@@ -159,6 +159,7 @@ static void document_read(YamlReader *reader)
     reader->places = places_open(reader->report.source);
     if (document.definitions) yaml_read_definitions(reader, document.definitions);
     if (document.objects) yaml_read_object_list(reader, document.objects, true);
+    scene_add_lamps(scene);
     yaml_definitions_free(reader);
     places_close(&reader->places);
 }
