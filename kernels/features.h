@@ -22,6 +22,7 @@
     FEATURE(TINTS, )              \
     FEATURE(EMISSION, )           \
     FEATURE(FRESNEL, )            \
+    FEATURE(ABSORPTION, )         \
     FEATURE(EYE_POWERS, )         \
     FEATURE(BVH, )
 // clang-format on

@@ -226,6 +226,7 @@ typedef struct {
     scalar4 reflection_tint; // factors of what is reflected, the largest 1; w: 1 with Fresnel's equations
     scalar4 specular_tint;   // factors of highlights
     scalar4 emission;        // rgb
+    scalar4 absorption; // rgb, density: within the body exp(-density d) of light is left after a length d
     // The loss of a shadow ray here: -log2(transmission) in integer steps, whose sum does not depend on the
     // order of the objects. x counts steps of 2^-24, for float; y and z are the low and high half of the
     // steps of 2^-48, for double.

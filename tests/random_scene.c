@@ -90,5 +90,8 @@ Scene random_scene(uint64_t seed, size_t object_count)
         }
         array_push(scene.lights, light);
     }
+    scene.sky.up = up;
+    scene.sky.zenith = random_color(&random);
+    scene.sky.nadir = random_color(&random);
     return scene;
 }

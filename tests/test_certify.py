@@ -47,6 +47,23 @@ objects:
   - sphere: {center: [-1, 1, 0], radius: 1, material: {diffuse: 0.1, transmission: 0.9, ior: 1.5, fresnel: true}}
   - box: {min: [0.4, 0, -0.5], max: [1.6, 1, 0.5], material: {diffuse: 0.1, reflection: [0.9, 0.7, 0.3]}}
 """
+# Bodies that absorb: with a bubble and an opaque ball within, one below the horizon without end, and one around the eye.
+ABSORPTION = """\
+camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
+background: [0.3, 0.5, 0.9]
+lights: [{point: {position: [3, 5, -5]}}]
+materials:
+  red: {diffuse: 0.1, transmission: 0.9, ior: 1.5, absorption: {color: [1, 0.5, 0], distance: 2}, emission: [0, 0, 0.1]}
+  air: {diffuse: 0.1, transmission: 0.9, ior: 0.7}
+  sea: {diffuse: 0.1, transmission: 0.9, reflection: 0.1, ior: 1.3, absorption: {color: [0.5, 0.8, 0.9]}}
+objects:
+  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: sea}
+  - sphere: {center: [-1, 1.3, 0], radius: 1, material: red}
+  - sphere: {center: [-1.3, 1.3, 0], radius: 0.4, material: air}
+  - sphere: {center: [-0.6, 1.3, 0.2], radius: 0.2}
+  - sphere: {center: [1, -1, 0], radius: 0.8, material: {emission: 0.5}}
+  - box: {min: [-9, -9, -9], max: [9, 9, 9], material: {transmission: 1, ior: 1, absorption: {color: 0.5, distance: 20}}}
+"""
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -77,12 +94,13 @@ class Certify(TestCase):
         self.assertEqual(self.glint(f"certify strong.yaml {SMALL}").stdout.count("unavailable: "), 4 - HAS_DOUBLE)
         self.refuses(f"certify strong.yaml {SMALL} --precision double,single", "single")
 
-    def test_fresnel(self):
-        """Neither a path nor a color differs from the exact ones, at all precisions that take Fresnel's equations."""
-        write("fresnel.yaml", FRESNEL)
-        for name, row in self.certify("fresnel.yaml", "--precision single,strict" + ",double" * HAS_DOUBLE).items():
-            self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
-            self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
+    def test_materials_without_bounds(self):
+        """Neither a path nor a color differs from the exact ones, at all precisions that take these materials."""
+        for scene in FRESNEL, ABSORPTION:
+            write("scene.yaml", scene)
+            for name, row in self.certify("scene.yaml", "--precision single,strict" + ",double" * HAS_DOUBLE).items():
+                self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
+                self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_parallel_mirrors(self):

@@ -527,13 +527,17 @@ class Trace(CliTestCase):
         self.assertEqual(process.stdout, "")
         self.assertEqual(csv_rows(read("hits.csv")), expected)
 
-    def test_certified_refuses_fresnel(self):
+    def test_certified_refuses_what_has_no_bound(self):
         """Only where a material of an object has it and bounces rays."""
-        for material, refused in ("{fresnel: true, transmission: 1}", True), ("{fresnel: true}", False):
+        ink = "absorption: {color: red}"
+        for material, refused in (
+            ("{fresnel: true, transmission: 1}", "fresnel"), ("{fresnel: true}", None),
+            (f"{{{ink}, transmission: 1}}", "absorption"), (f"{{{ink}, reflection: 0.5}}", None),
+        ):
             write("glass.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [5, 5, 5]}}]\n"
                   f"objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {material}}}}}]\n")
             command = f"render glass.yaml {SMALL} --precision certified -o glass.ppm"
-            self.refuses(command, "'fresnel', which has no error bound") if refused else self.glint(command)
+            self.refuses(command, f"'{refused}', which has no error bound") if refused else self.glint(command)
 
     def test_certified(self):
         """A hit, a miss, a hit beyond the end and one at it, and a tangent, which nothing decides."""

@@ -411,18 +411,38 @@ class Test(TestCase):
     def test_losses_of_materials_are_named(self):
         """One loss for each material; the first is that of Khronos' MultiUVTest."""
         image = {"baseColorTexture": {"index": 0}}
-        glass = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 2}}
         for material, path, loss in (
             ({"pbrMetallicRoughness": image, "emissiveTexture": {"index": 1, "texCoord": 1}, "emissiveFactor": [1, 1, 1]}, "materials[0]", "emission next to a different texture is not shown"),
             ({"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}, "samplers[0].magFilter", "filtering by the nearest texel is not used"),
             ({"pbrMetallicRoughness": image | {"roughnessFactor": 0}}, "materials[0]", "reflections of metals do not have the colors of a texture"),
-            ({"extensions": glass}, "materials[0].extensions.KHR_materials_volume.attenuationDistance", "absorption is not used"),
             ({"extensions": {"KHR_materials_unlit": {}}, "pbrMetallicRoughness": image | {"baseColorFactor": [1, 0, 0, 1]}}, "materials[0]", "the factors of an emitted texture become their mean"),
         ):
             gltf = Gltf(materials=[material], samplers=[{"magFilter": 9728}], textures=[{"source": 0}, {"source": 0, "sampler": 0}])
             gltf.add("images", bufferView=gltf.view(QUADRANTS), mimeType="image/png")
             gltf.square(WHOLE, attributes={"TEXCOORD_1": gltf.accessor(WHOLE)}, material=0)
             self.checked(gltf.write("a.gltf"), f"{path}: {loss}")
+
+    def test_volumes_absorb(self):
+        """The gray background through a slab with faces at z = 0 and 1, whose attenuation distance is half its thickness."""
+        for volume, color in (
+            ({"thicknessFactor": 1, "attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.1]}, (0.18, 0.18 * 0.25, 0.18 * 0.01)),
+            ({"attenuationDistance": 0.5, "attenuationColor": [1, 0.5, 0.1]}, (0.18, 0.18, 0.18)),
+            ({"thicknessFactor": 1, "attenuationColor": [1, 0.5, 0.1]}, (0.18, 0.18, 0.18)),
+        ):
+            gltf = Gltf()
+            extensions = {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1}, "KHR_materials_volume": volume}
+            roughness = {"metallicFactor": 0, "roughnessFactor": 1}
+            material = gltf.add("materials", extensions=extensions, pbrMetallicRoughness=roughness)
+            gltf.square(material=material, node={"translation": [0, 0, 1]})
+            gltf.square(material=material, node={"translation": [0, 1, 0], "rotation": [1, 0, 0, 0]})
+            camera = gltf.add("cameras", type="perspective", perspective={"yfov": 0.01, "znear": 1})
+            gltf.place(camera=camera, translation=[0.5, 0.5, 9])
+            path = gltf.write("slab.glb")
+            report = self.checked(path)
+            self.assertEqual("ABSORPTION" in report["features"], color[1] < 0.18)
+            self.glint(f"render {path} --size 1x1 -o slab.npy")
+            for got, expected in zip(npy_read("slab.npy")[2][0], color):
+                self.assertAlmostEqual(got, expected, delta=1e-5)
 
     def test_invalid_numbers_become_defaults(self):
         for member, expected in (

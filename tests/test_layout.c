@@ -85,6 +85,7 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_tint)               \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, specular_tint)                 \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, emission)                      \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, absorption)                    \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \

@@ -101,7 +101,9 @@ static void test_tints(void **state)
                                 "materials:\n"
                                 "  gold: {reflection: [0.5, 0.4, 0], specular: [1, 2, 4], fresnel: true}\n"
                                 "  gray: {reflection: [0.5, 0.5, 0.5], specular: 2}\n"
-                                "  lamp: {emission: [30, 2.5, 0]}\n");
+                                "  lamp: {emission: [30, 2.5, 0]}\n"
+                                "  ink: {absorption: {color: [1, 0.5, 0], distance: 2}}\n"
+                                "  tea: {absorption: {color: 0.25}}\n");
     const Material *gold = &scene.materials.items[0], *gray = gold + 1;
     assert_number(gold->reflection, 0.5);
     assert_vector(gold->reflection_tint, 1, 0.8, 0);
@@ -115,6 +117,9 @@ static void test_tints(void **state)
     assert_false(gray->fresnel);
     assert_vector(gray->emission, 0, 0, 0);
     assert_vector(gray[1].emission, 30, 2.5, 0);
+    assert_vector(gray[1].absorption, 0, 0, 0);
+    assert_vector(gray[2].absorption, 0, log(2) / 2, log(1e6) / 2);
+    assert_vector(gray[3].absorption, log(4), log(4), log(4));
     scene_free(&scene);
 }
 

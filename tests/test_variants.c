@@ -141,6 +141,9 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_FRESNEL, SCENE_HEAD
      "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
      "  material: {transmission: 0.9, fresnel: true}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
+    {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_TINTS | FEATURE_ABSORPTION,
+     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9,\n"
+                "  absorption: {color: [0.1, 0.9, 0]}}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS | FEATURE_FADING_LIGHTS,
      SCENE_HEAD "lights: [{point: {position: [2, 3, -4], intensity: 20, falloff: inverse_square}}]\n" SPHERE},

@@ -26,6 +26,8 @@ static FeatureSet material_features(const Material *material)
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
     // which has shadow rays that pass
     if (material->shadow == SHADOW_NONE) set |= FEATURE_TRANSMISSION;
+    if (material->transmission > 0 && !vector_is_zero(material->absorption))
+        set |= FEATURE_ABSORPTION | FEATURE_TINTS;
     if (!vector_is_zero(material->reflection_tint) || !vector_is_zero(material->specular_tint))
         set |= FEATURE_TINTS;
     if (!vector_is_zero(material->emission)) set |= FEATURE_EMISSION;

@@ -20,6 +20,14 @@ static double part_of_light(double part)
     return part > 0 ? fmax(part, FLT_MIN) : 0;
 }
 
+// A density whose products with lengths are in range: times the largest length of kernels/shading/medium.h it
+// is at least 2^10, of which exp makes 0.
+static double density_of(double absorption, bool is_double)
+{
+    const double largest = is_double ? 0x1p500 : 0x1p60;
+    return absorption > 0 ? fmin(fmax(absorption, 0x1p10 / largest), largest) : 0;
+}
+
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
     flat_array_renew(compiled, FLAT_MATERIALS, scene->materials.count);
@@ -38,6 +46,9 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             .reflection_tint = scalar4_of(tint_factors(material->reflection_tint), material->fresnel),
             .specular_tint = scalar4_of(tint_factors(material->specular_tint), 0),
             .emission = scalar4_of(material->emission, 0),
+            .absorption = {density_of(material->absorption.x, rounding->is_double),
+                           density_of(material->absorption.y, rounding->is_double),
+                           density_of(material->absorption.z, rounding->is_double), 0},
             .optical_depth = optical_depth_of(material_passing(material)),
         };
         if (material->checker) // the remainders are exact, quotients far from the origin are not

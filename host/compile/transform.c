@@ -55,6 +55,7 @@ void scene_scale(Scene *scene, double factor)
     for (size_t i = 0; i < scene->materials.count; i++) {
         scene->materials.items[i].checker_size *= factor;
         scene->materials.items[i].texture_size *= factor;
+        scene->materials.items[i].absorption = vector_scale(scene->materials.items[i].absorption, 1 / factor);
     }
 }
 

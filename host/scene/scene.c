@@ -2,6 +2,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
+#include "host/scene/portable.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -34,6 +35,17 @@ Color color_tint(Color color)
     if (color.x == color.y && color.y == color.z) return vector_all(0);
     const double largest = vector_largest(color);
     return (Color){color.x / largest, color.y / largest, color.z / largest};
+}
+
+static double channel_absorption(double left, double distance)
+{
+    return portable_log2(fmin(fmax(left, 1e-6), 1)) * -M_LN2 / distance;
+}
+
+Color color_absorption(Color left, double distance)
+{
+    return (Color){channel_absorption(left.x, distance), channel_absorption(left.y, distance),
+                   channel_absorption(left.z, distance)};
 }
 
 Color tint_factors(Color tint)

@@ -74,6 +74,7 @@ typedef struct {
     bool fresnel; // the surface reflects a part of `transmission`, or of `reflection` without it
     double ior;
     ShadowKind shadow;
+    Color absorption; // of what is transmitted exp(-absorption d) is left after a length d within
     bool checker;
     Color checker_colors[2];     // in place of color
     double checker_size;         // side of a square, > 0, in scene units
@@ -265,6 +266,9 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
 Material material_default(void);
 // Returns the tint of a color: its channels over the largest, or 0 if they are equal.
 Color color_tint(Color color);
+// Returns the absorption of a body in which `left` of white light is left after a distance above 0. Black
+// would need an infinite one, so channels below 1e-6 count as 1e-6.
+Color color_absorption(Color left, double distance);
 // Returns the factors of a tint, which are 1 where it is 0.
 Color tint_factors(Color tint);
 // Makes a material pass the fraction 1 - opacity of the light from behind, unbent, and dims what the surface

@@ -281,13 +281,32 @@ static Quad reflectance(Quad cosine, Quad ior, bool entering)
     return (across * across + along * along) / 2;
 }
 
-static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color weight, unsigned bounces_left)
+// What a ray travels in: how strongly the body around it absorbs light, and the one around that.
+typedef struct {
+    Color density, outer;
+} Medium;
+
+static double channel_left(double density, double length)
+{
+    return density > 0 ? exp(-density * length) : 1;
+}
+
+static Color weight_left(Color weight, Color density, double length)
+{
+    const Color left = {channel_left(density.x, length), channel_left(density.y, length),
+                        channel_left(density.z, length)};
+    return vector_multiply(weight, left);
+}
+
+static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color weight, Medium medium,
+                     unsigned bounces_left)
 {
     const Scene *scene = &tree->world->scene;
     ReferenceHit hit = reference_scene_hit(tree->world, ray, left);
     if (!hit.found) {
         tree->has_first = true;
         tree->margin = fmin(tree->margin, (double)hit.margin);
+        weight = weight_left(weight, medium.density, INFINITY);
         tree->sum = vector_add(tree->sum, vector_multiply(background_color(scene, ray->direction), weight));
         signature_add(tree, UINT32_MAX, 0);
         return;
@@ -301,6 +320,9 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
     tree->has_first = true;
     Surface surface = surface_at(tree->world, ray, &hit, tree->blur, &tree->random);
     const Material *material = surface.material;
+    // a surface that is reached from within tells the medium
+    if (material->transmission > 0 && !surface.entering) medium.density = material->absorption;
+    weight = weight_left(weight, medium.density, (double)surface.scale);
     const ReferenceColor own = surface_color(tree->world, &surface, (double)hit.margin, tree->shadows);
     tree->shadows = NULL;
     tree->sum = vector_add(tree->sum, vector_multiply(own.color, weight));
@@ -344,10 +366,13 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
     reflected.direction = reflect(direction, surface.normal);
     if (reflection > 0 && is_smooth && !is_on_side(reflected.direction, surface.geometric, 1, &tree->margin))
         reflected.direction = reflect(direction, surface.geometric);
+    const Medium behind =
+        surface.entering ? (Medium){material->absorption, medium.density} : (Medium){.density = medium.outer};
     if (reflection > 0)
-        add_path(tree, &reflected, hit.object, vector_multiply(weight, reflected_weight), bounces_left - 1);
+        add_path(tree, &reflected, hit.object, vector_multiply(weight, reflected_weight), medium,
+                 bounces_left - 1);
     if (transmission > 0)
-        add_path(tree, &refracted, hit.object, vector_scale(weight, transmission), bounces_left - 1);
+        add_path(tree, &refracted, hit.object, vector_scale(weight, transmission), behind, bounces_left - 1);
 }
 
 bool reference_is_undecided(const ReferencePixel *pixel)
@@ -368,7 +393,7 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
     first.direction = quad3_add(first.direction, turn);
-    add_path(&tree, &first, UINT32_MAX, vector_all(1), path->bounce_count);
+    add_path(&tree, &first, UINT32_MAX, vector_all(1), (Medium){0}, path->bounce_count);
     const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;
     return (ReferencePixel){.object = tree.object,
                             .path = tree.signature,

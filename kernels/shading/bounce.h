@@ -5,6 +5,12 @@
 
 #include "shading/surface.h"
 
+// What a ray travels in: the density of the body that absorbs its light, and that of the body around that
+// one; 0 in air (shading/medium.h).
+typedef struct {
+    Color3 density, outer;
+} Medium;
+
 // A ray to trace, and the weight of its color in the pixel. A weight of 0 means that there is no ray.
 typedef struct {
     Vector origin, direction; // unit
@@ -12,6 +18,7 @@ typedef struct {
     uint depth;
     real travelled; // distance from the eye along the path
     Sample sample;  // with HAS_AREA_LIGHTS
+    Medium medium;  // with HAS_ABSORPTION
     // At `certified`, the errors as in a Ray:
     real origin_error, start_error, direction_error;
     integer left;

@@ -3,13 +3,14 @@
 #ifndef PATH_H
 #define PATH_H
 
-#include "shading/bounce.h"
+#include "shading/medium.h"
 #include "shading/phong.h"
 
 // The hits of a packet of rays, shaded.
 typedef struct {
     Surface surface; // if no lane hit any, only surface.object
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
+    real t;          // with HAS_ABSORPTION
     // at `certified`: lanes in doubt about any of this; a bound on the error of any channel
     mask doubt;
     real color_error;
@@ -33,6 +34,7 @@ static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
     if (IS_CERTIFIED) traversal_judge(traversal);
     hit->surface.object = traversal->hit.object;
     hit->color = background_color(scene->header, ray->direction);
+    if (HAS_ABSORPTION) hit->t = traversal->hit.t;
     if (IS_CERTIFIED) {
         hit->doubt = traversal->hit.doubt;
         hit->color_error = (real)(0);
@@ -132,6 +134,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     real color_error = (real)(0);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
     Color3 color = black, weight = white;
+    Medium medium = {black, black};
     Ray rays[1] = {ray};         // an array, or Mesa 22.3 crashes in compiling rays_shade's loops
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
     uint pending_count = 0, depth = 0;
@@ -148,6 +151,11 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
                 *doubt = *doubt | (rays[0].active & color_is_doubtful(shaded->color, shaded->color_error));
             return shaded->color;
         }
+        mask found = surface_found(&shaded->surface);
+        if (HAS_ABSORPTION) {
+            if (lanes_any(found)) medium = medium_before(medium, &shaded->surface);
+            weight = weight_absorbed(weight, &medium, found, shaded->t);
+        }
         if (IS_CERTIFIED)
             color_error = real_fma(weight_largest(weight),
                                    lanes_select(rays[0].active, shaded->color_error, (real)(0)), color_error);
@@ -156,11 +164,15 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         Bounce reflected = {rays[0].origin, rays[0].direction, black, depth + 1};
         Bounce refracted = reflected;
         mask total = mask_none();
-        if (lanes_any(surface_found(&shaded->surface)) && depth < scene->header->bounces.x) {
+        if (lanes_any(found) && depth < scene->header->bounces.x) {
             total = surface_bounce(&shaded->surface, vector_renormalize(rays[0].direction), weight, false,
                                    &reflected, &refracted);
             if (IS_CERTIFIED)
                 bounces_set_errors(&shaded->surface, rays, total, &reflected, &refracted, doubt);
+            if (HAS_ABSORPTION) {
+                reflected.medium = medium;
+                refracted.medium = medium_behind(medium, &shaded->surface);
+            }
         }
         if (COMPUTE_SIGNATURE)
             *path = path_signature_add(*path, rays, shaded->surface.object, bounce_is_active(&reflected),
@@ -178,6 +190,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         }
         rays[0] = bounce_ray(&next);
         weight = next.weight;
+        if (HAS_ABSORPTION) medium = next.medium;
         depth = next.depth;
     }
     if (IS_CERTIFIED & !COMPUTE_SIGNATURE) *doubt = *doubt | color_is_doubtful(color, color_error);

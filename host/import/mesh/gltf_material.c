@@ -11,6 +11,7 @@
 typedef struct {
     double base[4], emissive[3], emissive_strength;
     double metal, roughness, transmission, ior, thickness, cutoff;
+    double attenuation[3], attenuation_distance; // the color left after the distance; DBL_MAX: clear
     GltfItem base_texture, emissive_texture;
     bool is_unlit;
 } Surface;
@@ -36,8 +37,14 @@ static void factors_read(Gltf *gltf, const GltfItem *item, const char *key, size
 
 static void surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
 {
-    *surface = (Surface){
-        .base = {1, 1, 1, 1}, .emissive_strength = 1, .metal = 1, .roughness = 1, .ior = 1.5, .cutoff = 0.5};
+    *surface = (Surface){.base = {1, 1, 1, 1},
+                         .emissive_strength = 1,
+                         .metal = 1,
+                         .roughness = 1,
+                         .ior = 1.5,
+                         .cutoff = 0.5,
+                         .attenuation = {1, 1, 1},
+                         .attenuation_distance = DBL_MAX};
     const GltfItem pbr = gltf_member(item, "pbrMetallicRoughness"),
                    strength = gltf_extension(item, "KHR_materials_emissive_strength"),
                    glass = gltf_extension(item, "KHR_materials_transmission"),
@@ -55,14 +62,15 @@ static void surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
     factors_read(gltf, &glass, "transmissionFactor", 1, &range_factor, &surface->transmission);
     factors_read(gltf, &ior, "ior", 1, &range_not_negative, &surface->ior);
     factors_read(gltf, &volume, "thicknessFactor", 1, &range_not_negative, &surface->thickness);
+    factors_read(gltf, &volume, "attenuationColor", 3, &range_factor, surface->attenuation);
+    factors_read(gltf, &volume, "attenuationDistance", 1, &range_positive, &surface->attenuation_distance);
     const struct {
         const GltfItem *item;
         const char *key;
         GltfLoss loss;
     } losses[] = {{&pbr, "metallicRoughnessTexture", GLTF_METAL_TEXTURE},
                   {item, "normalTexture", GLTF_NORMAL_TEXTURE},
-                  {item, "occlusionTexture", GLTF_OCCLUSION_TEXTURE},
-                  {&volume, "attenuationDistance", GLTF_ABSORPTION}};
+                  {item, "occlusionTexture", GLTF_OCCLUSION_TEXTURE}};
     for (size_t i = 0; i < sizeof losses / sizeof *losses; i++) {
         const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
         if (lost.json) gltf_lose(gltf, losses[i].loss, &lost);
@@ -264,7 +272,12 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
         look->reflection = opaque.reflection;
         look->emission = opaque.emission;
         if (surface->base_texture.json || mean_of(surface->base) < 1) gltf_lose(gltf, GLTF_GLASS_COLOR, item);
+        // without thickness a surface has no inside
         if (surface->thickness > 0 && surface->ior > 0) look->ior = surface->ior;
+        if (surface->thickness > 0 && surface->attenuation_distance < DBL_MAX)
+            look->absorption = color_absorption(
+                (Color){surface->attenuation[0], surface->attenuation[1], surface->attenuation[2]},
+                surface->attenuation_distance);
     }
 }
 

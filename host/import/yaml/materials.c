@@ -32,6 +32,32 @@ static bool read_checker(YamlReader *reader, const Field *field, const YamlNode 
     return true;
 }
 
+typedef struct {
+    Color color;
+    double distance;
+} Absorption;
+
+// Reads a color whose channels lie in the field's range.
+static bool read_fractions(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Color *color = target;
+    return read_color(reader, field, node, color) &&
+           (vector_largest(*color) <= field->range->high ||
+            report_error(&reader->report, node->offset, "'%s' must be %s", field->name, field->range->must));
+}
+
+static bool read_absorption(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    static const Field fields[] = {
+        {"color", read_fractions, offsetof(Absorption, color), FORM_ANY, REQUIRED, &range_unit},
+        {"distance", read_number, offsetof(Absorption, distance), FORM_ANY, OPTIONAL, &range_positive},
+    };
+    Absorption absorption = {.distance = 1};
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &absorption, NULL)) return false;
+    *(Color *)target = color_absorption(absorption.color, absorption.distance);
+    return true;
+}
+
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 {
     if (node->kind != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
@@ -124,6 +150,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},
         {"transmission", read_number, offsetof(Material, transmission), FORM_ANY, OPTIONAL, &range_unit},
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
+        {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL, NULL},
         {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL, NULL},
         {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL, NULL},
         {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL, NULL},
