@@ -23,10 +23,11 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         const Light *light = &scene->lights.items[i];
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
                                 .kind = {.x = (uint32_t)light->kind, .y = (uint32_t)light->area}};
-        const double unit =
-            light->kind == LIGHT_DIRECTIONAL ? 1 / sqrt(vector_dot(light->direction, light->direction)) : 1;
-        lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), light->radius);
-        lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
+        if (light->area != AREA_NONE) {
+            const double unit = light->kind == LIGHT_DIRECTIONAL ? 1 / vector_length(light->direction) : 1;
+            lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), light->radius);
+            lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
+        }
         lights[i].fading =
             (scalar4){light_fades(light) ? light->fading[0] : 1, light->fading[1], light->fading[2], 0};
         if (light->kind != LIGHT_DIRECTIONAL)

@@ -129,7 +129,7 @@ static void area_set(LightFields *read)
 {
     Light *light = &read->light;
     if (light->kind == LIGHT_DIRECTIONAL && read->angle > 0) {
-        const double length = sqrt(vector_dot(light->direction, light->direction));
+        const double length = vector_length(light->direction);
         across_set(light->across, light->direction, length * portable_tangent(read->angle * (M_PI / 360)));
         light->area = AREA_ELLIPSE;
     } else if (light->area == AREA_ELLIPSE) {
