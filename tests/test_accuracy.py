@@ -347,7 +347,7 @@ class Accuracy(TestCase):
             (f"{GLASS} --size 64x48 --reference {self.reference}.color.npy", "96x64"),
             (f"{GLASS} --size 96x32 --reference {self.reference}.color.npy", "not a multiple"),
             (f"{GLASS} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
-            (f"{GLASS} --reference {ROOT}/docs/demo.png", r"demo\.png"),
+            (f"{GLASS} --reference {ROOT}/docs/still-life.png", r"still-life\.png"),
             (f"{GLASS} {self.spheres} --reference {self.reference}.color.npy", "one scene"),
             (f"{GLASS} --size 8x8 --save file/folder", "file/folder"),
         ):
