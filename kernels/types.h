@@ -323,8 +323,10 @@ typedef struct {
     scalar4 background, ambient;
     // With HAS_SKY the background is that of directions across the unit vector sky_up. sky_above and
     // sky_below are added for unit directions along and against it, and in between by the cosine.
-    // sky_up.w: the largest magnitude of their channels.
-    scalar4 sky_up, sky_above, sky_below;
+    // sky_up.w: the largest magnitude of their channels. With HAS_IMAGES and sky_texture.x > 0 it is an image
+    // of all directions, whose center lies along the unit vector sky_forward, and whose middle of the right
+    // half along sky_right; sky_forward.w is the factor of its colors.
+    scalar4 sky_up, sky_above, sky_below, sky_forward, sky_right;
     // A camera ray runs from the eye along forward + x right + y up, with x and y in half pixels from the
     // image's center. The eye is the origin, except in a preview of a scene compiled for another eye.
     //
@@ -345,6 +347,7 @@ typedef struct {
     uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: largest depth
     uint4 cull_spheres;              // x: number per common origin, 0 if there are none
+    uint4 sky_texture;               // as a material's texture
     uint4 counts[KIND_QUARTETS];     // primitives by KIND_…
     uint4 bvh_counts[KIND_QUARTETS]; // those of them in the BVH, which come first
 } SceneHeader;

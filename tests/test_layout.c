@@ -35,6 +35,8 @@ typedef struct {
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_up)                         \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_above)                      \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_below)                      \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_forward)                    \
+    REALS(FLAT_HEADER, SceneHeader, SceneHeader, sky_right)                      \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, eye)                            \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, forward)                        \
     REALS(FLAT_HEADER, SceneHeader, SceneHeader, lens_right)                     \
@@ -50,6 +52,7 @@ typedef struct {
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, image)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bounces)                     \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, cull_spheres)                       \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, sky_texture)                 \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[KIND_QUARTETS - 1])   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[0])               \

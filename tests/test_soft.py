@@ -1,11 +1,25 @@
 #!/usr/bin/env -S python3 -B
 """Soft shadows, the lens, parallel rays and the sky against what geometry says, and how the error falls with the samples."""
+import itertools
 import math
+import struct
+import zlib
 
 import glint
 from glint import IS_LONG, TestCase, main, npy_read, need_device, skip_all, write
 
 PRECISIONS = ("single", "strict", "double") if IS_LONG else ("strict",)
+
+
+def png_write(name, width, height, color):
+    """Writes an image of 8 bits; `color` returns the three of a column and a row."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    rows = b"".join(b"\0" + bytes(value for x in range(width) for value in color(x, y)) for y in range(height))
+    with open(name, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)) +
+                   chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 def cap(x):
@@ -160,6 +174,47 @@ class Soft(TestCase):
                             exact = level / 2 + (colors["zenith"][channel] + colors["nadir"][channel]) / 4
                         self.assertAlmostEqual(pixel[channel], exact, delta=1e-6)
                 self.assertEqual(seen, {True, False})
+
+    def test_sky_image(self):
+        """Directions have the texels of their longitude and latitude; the image's mean over all directions is the ambient light."""
+        columns, rows = 64, 32
+        # by column: around +z, -x, -z and +x, and by row: above 45 degrees, below -45 and in between
+        sides = [(255, 255, 255), (0, 0, 255), (255, 0, 0), (0, 255, 0)]
+
+        def texel(column, row):
+            return (255, 255, 0) if row < 8 else (0, 0, 0) if row >= 24 else sides[(column + 8) // 16 % 4]
+
+        png_write("sky.png", columns, rows, texel)
+        scene = ("camera: {{position: [0, 0, 0], look_at: {}, up: [0.1, 0.9, 0.2], fov: 120}}\n"
+                 "background: {{image: sky.png, intensity: 0.5{}}}\n"
+                 "objects: [{{box: {{min: [3, -1, -1], max: [4, 1, 1]}}}}]\n")
+        # the ways to the image's middle, right quarter and top
+        turns = {"": ((0, 0, -1), (1, 0, 0), (0, 1, 0)), ", turn: 90": ((-1, 0, 0), (0, 0, -1), (0, 1, 0)),
+                 ", up: [0, 0, 1]": ((-1, 0, 0), (0, 1, 0), (0, 0, 1))}
+        seen = set()
+        for precision in (*PRECISIONS, "certified"):
+            for (turn, axes), look_at in itertools.product(turns.items(), ([1, 0.2, 0.3], [-1, 2, -0.5], [0.1, -1, 1])):
+                write("soft.yaml", scene.format(look_at, turn))
+                self.glint(f"render soft.yaml --quiet --lanes 1 --size 32x24 --aov ray,object --precision {precision} -o soft.npy")
+                pixels, rays, objects = (npy_read(f"soft{name}.npy")[2] for name in ("", ".ray", ".object"))
+                for pixel, ray, number in zip(pixels, rays, objects):
+                    ahead, right, up = (sum(a * b for a, b in zip(ray, axis)) for axis in axes)
+                    u = 0.5 + math.atan2(right, ahead) / (2 * math.pi)
+                    v = 0.5 - math.asin(max(-1, min(up, 1))) / math.pi
+                    column, row = u * columns, v * rows
+                    if number == 0:
+                        sine = math.sin(math.pi / 4)
+                        exact = [0.5 * (sine * sum(side[c] for side in sides) / 4 + (1 - sine) / 2 * (255, 255, 0)[c]) for c in range(3)]
+                    else:
+                        exact = [0.5 * value for value in texel(int(column) % columns, int(row))]
+                        # between the texels' centers colors blend
+                        near = {texel(int(column + x) % columns, min(max(int(row + y), 0), rows - 1)) for x in (-1, 1) for y in (-1, 1)}
+                        if len(near) > 1:
+                            continue
+                        seen |= near
+                    for channel in range(3):
+                        self.assertAlmostEqual(pixel[channel], exact[channel] / 255, delta=2e-6, msg=(turn, ray))
+        self.assertEqual(len(seen), 6)
 
     def test_certified_refuses(self):
         """An area, a lens and parallel rays, whose errors have no bound."""

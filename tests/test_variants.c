@@ -161,6 +161,8 @@ static const struct {
      "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], height: 4}\nambient: 0.5\n" SPHERE},
     {FEATURE_SKY, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
                   "background: {horizon: 1, zenith: [0, 0, 1], up: [0.1, 1, 0]}\n"},
+    {FEATURE_SKY | FEATURE_IMAGES, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
+                                   "background: {image: scenes/images/globe.png}\n"},
     {FEATURE_SPHERES | FEATURE_CHECKERS,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
                 "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},

@@ -1,10 +1,24 @@
 #include "host/compile/compile.h"
+#include "host/compile/stages.h"
 
 #include <float.h>
 #include <math.h>
 
 // What the rounding of shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
+
+Color scene_ambient(const CompiledScene *compiled, const Scene *scene)
+{
+    if (!scene->sky.is_ambient) return scene->ambient;
+    return vector_scale(compiled->textures[scene->sky.texture - 1].sky_mean, scene->sky.intensity);
+}
+
+static Color background_max(const CompiledScene *compiled, const Scene *scene)
+{
+    if (scene->sky.texture > 0)
+        return vector_all(compiled->textures[scene->sky.texture - 1].largest_texel * scene->sky.intensity);
+    return vector_max(scene->background, vector_max(scene->sky.zenith, scene->sky.nadir));
+}
 
 // Returns what a material emits and reflects at most: of the ambient light, and of all lights at once.
 static Color material_color_max(const CompiledScene *compiled, const Scene *scene, const Material *material,
@@ -13,7 +27,8 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
     Color color = material->color;
     if (material->checker) color = vector_max(material->checker_colors[0], material->checker_colors[1]);
     if (material->texture > 0) color = vector_all(compiled->textures[material->texture - 1].largest_texel);
-    const Color ambient = vector_scale(vector_multiply(scene->ambient, color), material->ambient);
+    const Color ambient =
+        vector_scale(vector_multiply(scene_ambient(compiled, scene), color), material->ambient);
     const Color factor =
         vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular));
     return vector_add(vector_add(material->emission, ambient), vector_multiply(light_sum, factor));
@@ -33,8 +48,7 @@ double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32
     // refracted, what rays with one bounce less see
     for (uint32_t left = 0; left <= bounces; left++) {
         const Color before = seen;
-        seen =
-            vector_max(seen, vector_max(scene->background, vector_max(scene->sky.zenith, scene->sky.nadir)));
+        seen = vector_max(seen, background_max(compiled, scene));
         for (size_t i = 0; i < scene->materials.count; i++) {
             const Material *material = &scene->materials.items[i];
             const Color passed = vector_scale(before, material->reflection + material->transmission);

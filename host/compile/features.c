@@ -57,6 +57,7 @@ FeatureSet features_of(const Scene *scene)
         if (scene->lights.items[i].area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
     if (scene->camera.lens_radius > 0) set |= FEATURE_LENS;
     if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;
+    if (scene->sky.texture > 0) set |= FEATURE_IMAGES;
     if (scene->camera.orthographic) set |= FEATURE_ORTHOGRAPHIC;
     return set;
 }

@@ -32,13 +32,16 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     const bool has_sky = !vector_is_zero(scene->sky.up);
     const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
                 below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
+    const Vector3 forward = vector_normalize(scene->sky.forward);
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
-        .ambient = scalar4_of(scene->ambient, 0),
+        .ambient = scalar4_of(scene_ambient(compiled, scene), 0),
         .sky_up = scalar4_of(has_sky ? vector_normalize(scene->sky.up) : scene->sky.up,
                              fmax(vector_largest(above), vector_largest(below))),
         .sky_above = scalar4_of(above, 0),
         .sky_below = scalar4_of(below, 0),
+        .sky_forward = scalar4_of(forward, scene->sky.intensity),
+        .sky_right = scalar4_of(vector_cross(forward, vector_normalize(scene->sky.up)), 0),
         .eye = scalar4_of(compiled->eye_offset, 0),
         .forward = scalar4_of(basis.forward, 0),
         .right = scalar4_of(basis.right, 0),
@@ -58,6 +61,11 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,
     };
+    if (scene->sky.texture > 0) {
+        const CompiledTexture *texture = &compiled->textures[scene->sky.texture - 1];
+        header.sky_texture =
+            (uint4){1 + texture->first_level, texture->level_count, WRAP_REPEATED, WRAP_CLAMPED};
+    }
     uint32_t counts[KIND_COUNT];
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
         counts[kind] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + kind].count;

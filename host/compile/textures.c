@@ -5,6 +5,7 @@
 #include "host/base/memory.h"
 #include "host/image/image.h"
 #include "host/image/srgb.h"
+#include "host/scene/portable.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -141,6 +142,23 @@ static float largest_texel(const Level *level)
     return largest;
 }
 
+// A row's share of the directions is the difference of the sines of its edges' latitudes.
+static Color sky_mean(const Level *level)
+{
+    Color mean = {0};
+    double below = 1;
+    for (uint32_t y = 0; y < level->height; y++) {
+        const double above = below;
+        below = portable_cosine((y + 1) * M_PI / level->height);
+        const double share = (above - below) / 2 / level->width;
+        for (uint32_t x = 0; x < level->width; x++) {
+            const float *color = level->colors[(size_t)y * level->width + x];
+            mean = vector_add(mean, vector_scale((Color){color[0], color[1], color[2]}, share));
+        }
+    }
+    return mean;
+}
+
 static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
                         const SceneTexture *scene_texture, MessageList *messages)
 {
@@ -153,9 +171,12 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
         done = !problem;
         if (done)
-            *texture = (CompiledTexture){image.width, image.height, first_level,
+            *texture = (CompiledTexture){image.width,
+                                         image.height,
+                                         first_level,
                                          (uint32_t)list->levels.count - first_level,
-                                         largest_texel(&list->levels.items[first_level])};
+                                         largest_texel(&list->levels.items[first_level]),
+                                         sky_mean(&list->levels.items[first_level])};
         if (done && image.has_alpha && !scene_texture->ignores_alpha)
             message_add_at(messages, MESSAGE_WARNING, &source, scene_texture->offset,
                            "the alpha of '%s' is ignored: its transparent parts are opaque",

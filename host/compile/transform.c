@@ -13,6 +13,7 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     change(&scene->camera.look_at, factor);
     change(&scene->camera.up, factor);
     change(&scene->sky.up, factor);
+    change(&scene->sky.forward, factor);
     for (size_t i = 0; i < scene->lights.count; i++) {
         change(&scene->lights.items[i].position, factor);
         change(&scene->lights.items[i].direction, factor);

@@ -195,6 +195,12 @@ typedef struct {
     struct {
         Vector3 up;
         Color zenith, nadir;
+        // As in a Material: an image of all directions in place of these colors, times `intensity`. Its
+        // center lies along `forward`, across `up`.
+        uint32_t texture;
+        Vector3 forward;
+        double intensity;
+        bool is_ambient; // its mean replaces `ambient`
     } sky;
     struct {
         Light *items;

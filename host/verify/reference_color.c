@@ -306,6 +306,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
     if (!hit.found) {
         tree->has_first = true;
         tree->margin = fmin(tree->margin, (double)hit.margin);
+        tree->has_texture = tree->has_texture || scene->sky.texture > 0;
         weight = weight_left(weight, medium.density, INFINITY);
         tree->sum = vector_add(tree->sum, vector_multiply(background_color(scene, ray->direction), weight));
         signature_add(tree, UINT32_MAX, 0);

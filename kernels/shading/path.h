@@ -16,11 +16,14 @@ typedef struct {
     real color_error;
 } ShadedHit;
 
-// Returns what a ray of unit direction sees where it hits nothing.
-static inline Color3 background_color(global const SceneHeader *header, Vector direction)
+// Returns what a ray of unit direction sees where it hits nothing, in the lanes in `wanted`.
+static inline Color3 background_color(const Scene *scene, Vector direction, mask wanted)
 {
+    global const SceneHeader *header = scene->header;
     Color3 color = vector_of(header->background);
     if (!HAS_SKY) return color;
+    if (HAS_IMAGES && header->sky_texture.x > 0)
+        return lanes_any(wanted) ? sky_image_color(scene, direction, wanted) : color;
     const real zero = (real)(0);
     real height = vector_dot(direction, vector_of(header->sky_up));
     color = vector_fma(vector_of(header->sky_above), real_max(height, zero), color);
@@ -33,7 +36,7 @@ static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
 {
     if (IS_CERTIFIED) traversal_judge(traversal);
     hit->surface.object = traversal->hit.object;
-    hit->color = background_color(scene->header, ray->direction);
+    hit->color = background_color(scene, ray->direction, RAY_ACTIVE(ray) & !surface_found(&hit->surface));
     if (HAS_ABSORPTION) hit->t = traversal->hit.t;
     if (IS_CERTIFIED) {
         hit->doubt = traversal->hit.doubt;

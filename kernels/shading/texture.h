@@ -153,6 +153,42 @@ static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar
     return scalar4_between(color, coarser, part);
 }
 
+// Returns the filtered color of each lane in `wanted`.
+static inline Vector texture_lookup(const Scene *scene, uint4 texture, real along, real across, real width,
+                                    uint wrap_v, mask wanted)
+{
+    RealLanes u = {along}, v = {across}, footprint = {width};
+    RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
+    IntegerLanes lanes = {wanted};
+    for (uint lane = 0; lane < LANES; lane++) {
+        if (lanes.each[lane] == 0) continue;
+        scalar4 color = texture_filtered(scene, texture, wrap_unit(u.each[lane], texture.z),
+                                         wrap_unit(v.each[lane], wrap_v), footprint.each[lane], wrap_v);
+        red.each[lane] = color.x;
+        green.each[lane] = color.y;
+        blue.each[lane] = color.z;
+    }
+    return (Vector){red.all, green.all, blue.all};
+}
+
+// Returns the color of the sky's image along a unit direction, for the lanes in `wanted`. Its texels are
+// counted at the horizon or by their height, as a sphere's.
+static inline Vector sky_image_color(const Scene *scene, Vector direction, mask wanted)
+{
+    global const SceneHeader *header = scene->header;
+    const real one_half = (real)(0.5f), two = (real)(2);
+    uint4 level = scene->texture_levels[header->sky_texture.x - 1].place;
+    real x = vector_dot(direction, vector_of(header->sky_right));
+    real y = vector_dot(direction, vector_of(header->sky_up));
+    real z = vector_dot(direction, vector_of(header->sky_forward));
+    real across = real_sqrt(real_fma(x, x, z * z));
+    scalar texels = max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
+    Vector color = texture_lookup(scene, header->sky_texture, one_half + real_turns(z, x),
+                                  real_fma(two, real_turns(across, y), one_half),
+                                  (real)(header->sample.x * texels), WRAP_CLAMPED, wanted);
+    return vector_scale(color, (real)(header->sky_forward.w));
+}
+
 // Returns the texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance
 // `travelled` from the eye. At a grazing angle the footprint grows by at most 2^10.
 static inline Vector texture_color(const Scene *scene, uint kind, const Material *material,
@@ -162,21 +198,9 @@ static inline Vector texture_color(const Scene *scene, uint kind, const Material
     real cosine = real_max(fabs(vector_dot(point->normal, ray->direction)), (real)(0x1p-10f));
     real width = travelled * (real)(scene->header->sample.x);
     if (HAS_ORTHOGRAPHIC && scene->header->sample.z > 0) width = (real)(scene->header->sample.z);
-    RealLanes u = {coordinates.u}, v = {coordinates.v},
-              footprint = {real_divide(width * coordinates.density, cosine)};
-    RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
-    IntegerLanes lanes = {wanted};
-    for (uint lane = 0; lane < LANES; lane++) {
-        if (lanes.each[lane] == 0) continue;
-        uint wrap_v = kind == KIND_SPHERES ? WRAP_CLAMPED : material->texture.w;
-        scalar4 color =
-            texture_filtered(scene, material->texture, wrap_unit(u.each[lane], material->texture.z),
-                             wrap_unit(v.each[lane], wrap_v), footprint.each[lane], wrap_v);
-        red.each[lane] = color.x;
-        green.each[lane] = color.y;
-        blue.each[lane] = color.z;
-    }
-    return (Vector){red.all, green.all, blue.all};
+    return texture_lookup(scene, material->texture, coordinates.u, coordinates.v,
+                          real_divide(width * coordinates.density, cosine),
+                          kind == KIND_SPHERES ? WRAP_CLAMPED : material->texture.w, wanted);
 }
 
 #endif

@@ -74,7 +74,7 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 }
 
 // Reads the name of a file, or a mapping of a file and its layer.
-static bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     typedef struct {
         const YamlNode *file, *layer;

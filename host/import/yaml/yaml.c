@@ -8,6 +8,15 @@
 
 #include <stdlib.h>
 
+// Turns a vector about a unit axis, counterclockwise seen from the axis' tip (Rodrigues).
+static Vector3 vector_turned(Vector3 v, Vector3 axis, double degrees)
+{
+    const double angle = fmod(degrees, 360) * (M_PI / 180), cosine = portable_cosine(angle);
+    const Vector3 along = vector_scale(axis, vector_dot(axis, v) * (1 - cosine));
+    const Vector3 across = vector_scale(vector_cross(axis, v), portable_sine(angle));
+    return vector_add(vector_add(vector_scale(v, cosine), across), along);
+}
+
 typedef struct {
     Camera camera;
     double fov_degrees, focal_length, frame[2], height, aperture, turn;
@@ -42,18 +51,6 @@ static void camera_set_lens(YamlReader *reader, const CameraFields *read, const 
         report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
 }
 
-// Turns the position about `up` through look_at, counterclockwise seen from above (Rodrigues).
-static void camera_turn(Camera *camera, double degrees)
-{
-    const double angle = fmod(degrees, 360) * (M_PI / 180), cosine = portable_cosine(angle);
-    const Vector3 axis = vector_normalize(camera->up),
-                  from = vector_subtract(camera->position, camera->look_at);
-    const Vector3 along = vector_scale(axis, vector_dot(axis, from) * (1 - cosine));
-    const Vector3 across = vector_scale(vector_cross(axis, from), portable_sine(angle));
-    camera->position =
-        vector_add(camera->look_at, vector_add(vector_add(vector_scale(from, cosine), across), along));
-}
-
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 {
     static const Field fields[] = {
@@ -79,7 +76,11 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
                      "'look_at' must differ from 'position'");
         return;
     }
-    if (read.turn != 0) camera_turn(camera, read.turn);
+    if (read.turn != 0) {
+        const Vector3 from = vector_subtract(camera->position, camera->look_at);
+        camera->position =
+            vector_add(camera->look_at, vector_turned(from, vector_normalize(camera->up), read.turn));
+    }
     if (isnan(read.focus.x)) read.focus = camera->look_at;
     camera_set_lens(reader, &read, field_node(reader, node, "focus"));
     if (form == FORM_THIRD) {
@@ -99,32 +100,59 @@ typedef struct {
     Color horizon;
     Vector3 up;
     Color zenith, nadir;
+    uint32_t texture;
+    double intensity, turn;
 } Background;
 
 // Takes a color, or those of the sky.
 static bool read_background(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
-        {"horizon", read_strength, offsetof(Background, horizon), FORM_ANY, REQUIRED, NULL},
-        {"zenith", read_strength, offsetof(Background, zenith), FORM_ANY, REQUIRED, NULL},
-        {"nadir", read_strength, offsetof(Background, nadir), FORM_ANY, OPTIONAL, NULL},
+        {"horizon", read_strength, offsetof(Background, horizon), FORM_FIRST, REQUIRED, NULL},
+        {"zenith", read_strength, offsetof(Background, zenith), FORM_FIRST, REQUIRED, NULL},
+        {"nadir", read_strength, offsetof(Background, nadir), FORM_FIRST, OPTIONAL, NULL},
+        {"image", read_texture, offsetof(Background, texture), FORM_SECOND, REQUIRED, NULL},
+        {"intensity", read_number, offsetof(Background, intensity), FORM_SECOND, OPTIONAL,
+         &range_not_negative},
+        {"turn", read_number, offsetof(Background, turn), FORM_SECOND, OPTIONAL, NULL},
         {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL, NULL},
     };
     Background *background = target;
     if (node->kind != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
     background->up = (Vector3){0, 1, 0};
     background->nadir = vector_all(NAN);
+    background->intensity = 1;
     if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), background, NULL)) return false;
     if (isnan(background->nadir.x)) background->nadir = background->horizon;
     return true;
 }
 
-// Returns the mean over all directions.
+// Returns the mean of the colors over all directions.
 static Color background_mean(const Background *background)
 {
     if (vector_is_zero(background->up)) return vector_all(0);
     const Color poles = vector_add(background->zenith, background->nadir);
     return vector_add(vector_scale(background->horizon, 0.5), vector_scale(poles, 0.25));
+}
+
+// Sets the background and, unless it is given, the ambient light.
+static void scene_set_background(Scene *scene, const Background *background, Color ambient)
+{
+    const bool has_ambient = !isnan(ambient.x);
+    scene->background = background->horizon;
+    scene->sky.up = background->up;
+    scene->sky.zenith = background->zenith;
+    scene->sky.nadir = background->nadir;
+    scene->ambient = has_ambient ? ambient : background_mean(background);
+    if (background->texture == 0) return;
+    scene->sky.texture = background->texture;
+    scene->sky.is_ambient = !has_ambient;
+    scene->sky.intensity = background->intensity;
+    // -z, or where that lies along `up`, -x
+    const Vector3 up = vector_normalize(background->up);
+    Vector3 right = vector_cross((Vector3){0, 0, -1}, up);
+    if (vector_length(right) < 1e-6) right = vector_cross((Vector3){-1, 0, 0}, up);
+    scene->sky.forward = vector_turned(vector_cross(up, right), up, background->turn);
 }
 
 typedef struct {
@@ -146,12 +174,7 @@ static void document_read(YamlReader *reader)
     };
     Document document = {.ambient = vector_all(NAN)};
     fields_read(reader, reader->tree.nodes.items, "scene", fields, COUNT_OF(fields), &document, NULL);
-    Scene *scene = reader->scene;
-    scene->background = document.background.horizon;
-    scene->sky.up = document.background.up;
-    scene->sky.zenith = document.background.zenith;
-    scene->sky.nadir = document.background.nadir;
-    scene->ambient = isnan(document.ambient.x) ? background_mean(&document.background) : document.ambient;
+    scene_set_background(reader->scene, &document.background, document.ambient);
     if (document.camera) yaml_read_camera(reader, document.camera);
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them
@@ -159,7 +182,7 @@ static void document_read(YamlReader *reader)
     reader->places = places_open(reader->report.source);
     if (document.definitions) yaml_read_definitions(reader, document.definitions);
     if (document.objects) yaml_read_object_list(reader, document.objects, true);
-    scene_add_lamps(scene);
+    scene_add_lamps(reader->scene);
     yaml_definitions_free(reader);
     places_close(&reader->places);
 }

@@ -11,6 +11,9 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node);
 // Reads a material's name or an inline material; the target is a uint32_t, the material's index.
 FieldReader read_material;
 
+// Reads the name of an image, or a mapping with its layer; the target is a uint32_t, as in Material.texture.
+FieldReader read_texture;
+
 // Returns the default material's index.
 uint32_t material_default_index(YamlReader *reader);
 
