@@ -32,7 +32,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
         SquarePoint point = disc_of_square(sample_point(&sample, SAMPLED_LENS));
         Vector offset = vector_fma(vector_of(header->lens_right), point.x,
                                    vector_scale(vector_of(header->lens_up), point.y));
-        direction = vector_fma(direction, (real)(header->lens_right.w), vector_negate(offset));
+        direction = vector_fma(offset, (real)(-header->lens_right.w), direction);
         origin = vector_add(origin, offset);
     }
     Ray ray = ray_make_unit(origin, vector_normalize(direction), active);

@@ -330,9 +330,10 @@ typedef struct {
     // A camera ray runs from the eye along forward + x right + y up, with x and y in half pixels from the
     // image's center. The eye is the origin, except in a preview of a scene compiled for another eye.
     //
-    // With HAS_LENS and lens_right.w > 0, the distance of the focal plane, it runs from a point of the lens
-    // to where the ray from the lens' center meets that plane; lens_right and lens_up lead from the center to
-    // the edge. With HAS_ORTHOGRAPHIC and lens_up.w = 1 it runs along forward, from the eye + x right + y up.
+    // With HAS_LENS and lens_right.w > 0, one over the distance of the focal plane, it runs from a point of
+    // the lens to where the ray from the lens' center meets that plane; lens_right and lens_up lead from the
+    // center to the edge. With HAS_ORTHOGRAPHIC and lens_up.w = 1 it runs along forward, from the eye + x
+    // right + y up.
     scalar4 eye, forward, right, up;
     scalar4 lens_right, lens_up;
     scalar4 bounds;                  // those of the BVH; xyz: center, w: largest |x| + |y| + |z| from there

@@ -24,16 +24,16 @@ static Camera camera_make(FieldAxis axis)
 
 static Vector3 point_along(const Camera *camera, const double pixel[2], double distance)
 {
-    Vector3 ray = camera_ray(camera, size, pixel[0], pixel[1]);
-    return vector_add(camera->position, vector_scale(ray, distance));
+    const CameraRay ray = camera_ray(camera, size, pixel[0], pixel[1]);
+    return vector_add(ray.origin, vector_scale(ray.direction, distance));
 }
 
 // Checks that the point is seen in the pixel.
 static void check_pixel(const Camera *camera, Vector3 point, const double pixel[2])
 {
-    Vector3 seen = vector_normalize(vector_subtract(point, camera->position));
-    Vector3 ray = camera_ray(camera, size, pixel[0], pixel[1]);
-    assert_vector(seen, ray.x, ray.y, ray.z);
+    const CameraRay ray = camera_ray(camera, size, pixel[0], pixel[1]);
+    Vector3 seen = vector_normalize(vector_subtract(point, ray.origin));
+    assert_vector(seen, ray.direction.x, ray.direction.y, ray.direction.z);
 }
 
 static double distance_to(const Camera *camera, Vector3 point)
@@ -45,19 +45,24 @@ static void grabbed_point_stays_under_the_cursor(void **state)
 {
     (void)state;
     static const double from[2] = {100, 50}, to[2] = {420, 333};
-    for (int axis = 0; axis < 2; axis++) {
-        Camera start = camera_make((FieldAxis)axis), camera = start;
+    for (int i = 0; i < 4; i++) {
+        Camera start = camera_make((FieldAxis)(i % 2));
+        start.orthographic = i >= 2;
+        Camera camera = start;
         Vector3 point = point_along(&start, from, 4);
 
         camera_orbit(&camera, point, 0.7, -0.3);
         check_pixel(&camera, point, from);
-        assert_number(distance_to(&camera, point), 4);
+        if (!start.orthographic) assert_number(distance_to(&camera, point), 4);
         assert_true(distance_to(&camera, start.position) > 0.5);
 
         camera = start;
         camera_dolly(&camera, point, 0.25);
         check_pixel(&camera, point, from);
-        assert_number(distance_to(&camera, point), 1);
+        if (start.orthographic)
+            assert_number(camera.half_tangent, start.half_tangent / 4);
+        else
+            assert_number(distance_to(&camera, point), 1);
 
         camera = start;
         camera_pan(&camera, size, 4, from, to);
@@ -127,7 +132,9 @@ static void check_yaml(const Camera *camera)
         fail_msg("%.17g read as %.17g from %s", camera->half_tangent, read->half_tangent, text_c(&text));
     assert_int_equal(read->orthographic, camera->orthographic);
     assert_true(read->lens_radius == camera->lens_radius);
-    if (camera->lens_radius > 0) assert_true(read->focal_distance == camera->focal_distance);
+    assert_true(read->focal_distance == camera->focal_distance);
+    assert_int_equal(read->has_focus, camera->has_focus);
+    assert_memory_equal(&read->focus, &camera->focus, sizeof(Vector3));
     scene_free(&scene);
     text_free(&text);
 }
@@ -150,6 +157,11 @@ static void yaml_gives_the_same_camera(void **state)
     check_yaml(&lens);
     lens.orthographic = true;
     check_yaml(&lens);
+    lens.focal_distance = 0;
+    check_yaml(&lens);
+    lens.has_focus = true;
+    lens.focus = lens.look_at;
+    check_yaml(&lens);
     camera.half_tangent = portable_tangent(50 * (M_PI / 360));
     camera.position = (Vector3){0.1, 1e300, -40};
     Text text = {0};
@@ -164,7 +176,8 @@ static void yaml_gives_the_same_camera(void **state)
 // Checks the text that replaces the camera. An `expected` of NULL means a refusal with one message.
 static void check_replaced(const char *text, const char *expected)
 {
-    const Camera camera = {.position = {1, 2.5, 3}, .look_at = {0, 0, 1e-3}, .up = {0, 0, 1}};
+    const Camera camera = {
+        .position = {1, 2.5, 3}, .look_at = {0, 0, 1e-3}, .up = {0, 0, 1}, .half_tangent = 0.5};
     const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
     Text replaced;
     MessageList messages = {0};
@@ -193,6 +206,13 @@ static void camera_is_written_into_the_file(void **state)
     check_replaced("{\"camera\": {\"look_at\": [0, 0, 0], \"position\": [1, 2.5, 3]}, \"objects\": []}\n",
                    "{\"camera\": {\"up\": [0, 0, 1], \"look_at\": [0, 0, 0.001], \"position\": [1, 2.5, 3]}, "
                    "\"objects\": []}\n");
+    check_replaced(
+        "camera: {position: [9, 9, 9], look_at: [0, 0, 0], up: [0, 0, 1], turn: 90, fov: 40}\n" REST,
+        "camera: {position: [1, 2.5, 3], look_at: [0, 0, 0.001], up: [0, 0, 1], turn: 0, fov: 40}\n" REST);
+    check_replaced(
+        "camera: {position: [1, 2.5, 3], look_at: [0, 0, 0.001], up: [0, 0, 1], height: 4}\n" REST,
+        "camera: {position: [1, 2.5, 3], look_at: [0, 0, 0.001], up: [0, 0, 1], height: 1}\n" REST);
+    check_replaced("camera: {position: [9, 9, 9], look_at: [0, 0, 0], turn: {keys: {0: 0}}}\n" REST, NULL);
     check_replaced("{objects: [&a [9, 9, 9]], camera: {position: *a, look_at: [0, 0, 0]}}\n", NULL);
     check_replaced("{a: [1], objects: []}\n", NULL);
     check_replaced("camera: {position: [1, 2, 3]}\n", NULL);

@@ -43,7 +43,7 @@ class Frames(TestCase):
     def test_turn(self):
         """The camera goes round the point that it looks at, about `up`, in equal steps and back to where it was."""
         scene = ("camera: {{position: {position}, look_at: [1, 2, 3], up: [0, 0, 2]{turn}}}\n"
-                 "objects: [{{box: {{min: [0, 1, 2], max: [2, 2.5, 4]}}}}]\n")
+                 "ambient: 1\nobjects: [{{box: {{min: [0, 1, 2], max: [2, 2.5, 4], material: {{checker: {{colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}}}}}]\n")
         write("moving.yaml", scene.format(position="[1, -4, 5]", turn=", turn: {keys: {0: 0, 12: 360}}"))
         self.glint(f"render moving.yaml --frames 0-12 {RENDER} --precision double --aov t -o f%02d.npy")
         for frame in range(13):
@@ -54,12 +54,15 @@ class Frames(TestCase):
             for a, b in zip(npy_read(f"f{frame:02}.t.npy")[2], npy_read("fixed.t.npy")[2]):
                 self.assertTrue(a == b or abs(a - b) < 1e-9, (frame, a, b))
         self.assertSameBytes("f00.npy", "f12.npy")
+        self.assertNotEqual(npy_read("f00.npy"), npy_read("f01.npy"))
 
     def test_names(self):
         write("moving.yaml", SCENE.format(**KEYS))
         os.makedirs("a%d", exist_ok=True)
+        os.makedirs("out", exist_ok=True)
         for option, names in (("", ["moving-0007.png", "moving-0008.png"]), ("-o a%d/x%03dy.png", ["a%d/x007y.png", "a%d/x008y.png"]),
-                              ("-o z%d.exr", ["z7.exr", "z8.exr"])):
+                              ("-o z%d.exr", ["z7.exr", "z8.exr"]), ("-o 100%-%d.png", ["100%-7.png", "100%-8.png"]),
+                              ("-o out", ["out/moving-0007.png", "out/moving-0008.png"])):
             with self.subTest(option):
                 self.glint(f"render moving.yaml --frames 7-8 {RENDER} {option}")
                 for name in names:
@@ -79,20 +82,25 @@ class Frames(TestCase):
         write("moving.yaml", SCENE.format(**KEYS))
         write("s1.png", "kept")
         process = self.glint("render moving.yaml --frames 0-2 --size 32x18 --lanes 1 --skip-existing -o s%d.png")
-        self.assertEqual(process.stderr, "glint: wrote s0.png\nglint: wrote s2.png\n")
+        self.assertEqual(process.stderr, "glint: wrote s0.png\nglint: kept s1.png\nglint: wrote s2.png\n")
         self.assertEqual(read("s1.png"), "kept")
         write("still.yaml", SPHERE)
         write("still.png", "kept")
         process = self.glint("render moving.yaml still.yaml --size 32x18 --lanes 1 --skip-existing")
-        self.assertEqual((process.stderr, read("still.png")), ("glint: wrote moving.png\n", "kept"))
+        self.assertEqual((process.stderr, read("still.png")), ("glint: wrote moving.png\nglint: kept still.png\n", "kept"))
+        # its AOV does not exist
+        process = self.glint("render moving.yaml --size 32x18 --lanes 1 --skip-existing --aov t")
+        self.assertEqual(process.stderr, "glint: wrote moving.png, moving.t.npy\n")
+        self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
 
     def test_refused(self):
         write("moving.yaml", SCENE.format(**KEYS))
         write("still.yaml", SPHERE)
         for options, message in {
-            "--frames 0-3 -o a.png": "needs a place for the number, such as image-%04d.png",
-            "--frames 0-3 -o %d/a.png": "needs a place for the number",
-            "--frames 0-3 -o %5d.png": "needs a place for the number",
+            "--frames 0-3 -o a.png": "or have a place for the number, such as image-%04d.png",
+            "--frames 0-3 -o %d/a.png": "or have a place for the number",
+            "--frames 0-3 -o %5d.png": "or have a place for the number",
+            "--frames 0-3 -o %d-%02d.png": "more than one place",
             "--frames 3-2": "--frames: expected A or A-B",
             "--frames -1": "--frames: expected A or A-B",
             "--frames 1x": "--frames: expected A or A-B",
@@ -102,8 +110,14 @@ class Frames(TestCase):
             "--frames 0-3 --timing=json": "--timing=json takes one frame",
         }.items():
             self.refuses(f"render moving.yaml {RENDER} {options}", message)
-        process = self.glint(f"render still.yaml --frames 0-1 {RENDER}")
-        self.assertEqual(process.stderr, "glint: warning: 'still.yaml' has no keys: all frames are alike\n")
+        self.refuses("render - --frames 0-1", "standard input only once")
+        for frames in "0-1", "7":
+            process = self.glint(f"render still.yaml --frames {frames} {RENDER}")
+            self.assertEqual(process.stderr, "glint: warning: 'still.yaml' has no keys: all frames are alike\n")
+        # neither replaced nor removed values count
+        for value in "camera.fov=40", "camera.fov=":
+            write("moving.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0], fov: {keys: {0: 1, x: 2}}}\nobjects: []\n")
+            self.assertIn("has no keys", self.glint(f"render moving.yaml --frames 1 --set {value} {RENDER}").stderr)
 
 
 if __name__ == "__main__":

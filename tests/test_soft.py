@@ -222,9 +222,28 @@ class Soft(TestCase):
         point, command = "point: {position: [0, 5, 0]}", "render soft.yaml --size 8x8 --precision certified -o soft.npy"
         for key, light, message in (("", "{sphere: {center: [0, 5, 0], radius: 1}}", "a light has an area, "),
                                     (", aperture: 1", f"{{{point}}}", "the camera has an 'aperture', "),
-                                    (", height: 1", f"{{{point}}}", "the camera is orthographic, ")):
+                                    (", height: 1", f"{{{point}}}", "the camera has a 'height', ")):
             write("soft.yaml", camera.format(key, light))
             self.refuses(command, f"{message}which has no error bound: choose a precision other than certified")
+            self.refuses("certify soft.yaml --precision strict --size 8x8", "the exact reference has no .*cannot judge this scene")
+        ghost = "materials: {{ghost: {{shadow: false}}}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1{}}}}}]\n"
+        for material, refused in (", material: ghost", True), ("", False):
+            write("soft.yaml", camera.replace("objects: []\n", "").format("", f"{{{point}}}") + ghost.format(material))
+            self.refuses(command, "a material has 'shadow: false', which") if refused else self.glint(command)
+
+    def test_far_focus(self):
+        """A focal plane at infinity is that of the view's directions alone."""
+        text = ("camera: {{position: [0, 0, 10], look_at: [0, 0, 0], fov: 2, aperture: 1e-6{}}}\n"
+                "ambient: 1\nobjects: [{{box: {{min: [0, -90, -1e-6], max: [90, 90, 0]}}}}]\n")
+        near = self.row(text.format(""), (32, 8), "--samples 4")
+        self.assertEqual(self.row(text.format(", focus: 1e30"), (32, 8), "--samples 4"), near)
+        self.assertEqual({0, 1}, set(near))
+
+    def test_far_lights(self):
+        """The squares of distances to the points of a light must be in range."""
+        for light in "sphere: {center: [0, 5, 0], radius: 1e20}", "rectangle: {center: [0, 5, 0], edges: [[1e20, 0, 0], [0, 0, 1]]}":
+            write("soft.yaml", f"camera: {{position: [0, 0, 5], look_at: [0, 0, 0]}}\nlights: [{{{light}}}]\nobjects: []\n")
+            self.refuses("render soft.yaml --size 8x8 -o soft.npy", "a light lies 1e.20 from the eye|a light lies 5e.19 from the eye")
 
 
 if __name__ == "__main__":

@@ -34,7 +34,8 @@ static int variants_close(void **state)
     return probe_close(state);
 }
 
-// Points of areas depend on the pixel, so that a mirrored image has others.
+// Points of areas depend on the pixel, so that a mirrored image has others. Parallel rays need another
+// camera.
 #define SAMPLED_FEATURES (FEATURE_AREA_LIGHTS | FEATURE_LENS | FEATURE_ORTHOGRAPHIC)
 
 // Renders with the settings' features unchanged.
@@ -287,36 +288,45 @@ static void regions_are_cuts_of_the_whole(void **state)
     film_free(&whole);
 }
 
-// The points of areas are those of the pixel and the sample, wherever and whenever they are computed.
-static void points_of_areas_agree(void **state)
+static void check_sampled(const Scene *scene)
 {
-    (void)state;
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     settings.sample_count = 3;
     settings.lanes = 1;
-    Film expected = render(&sampled, &settings);
+    Film expected = render(scene, &settings);
     assert_int_equal(film_count_faulty(&expected), 0);
     for (const uint32_t *lanes = tested_lanes(probe_compute.device); *++lanes;) {
         settings.lanes = *lanes;
-        Film film = render(&sampled, &settings);
+        Film film = render(scene, &settings);
         same_and_freed(&film, &expected, "lanes");
     }
-    Scene large = scene_scaled(&sampled, 0x1p20);
+    Scene large = scene_scaled(scene, 0x1p20);
     Film grown = render(&large, &settings);
     same_and_freed(&grown, &expected, "scaled");
     scene_scaled_free(&large);
     settings.band_rows = 7;
     settings.band_seconds = 1e-9;
-    Film apart = render(&sampled, &settings);
+    Film apart = render(scene, &settings);
     same_and_freed(&apart, &expected, "launches of samples");
     settings.region_x = 13;
     settings.region_y = 5;
     settings.region_width = 31;
     settings.region_height = 21;
-    Film part = render(&sampled, &settings), cut = film_cut(&expected, 13, 5, 31, 21);
+    Film part = render(scene, &settings), cut = film_cut(&expected, 13, 5, 31, 21);
     same_and_freed(&part, &cut, "region");
     film_free(&cut);
     film_free(&expected);
+}
+
+// The points of areas are those of the pixel and the sample, wherever and whenever they are computed.
+static void points_of_areas_agree(void **state)
+{
+    (void)state;
+    check_sampled(&sampled);
+    Scene parallel = sampled;
+    parallel.camera.orthographic = true;
+    parallel.camera.half_tangent = 3;
+    check_sampled(&parallel);
 }
 
 // Hard case R7 (docs/verify.md).

@@ -12,6 +12,7 @@
 #include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
+#include "host/compile/features.h"
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -286,8 +287,23 @@ static int decided_check(const CertifyErrors *certified)
     return EXIT_CHECK;
 }
 
+// Returns what the scene has that the exact reference does not compute, or NULL.
+static const char *reference_lacks(const Scene *scene)
+{
+    const FeatureSet features = features_of(scene);
+    if (features & FEATURE_AREA_LIGHTS) return "lights with an area";
+    if (features & FEATURE_LENS) return "a lens ('aperture')";
+    return features & FEATURE_ORTHOGRAPHIC ? "parallel rays ('height')" : NULL;
+}
+
 static int scene_certify(const CertifyOptions *options, const Scene *scene, OpenDevice *open)
 {
+    const char *lacking = reference_lacks(scene);
+    if (lacking) {
+        fprintf(stderr, "glint certify: the exact reference has no %s, and so cannot judge this scene\n",
+                lacking);
+        return EXIT_USER;
+    }
     Compute *compute = &open->compute;
     const bool is_certified = !options->precisions || options->precisions >> PRECISION_CERTIFIED & 1;
     const char *selector = options->common.reference_device;

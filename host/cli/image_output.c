@@ -11,6 +11,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { NOTE_COUNT_MAX = 24 };
 
@@ -232,18 +233,48 @@ static char *aov_path(const ImageOutputOptions *options, const char *name)
     return text_format("%.*s.%s.npy", (int)(dot - options->path), options->path, name);
 }
 
+// Calls `is_so` for each file of the image until it returns false. Returns whether it never did.
+static bool files_all(const ImageOutputOptions *options, bool (*is_so)(const char *path, void *context),
+                      void *context)
+{
+    bool all = is_so(options->path, context);
+    const bool is_one_file = image_format_of(options->path) == IMAGE_EXR;
+    for (Layer layer = 0; layer < LAYER_COUNT && all && !is_one_file; layer++) {
+        if (!(options->aovs >> layer & 1)) continue;
+        char *path = aov_path(options, layer_names[layer]);
+        all = is_so(path, context);
+        free(path);
+    }
+    return all;
+}
+
+typedef struct {
+    const Scene *scene;
+    const char *path;
+} SceneFile;
+
+static bool file_spares_scene(const char *path, void *context)
+{
+    const SceneFile *file = context;
+    return !output_overwrites_scene(path, file->scene, file->path);
+}
+
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path)
 {
-    bool overwrites = output_overwrites_scene(options->path, scene, scene_path);
-    const bool is_one_file = image_format_of(options->path) == IMAGE_EXR;
-    for (Layer layer = 0; layer < LAYER_COUNT && !overwrites && !is_one_file; layer++) {
-        if (!(options->aovs >> layer & 1)) continue;
-        char *path = aov_path(options, layer_names[layer]);
-        overwrites = output_overwrites_scene(path, scene, scene_path);
-        free(path);
-    }
-    return overwrites;
+    return !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
+}
+
+static bool file_exists(const char *path, void *unused)
+{
+    (void)unused;
+    struct stat status;
+    return stat(path, &status) == 0 && S_ISREG(status.st_mode);
+}
+
+bool image_output_exists(const ImageOutputOptions *options)
+{
+    return files_all(options, file_exists, NULL);
 }
 
 // Returns whether the AOV is written. The shadow masks of a scene without lights are not.

@@ -35,6 +35,9 @@ bool image_output_holds_floats(const char *path);
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path);
 
+// Returns whether all of its files exist.
+bool image_output_exists(const ImageOutputOptions *options);
+
 // Opens the output. Its files are opened with the first band, and their notes name the devices of all
 // renderers. `ranks`, which render parts of the image, may be NULL.
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,

@@ -208,8 +208,9 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start};
-        if (options.frame_count > 1 && !scene.is_animated && options.common.frame == options.first_frame)
+        if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)
             fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options.scene);
+        open->has_warned_of_frames = true;
         open->reference_selector = options.common.reference_device;
         if (render_devices_open(open, &options.common))
             status = scene_render(&options, &scene, open, ranks, &times);
@@ -222,13 +223,13 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
 static char *frame_path_make(const RenderOptions *options, uint32_t frame)
 {
     const char *output = options->output.path;
-    if (output) {
-        const FramePlace place = frame_place_of(output);
-        if (!place.start) return memory_copy_text(output);
+    const FramePlace place = output ? frame_place_of(output) : (FramePlace){0};
+    if (place.start)
         return text_format("%.*s%0*u%s", (int)(place.start - output), output, place.digits, frame, place.end);
-    }
+    if (output && !output_is_folder(output)) return memory_copy_text(output);
     char *name = image_output_default_path(options->scenes[0]);
-    char *path = text_format("%.*s-%04u.png", (int)(strlen(name) - strlen(".png")), name, frame);
+    char *path = text_format("%s%s%.*s-%04u.png", output ? output : "", output ? "/" : "",
+                             (int)(strlen(name) - strlen(".png")), name, frame);
     free(name);
     return path;
 }
@@ -306,7 +307,7 @@ bool render_command_spares_scenes(RenderCommand *command)
 {
     const RenderOptions *options = &command->options;
     bool image_exists = false;
-    for (size_t i = 0; i < options->scene_count && options->scene_count > 1; i++)
+    for (size_t i = 0; i < options->scene_count && options->scene_count > 1 && !options->skips_existing; i++)
         image_exists = image_exists || access(command->paths[i], F_OK) == 0;
     for (size_t i = 0; i < options->scene_count && image_exists; i++) {
         const bool can_read_twice = strcmp(options->scenes[i], "-") != 0;
@@ -344,13 +345,23 @@ bool render_command_open_devices(RenderCommand *command)
     return render_devices_open(&command->open, &command->options.common);
 }
 
+// Returns whether all files of an image exist, and prints the image's name if so.
+static bool image_exists(const RenderOptions *options, const char *path)
+{
+    ImageOutputOptions output = options->output;
+    output.path = path;
+    if (!image_output_exists(&output)) return false;
+    if (!options->quiet) fprintf(stderr, "glint: kept %s\n", path);
+    return true;
+}
+
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
 {
     RenderDevices *open = &command->open;
     RenderOptions *options = &command->options;
     options->scene = render_command_scene(command, index);
     if (options->frame_count > 0) options->common.frame = options->first_frame + (double)index;
-    if (options->skips_existing && access(command->paths[index], F_OK) == 0) return EXIT_DONE;
+    if (options->skips_existing && image_exists(options, command->paths[index])) return EXIT_DONE;
     render_devices_rest(open);
     progress_end_at_once(); // nothing checks the flag while a scene is read
     if (progress_interrupted()) return EXIT_INTERRUPTED;

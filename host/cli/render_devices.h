@@ -11,7 +11,8 @@ typedef struct {
     bool is_single;                 // opens only one of the listed devices, by devices_open_one
     size_t number;                  // the number of that device
     const char *reference_selector; // NULL if not given
-    bool is_unfit;                  // whether the last image's settings or scene did not fit a device
+    bool has_warned_of_frames;
+    bool is_unfit; // whether the last image's settings or scene did not fit a device
 } RenderDevices;
 
 // Opens the devices that the options select and applies --work-group and --build-options. Returns true if

@@ -81,9 +81,10 @@ static const char help_text[] =
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command resumes where an earlier one ended\n"
-                    "      --frames A[-B]    of an animation; -o has a place for the number (default: "
-                    "NAME-%04d.png)\n"
-                    "      --skip-existing   render only images that do not exist\n"
+                    "      --frames A[-B]    render these frames of an animation; -o has %d or %04d for the "
+                    "number\n"
+                    "                        (default: NAME-%04d.png)\n"
+                    "      --skip-existing   leave out images that exist\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
 
@@ -136,16 +137,13 @@ static bool frames_read(const char *value, RenderOptions *options)
 
 FramePlace frame_place_of(const char *pattern)
 {
-    const char *slash = strrchr(pattern, '/');
-    const char *start = strchr(slash ? slash + 1 : pattern, '%');
-    if (!start) return (FramePlace){0};
-    const char *end = start + 1;
-    int digits = 0;
-    if (*end == '0' && end[1] >= '1' && end[1] <= '9') {
-        digits = end[1] - '0';
-        end += 2;
+    const char *slash = strrchr(pattern, '/'), *name = slash ? slash + 1 : pattern;
+    for (const char *start = name; (start = strchr(start, '%')) != NULL; start++) {
+        const bool has_digits = start[1] == '0' && start[2] >= '1' && start[2] <= '9';
+        const char *end = start + (has_digits ? 3 : 1);
+        if (*end == 'd') return (FramePlace){start, end + 1, has_digits ? start[2] - '0' : 0};
     }
-    return *end == 'd' ? (FramePlace){start, end + 1, digits} : (FramePlace){0};
+    return (FramePlace){0};
 }
 
 static bool exposure_read(const char *value, double *exposure)
@@ -232,7 +230,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     }
 }
 
-static bool is_folder(const char *path)
+bool output_is_folder(const char *path)
 {
     struct stat status;
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
@@ -243,6 +241,7 @@ static bool several_fit(const RenderOptions *options)
 {
     const char *const path = options->output.path;
     const bool has_scenes = options->scene_count > 1;
+    const FramePlace place = path ? frame_place_of(path) : (FramePlace){0};
     if (options->frame_count > 0 && has_scenes)
         option_usage_fault("render", "--frames takes one scene, but several are given");
     else if (options->checkpoint)
@@ -252,11 +251,15 @@ static bool several_fit(const RenderOptions *options)
     else if (options->timing == TIMING_JSON)
         option_usage_fault("render", has_scenes ? "--timing=json takes one scene, but several are given"
                                                 : "--timing=json takes one frame, but several are given");
-    else if (has_scenes && path && !is_folder(path))
+    else if (has_scenes && path && !output_is_folder(path))
         option_usage_fault("render", "--output of several scenes must be a folder");
-    else if (!has_scenes && path && !frame_place_of(path).start)
-        option_usage_fault("render", "--output of several frames needs a place for the number, such as "
-                                     "image-%04d.png");
+    else if (!has_scenes && strcmp(options->scenes[0], "-") == 0)
+        option_usage_fault("render", "--frames reads its scene for each frame, but standard input only once");
+    else if (!has_scenes && path && !place.start && !output_is_folder(path))
+        option_usage_fault("render", "--output of several frames must be a folder, or have a place for the "
+                                     "number, such as image-%04d.png");
+    else if (!has_scenes && place.start && frame_place_of(place.end).start)
+        option_usage_fault("render", "--output has more than one place for the frame's number");
     else
         return true;
     return false;
@@ -282,6 +285,8 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
                                   "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
     if (!display_fits(&options->output)) return EXIT_USER;
+    if (options->skips_existing && options->timing == TIMING_JSON)
+        return option_usage_fault("render", "--skip-existing may leave --timing=json nothing to report");
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
     const bool is_one = options->scene_count == 1 && options->frame_count <= 1;

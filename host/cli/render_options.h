@@ -30,8 +30,11 @@ typedef struct {
     int digits;
 } FramePlace;
 
-// Finds the directive in the name of a file, not in those of its folders.
+// Finds the first directive in the name of a file, not in those of its folders.
 FramePlace frame_place_of(const char *pattern);
+
+// Returns whether the output is a folder, for several images.
+bool output_is_folder(const char *path);
 
 // Sets the settings for one scene. Chooses the size and region if the options leave them open. Returns false
 // with a message if the options do not fit the scene.

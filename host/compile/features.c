@@ -24,7 +24,7 @@ static FeatureSet material_features(const Material *material)
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
     // which includes reflected rays: total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
-    // which has shadow rays that pass
+    // shadow rays must pass through it
     if (material->shadow == SHADOW_NONE) set |= FEATURE_TRANSMISSION;
     if (material->transmission > 0 && !vector_is_zero(material->absorption))
         set |= FEATURE_ABSORPTION | FEATURE_TINTS;
@@ -37,24 +37,31 @@ static FeatureSet material_features(const Material *material)
     return set;
 }
 
-FeatureSet features_of(const Scene *scene)
+FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
 {
     FeatureSet set = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        set |= shape_features[shape_ops[object->kind]->kind] |
-               material_features(&scene->materials.items[object->material]);
+        set |= of(&scene->materials.items[object->material]);
         if (object->kind != SHAPE_MESH) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         for (size_t k = 0; mesh->materials && k < mesh->triangle_count; k++)
-            set |= material_features(&scene->materials.items[mesh->materials[k]]);
+            set |= of(&scene->materials.items[mesh->materials[k]]);
     }
-    for (size_t i = 0; i < scene->lights.count; i++)
-        set |= light_features[scene->lights.items[i].kind];
-    for (size_t i = 0; i < scene->lights.count; i++)
-        if (light_fades(&scene->lights.items[i])) set |= FEATURE_FADING_LIGHTS;
-    for (size_t i = 0; i < scene->lights.count; i++)
-        if (scene->lights.items[i].area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
+    return set;
+}
+
+FeatureSet features_of(const Scene *scene)
+{
+    FeatureSet set = materials_union(scene, material_features);
+    for (size_t i = 0; i < scene->objects.count; i++)
+        set |= shape_features[shape_ops[scene->objects.items[i].kind]->kind];
+    for (size_t i = 0; i < scene->lights.count; i++) {
+        const Light *light = &scene->lights.items[i];
+        set |= light_features[light->kind];
+        if (light_fades(light)) set |= FEATURE_FADING_LIGHTS;
+        if (light->area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
+    }
     if (scene->camera.lens_radius > 0) set |= FEATURE_LENS;
     if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;
     if (scene->sky.texture > 0) set |= FEATURE_IMAGES;

@@ -19,4 +19,7 @@ enum { FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (1u << FEATURE_COUNT) - 1 };
 extern const char *const feature_names[FEATURE_COUNT]; // "SPHERES", …
 
 FeatureSet features_of(const Scene *scene);
+
+// Returns the union of a set for each material that an object has.
+FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material));
 void features_write_prelude(Text *text, FeatureSet set); // `#define HAS_SPHERES 1` … one for each feature

@@ -27,7 +27,8 @@ static double first_rival(const CompiledScene *compiled, const CompileSettings *
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
-    const double lens_radius = scene->camera.lens_radius;
+    const double focal_distance = camera_focal_distance(&scene->camera),
+                 lens_radius = focal_distance > 0 ? scene->camera.lens_radius : 0;
     const double sample_width = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count);
     const bool has_sky = !vector_is_zero(scene->sky.up);
     const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
@@ -47,7 +48,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .right = scalar4_of(basis.right, 0),
         .up = scalar4_of(basis.up, 0),
         .lens_right = scalar4_of(vector_scale(vector_normalize(basis.right), lens_radius),
-                                 lens_radius > 0 ? scene->camera.focal_distance : 0),
+                                 focal_distance > 0 ? 1 / focal_distance : 0),
         .lens_up = scalar4_of(vector_scale(vector_normalize(basis.up), lens_radius),
                               scene->camera.orthographic ? 1 : 0),
         .bounds = center_and_half_extent(&compiled->bvh_bounds),

@@ -63,6 +63,11 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
         names[0], farthest.size, names[1], smallest.size, precision_names[settings->precision]);
 }
 
+static FeatureSet material_shadow(const Material *material)
+{
+    return material->shadow == SHADOW_NONE;
+}
+
 bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages)
 {
     static const struct {
@@ -73,18 +78,17 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_ABSORPTION, "a material has 'absorption'"},
         {FEATURE_AREA_LIGHTS, "a light has an area"},
         {FEATURE_LENS, "the camera has an 'aperture'"},
-        {FEATURE_ORTHOGRAPHIC, "the camera is orthographic"},
+        {FEATURE_ORTHOGRAPHIC, "the camera has a 'height'"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;
-    for (size_t i = 0; i < scene->materials.count && settings->certifies; i++)
-        if (scene->materials.items[i].shadow == SHADOW_NONE)
-            return message_error(messages, "a material casts no shadow, which has no error bound: choose a "
-                                           "precision other than certified");
     for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)
         if (features & unbounded[i].feature)
             return message_error(messages,
                                  "%s, which has no error bound: choose a precision other than certified",
                                  unbounded[i].text);
+    if (settings->certifies && materials_union(scene, material_shadow))
+        return message_error(messages, "a material has 'shadow: false', which has no error bound: choose a "
+                                       "precision other than certified");
     return true;
 }
 
@@ -96,7 +100,8 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
     if (settings->precision == PRECISION_DOUBLE) return true;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
-        double distance = vector_largest(vector_subtract(light->position, eye));
+        const double distance = vector_largest(vector_subtract(light->position, eye)) + light->radius +
+                                vector_largest(light->across[0]) + vector_largest(light->across[1]);
         if (light->kind == LIGHT_DIRECTIONAL || distance <= farthest) continue;
         return message_error(
             messages,

@@ -12,6 +12,7 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     change(&scene->camera.position, factor);
     change(&scene->camera.look_at, factor);
     change(&scene->camera.up, factor);
+    change(&scene->camera.focus, factor);
     change(&scene->sky.up, factor);
     change(&scene->sky.forward, factor);
     for (size_t i = 0; i < scene->lights.count; i++) {

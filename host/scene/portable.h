@@ -4,6 +4,7 @@
 #pragma once
 
 #include "host/scene/quad.h"
+#include "host/scene/vector.h"
 
 static inline double portable_sine(double angle)
 {
@@ -18,6 +19,15 @@ static inline double portable_cosine(double angle)
 static inline double portable_tangent(double angle)
 {
     return (double)QUAD_CALL(tan)((Quad)angle);
+}
+
+// Returns a vector turned about a unit axis by an angle in radians, right-handed (Rodrigues, 1840).
+static inline Vector3 vector_rotated(Vector3 v, Vector3 axis, double angle)
+{
+    const double cosine = portable_cosine(angle);
+    const Vector3 along = vector_scale(axis, vector_dot(axis, v) * (1 - cosine));
+    const Vector3 across = vector_scale(vector_cross(axis, v), portable_sine(angle));
+    return vector_add(vector_add(vector_scale(v, cosine), across), along);
 }
 
 static inline double portable_log2(double value)

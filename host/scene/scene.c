@@ -4,6 +4,7 @@
 #include "host/scene/mesh.h"
 #include "host/scene/portable.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -94,6 +95,15 @@ void scene_add_object(Scene *scene, Object object, const Material *material)
 {
     object.material = scene_add_material(scene, material, "");
     array_push(scene->objects, object);
+}
+
+double camera_focal_distance(const Camera *camera)
+{
+    if (camera->lens_radius == 0) return 0;
+    if (camera->focal_distance > 0) return camera->focal_distance;
+    const Vector3 view = vector_subtract(camera->look_at, camera->position);
+    const Vector3 to_focus = camera->has_focus ? vector_subtract(camera->focus, camera->position) : view;
+    return fmax(vector_dot(to_focus, vector_normalize(view)), 0);
 }
 
 double material_passing(const Material *material)

@@ -21,8 +21,12 @@ typedef struct {
     double half_tangent;
     double frame_aspect; // width over height of the frame, or 0 where the file gives none
     bool orthographic;   // rays are parallel to the view
-    // 0: all distances are in focus. With a lens the plane across the view at focal_distance > 0 is.
-    double lens_radius, focal_distance;
+    // With a lens the plane across the view at focal_distance is in focus or, if that is 0, the one through
+    // `focus`, or through look_at.
+    double lens_radius; // 0: no lens
+    double focal_distance;
+    bool has_focus;
+    Vector3 focus;
 } Camera;
 
 typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
@@ -41,7 +45,7 @@ typedef struct {
     // From the center of a rectangle or an ellipse to the middles of two sides; for a directional light
     // across `direction`, and relative to its length.
     Vector3 across[2];
-    double radius;   // of a sphere
+    double radius;   // of a sphere or a disc
     bool is_visible; // the area is an object that shows `color` and casts no shadow
     // point, spot: unless the latter two are 0, the strength is divided by fading[0] + fading[1] d +
     // fading[2] d^2 at the distance d
@@ -231,13 +235,17 @@ typedef struct {
     Text text;          // what was read from it: for messages about them, see scene_source
     uint64_t text_hash; // of the file's bytes and the overrides; hash_bytes
     Source *overrides;  // what replaced values of the file, PATH=VALUE each, in order; NULL if none
-    bool is_animated;   // values depend on
-    double frame;       // the frame, which the options named
+    bool is_animated;   // values depend on the frame
+    double frame;       // that the options named
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;
 
 void scene_free(Scene *scene); // and zeroes
+
+// Returns the distance along the view that is in focus, above 0. Without a lens, or if the point in focus
+// lies behind it, returns 0: all distances are.
+double camera_focal_distance(const Camera *camera);
 
 // Returns the part of the light that a surface lets through to what it shadows.
 double material_passing(const Material *material);

@@ -1,5 +1,6 @@
 #include "host/view/camera_file.h"
 
+#include "host/import/yaml/animation.h"
 #include "host/import/yaml/yaml.h"
 #include "host/view/camera_yaml.h"
 #include <string.h>
@@ -16,6 +17,20 @@ static void camera_file_free(CameraFile *file)
     scene_free(&file->scene);
 }
 
+// Reports an error and returns false if a value of the camera has keys.
+static bool camera_is_constant(CameraFile *file)
+{
+    YamlReader *reader = &file->reader;
+    const YamlNode *key = file->camera->kind == YAML_MAPPING ? yaml_first(&reader->tree, file->camera) : NULL;
+    for (const YamlNode *value; key; key = yaml_next(&reader->tree, value)) {
+        value = yaml_next(&reader->tree, key);
+        if (yaml_has_keys(reader, value))
+            return report_error(&reader->report, value->offset,
+                                "the camera cannot be written: it is animated");
+    }
+    return true;
+}
+
 static bool camera_file_read(CameraFile *file, const Source *source, MessageList *messages)
 {
     *file = (CameraFile){.reader.report = report_open(source, messages)};
@@ -26,7 +41,7 @@ static bool camera_file_read(CameraFile *file, const Source *source, MessageList
         file->camera = root->kind == YAML_MAPPING ? field_node(reader, root, "camera") : root;
         if (file->camera == root)
             report_error(&reader->report, root->offset, "the scene has no camera");
-        else
+        else if (camera_is_constant(file))
             yaml_read_camera(reader, file->camera);
     }
     if (report_close(&reader->report)) return true;
@@ -70,9 +85,13 @@ static void up_insert(Copy *copy, const CameraFile *file, const YamlNode *key, V
         text_appendf(copy->text, "\n%*s", (int)indentation(copy->source, offset), "");
 }
 
-// Whether the value of a key has changed and must be written.
-static bool vector_changed(const char *key, const Camera *old, const Camera *camera, Vector3 *value)
+// Writes the new value of a key. Returns false if it has not changed. Where the camera turned, the new
+// position has turned.
+static bool value_write(Text *text, const char *key, const Camera *old, const Camera *camera, bool has_turn)
 {
+    const bool is_moved = !vectors_equal(old->position, camera->position) ||
+                          !vectors_equal(old->look_at, camera->look_at) ||
+                          !vectors_equal(old->up, camera->up);
     const struct {
         const char *name;
         Vector3 old, new;
@@ -81,17 +100,29 @@ static bool vector_changed(const char *key, const Camera *old, const Camera *cam
                    {"up", old->up, camera->up}};
     for (size_t i = 0; i < sizeof members / sizeof *members; i++)
         if (strcmp(key, members[i].name) == 0) {
-            *value = members[i].new;
-            return !vectors_equal(members[i].old, members[i].new);
+            if (vectors_equal(members[i].old, members[i].new) && !(i == 0 && is_moved && has_turn))
+                return false;
+            vector_write_yaml(text, members[i].new);
+            return true;
         }
-    return false;
+    if (is_moved && strcmp(key, "turn") == 0) {
+        number_write_yaml(text, 0);
+        return true;
+    }
+    if (strcmp(key, "height") != 0 || old->half_tangent == camera->half_tangent) return false;
+    number_write_yaml(text, 2 * camera->half_tangent);
+    return true;
 }
 
 static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera)
 {
     YamlReader *reader = &file->reader;
+    if (camera->lens_radius > 0 && camera_focal_distance(camera) == 0)
+        return report_error(&reader->report, file->camera->offset,
+                            "the camera cannot be written: 'focus' lies behind it");
     const Camera *old = &file->scene.camera;
     const bool has_up = field_node(reader, file->camera, "up") != file->camera;
+    const bool has_turn = field_node(reader, file->camera, "turn") != file->camera;
     bool lacks_up = !has_up && !vectors_equal(old->up, camera->up);
     for (const YamlNode *key = yaml_first(&reader->tree, file->camera), *value; key;
          key = yaml_next(&reader->tree, value)) {
@@ -101,10 +132,11 @@ static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera)
                                 "the camera cannot be written: it has an alias");
         if (lacks_up) up_insert(copy, file, key, camera->up);
         lacks_up = false;
-        Vector3 changed;
-        if (!vector_changed(yaml_text(&reader->tree, key), old, camera, &changed)) continue;
+        Text written = {0};
+        if (!value_write(&written, yaml_text(&reader->tree, key), old, camera, has_turn)) continue;
         copy_until(copy, value->offset);
-        vector_write_yaml(copy->text, changed);
+        text_append(copy->text, written.items, written.count);
+        text_free(&written);
         copy->next = value->end;
     }
     copy_until(copy, copy->source->length);

@@ -1,6 +1,7 @@
 #include "host/view/camera_moves.h"
 
 #include "host/compile/camera_basis.h"
+#include "host/scene/portable.h"
 
 static const double POLE_ANGLE = M_PI / 180; // between the view and `up`, at least
 
@@ -10,28 +11,22 @@ static void camera_shift(Camera *camera, Vector3 by)
     camera->look_at = vector_add(camera->look_at, by);
 }
 
-Vector3 camera_ray(const Camera *camera, ImageSize size, double x, double y)
+CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y)
 {
     CameraBasis basis = camera_basis(camera, size.width, size.height);
     Vector3 right = vector_scale(basis.right, 2 * x + 1 - size.width);
     Vector3 up = vector_scale(basis.up, size.height - 1 - 2 * y);
-    return vector_normalize(vector_add(basis.forward, vector_add(right, up)));
-}
-
-// About a unit axis, right-handed (Rodrigues).
-static Vector3 rotated(Vector3 v, Vector3 axis, double angle)
-{
-    Vector3 along = vector_scale(axis, vector_dot(axis, v) * (1 - cos(angle)));
-    Vector3 across = vector_scale(vector_cross(axis, v), sin(angle));
-    return vector_add(vector_add(vector_scale(v, cos(angle)), across), along);
+    Vector3 across = vector_add(right, up);
+    if (camera->orthographic) return (CameraRay){vector_add(camera->position, across), basis.forward};
+    return (CameraRay){camera->position, vector_normalize(vector_add(basis.forward, across))};
 }
 
 static void camera_rotate(Camera *camera, Vector3 pivot, Vector3 axis, double angle)
 {
     Vector3 position = vector_subtract(camera->position, pivot);
     Vector3 look_at = vector_subtract(camera->look_at, pivot);
-    camera->position = vector_add(pivot, rotated(position, axis, angle));
-    camera->look_at = vector_add(pivot, rotated(look_at, axis, angle));
+    camera->position = vector_add(pivot, vector_rotated(position, axis, angle));
+    camera->look_at = vector_add(pivot, vector_rotated(look_at, axis, angle));
 }
 
 // A camera without a usable `up` gets the one that its image has.
@@ -56,7 +51,8 @@ void camera_orbit(Camera *camera, Vector3 pivot, double yaw, double pitch)
 void camera_pan(Camera *camera, ImageSize size, double distance, const double from[2], const double to[2])
 {
     CameraBasis basis = camera_basis(camera, size.width, size.height);
-    double depth = distance * vector_dot(basis.forward, camera_ray(camera, size, from[0], from[1]));
+    Vector3 ray = camera_ray(camera, size, from[0], from[1]).direction;
+    double depth = camera->orthographic ? 1 : distance * vector_dot(basis.forward, ray);
     Vector3 right = vector_scale(basis.right, 2 * depth * (from[0] - to[0]));
     Vector3 up = vector_scale(basis.up, 2 * depth * (to[1] - from[1]));
     camera_shift(camera, vector_add(right, up));
@@ -64,6 +60,14 @@ void camera_pan(Camera *camera, ImageSize size, double distance, const double fr
 
 void camera_dolly(Camera *camera, Vector3 pivot, double factor)
 {
+    if (camera->orthographic) {
+        Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position));
+        Vector3 to_pivot = vector_subtract(pivot, camera->position);
+        Vector3 across = vector_subtract(to_pivot, vector_scale(forward, vector_dot(to_pivot, forward)));
+        camera->half_tangent *= factor;
+        camera_shift(camera, vector_scale(across, 1 - factor));
+        return;
+    }
     camera_shift(camera, vector_scale(vector_subtract(pivot, camera->position), 1 - factor));
 }
 

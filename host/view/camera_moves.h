@@ -8,8 +8,12 @@ typedef struct {
     uint32_t width, height;
 } ImageSize;
 
-// Unit direction of the ray through a pixel's center.
-Vector3 camera_ray(const Camera *camera, ImageSize size, double x, double y);
+typedef struct {
+    Vector3 origin, direction; // unit
+} CameraRay;
+
+// Returns the ray through a pixel's center, from the lens' center.
+CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y);
 
 // Turns the camera about a point, which stays where it is in the image: about `up`, then about the image's
 // horizontal axis. Positive angles turn the view to the left and up. The view does not turn over: it stays a
@@ -19,7 +23,8 @@ void camera_orbit(Camera *camera, Vector3 pivot, double yaw, double pitch);
 // Moves sideways so that a point `distance` along the ray through one pixel is seen in another.
 void camera_pan(Camera *camera, ImageSize size, double distance, const double from[2], const double to[2]);
 
-// Moves towards a point, to `factor` of the distance to it; it stays where it is in the image.
+// Moves towards a point, to `factor` of the distance to it; it stays where it is in the image. With parallel
+// rays the image shows `factor` of what it showed.
 void camera_dolly(Camera *camera, Vector3 pivot, double factor);
 
 // Moves along the view, to the right and up.

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 
 // The fewest digits that read back as the same number.
-static void number_write(Text *text, double value)
+void number_write_yaml(Text *text, double value)
 {
     char word[32];
     int digits = 6; // fewer would give 5e+01
@@ -18,11 +18,11 @@ static void number_write(Text *text, double value)
 void vector_write_yaml(Text *text, Vector3 v)
 {
     text_appendf(text, "[");
-    number_write(text, v.x);
+    number_write_yaml(text, v.x);
     text_appendf(text, ", ");
-    number_write(text, v.y);
+    number_write_yaml(text, v.y);
     text_appendf(text, ", ");
-    number_write(text, v.z);
+    number_write_yaml(text, v.z);
     text_appendf(text, "]");
 }
 
@@ -67,23 +67,27 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
     vector_write(text, "up", camera->up);
     if (camera->lens_radius > 0) {
         text_appendf(text, "aperture: ");
-        number_write(text, 2 * camera->lens_radius);
-        text_appendf(text, ", focus: ");
-        number_write(text, camera->focal_distance);
+        number_write_yaml(text, 2 * camera->lens_radius);
+        text_appendf(text, ", ");
+        if (camera->has_focus) vector_write(text, "focus", camera->focus);
+    }
+    if (camera->lens_radius > 0 && camera->focal_distance > 0) {
+        text_appendf(text, "focus: ");
+        number_write_yaml(text, camera->focal_distance);
         text_appendf(text, ", ");
     }
     if (camera->orthographic) {
         text_appendf(text, "height: ");
-        number_write(text, 2 * camera->half_tangent);
+        number_write_yaml(text, 2 * camera->half_tangent);
     } else if (camera->field_axis == FIELD_VERTICAL) {
         text_appendf(text, "fov: ");
-        number_write(text, field_of_view(camera->half_tangent));
+        number_write_yaml(text, field_of_view(camera->half_tangent));
     } else {
         double width = 2 * camera->half_tangent;
         text_appendf(text, "focal_length: 1, frame: [");
-        number_write(text, width);
+        number_write_yaml(text, width);
         text_appendf(text, ", ");
-        number_write(text, width / aspect);
+        number_write_yaml(text, width / aspect);
         text_appendf(text, "]");
     }
     text_appendf(text, "}\n");

@@ -4,7 +4,9 @@
 #include "host/base/text.h"
 #include "host/scene/scene.h"
 
-// A list of three numbers, of the fewest digits that read back as the same.
+// Writes a number with the fewest digits that read back as the same.
+void number_write_yaml(Text *text, double value);
+// Writes a list of three such numbers.
 void vector_write_yaml(Text *text, Vector3 v);
 
 // One line, `camera: {…}`, from which the reader gets the same camera bit for bit; but for an angle of view

@@ -82,8 +82,10 @@ static void branch_write(Tree *tree, const Branch *branch)
 char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y)
 {
     Tree tree = {.view = view};
-    const Vector3 ray = camera_ray(&view->scene->camera, view->size, x, y);
-    const double eye[3] = {0}, direction[3] = {ray.x, ray.y, ray.z}; // the eye is the origin
+    const CameraRay ray = camera_ray(&view->scene->camera, view->size, x, y);
+    const Vector3 origin = vector_subtract(ray.origin, view->scene->camera.position); // as seen from the eye
+    const double eye[3] = {origin.x, origin.y, origin.z},
+                 direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
     const Branch first = {NULL, 1, 0, ray_from(eye, direction)};
     text_appendf(&tree.text, "pixel %u,%u: ", x, y);
     branch_write(&tree, &first);

@@ -38,8 +38,8 @@ static void pivot_pick(Window *window, const double at[2])
     double distance = distance_known(window, at);
     if (distance <= 0 && memcmp(at, window->pivot_at, sizeof window->pivot_at) == 0) return;
     if (distance <= 0) distance = target_distance(window);
-    Vector3 ray = camera_ray(&window->camera, window->size, at[0], at[1]);
-    window->pivot = vector_add(window->camera.position, vector_scale(ray, distance));
+    const CameraRay ray = camera_ray(&window->camera, window->size, at[0], at[1]);
+    window->pivot = vector_add(ray.origin, vector_scale(ray.direction, distance));
     memcpy(window->pivot_at, at, sizeof window->pivot_at);
 }
 

@@ -41,9 +41,11 @@ static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
     if (IS_CERTIFIED) {
         hit->doubt = traversal->hit.doubt;
         hit->color_error = (real)(0);
-        if (HAS_SKY)
-            hit->color_error =
+        if (HAS_SKY) {
+            real error =
                 (real)(scene->header->sky_up.w) * (ray->direction_error + (real)(16 * UNIT_ROUNDOFF));
+            hit->color_error = lanes_select(surface_found(&hit->surface), (real)(0), error);
+        }
     }
     mask found = surface_found(&hit->surface);
     if (!lanes_any(found)) return false;

@@ -43,8 +43,8 @@ static inline Vector light_area_offset(const Light *light, uint index, const Sur
     if (light->kind.y != LIGHT_AREA_SPHERE)
         return vector_fma(vector_of(light->across_u), point.x,
                           vector_scale(vector_of(light->across_v), point.y));
-    // Neighboring directions have neighboring bases, or a pixel's samples would not complement each other:
-    // only at this axis, along which no scene is built, the basis is not continuous.
+    // Where the basis jumps, a pixel's samples do not complement each other. This one jumps only where a
+    // surface lies exactly along the axis, which is that of no coordinate.
     const Vector axis = {(real)(0.37f), (real)(0.48f), (real)(0.79f)};
     Vector toward = vector_normalize(vector_subtract(surface->position, vector_of(light->position)));
     Vector u = vector_normalize(vector_cross(toward, axis)), v = vector_cross(toward, u);

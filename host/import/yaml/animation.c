@@ -1,5 +1,6 @@
 #include "host/import/yaml/animation.h"
 #include "host/base/array.h"
+#include "host/base/memory.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -32,20 +33,19 @@ static bool node_number(const YamlReader *reader, const YamlNode *node, double *
     return number_read(text, strlen(text), value) == NUMBER_READ;
 }
 
-// Returns the mapping of frames, or NULL if the node is not animated. A material may be called `keys`, but
-// its own keys are not numbers.
-static const YamlNode *frames_of(const YamlReader *reader, const YamlNode *node)
+// A material may be called `keys`, but its own keys are not numbers.
+bool yaml_has_keys(const YamlReader *reader, const YamlNode *node)
 {
     const YamlTree *tree = &reader->tree;
-    if (node->kind != YAML_MAPPING || node->child_count > 4) return NULL;
+    if (node->kind != YAML_MAPPING) return false;
     for (const YamlNode *key = yaml_first(tree, node); key; key = yaml_next(tree, yaml_next(tree, key))) {
         if (key->kind != YAML_SCALAR || strcmp(yaml_text(tree, key), "keys") != 0) continue;
         const YamlNode *frames = yaml_next(tree, key);
         const YamlNode *first = frames->kind == YAML_MAPPING ? yaml_first(tree, frames) : NULL;
         double frame;
-        return first && node_number(reader, first, &frame) ? frames : NULL;
+        return first && node_number(reader, first, &frame);
     }
-    return NULL;
+    return false;
 }
 
 // Returns whether two values are numbers, or lists of as many numbers.
@@ -62,8 +62,10 @@ static bool values_match(YamlReader *reader, const YamlNode *a, const YamlNode *
             match = node_number(reader, child, &number);
     }
     return match ||
-           report_error(&reader->report, b->offset,
-                        "the values of 'keys' must be numbers, or lists of as many, at most %d", NUMBERS_MAX);
+           report_error(
+               &reader->report, b->offset,
+               "all values of 'keys' must be numbers, or lists of the same number of numbers, at most %d",
+               NUMBERS_MAX);
 }
 
 // Reads the keys, which the caller frees.
@@ -74,10 +76,11 @@ static bool keys_read(YamlReader *reader, const YamlNode *frames, Keys *keys)
     for (const YamlNode *name = yaml_first(tree, frames); name;) {
         const YamlNode *value = yaml_next(tree, name);
         Key key = {.node = (uint32_t)(value - tree->nodes.items)};
-        if (!node_number(reader, name, &key.frame))
-            return report_error(&reader->report, name->offset, "expected the number of a frame");
+        if (!node_number(reader, name, &key.frame)) return expected_report(reader, "frame", "a number", name);
         if (keys->count > 0 && key.frame <= keys->items[keys->count - 1].frame)
-            return report_error(&reader->report, name->offset, "frames must ascend");
+            return report_error(&reader->report, name->offset,
+                                "frame %g must be greater than frame %g before it", key.frame,
+                                keys->items[keys->count - 1].frame);
         if (++reader->key_count > KEYS_MAX)
             return report_error(&reader->report, name->offset, "more than %d keys", KEYS_MAX);
         if (!values_match(reader, before ? before : value, value)) return false;
@@ -88,22 +91,19 @@ static bool keys_read(YamlReader *reader, const YamlNode *frames, Keys *keys)
     return true;
 }
 
-static bool ease_read(YamlReader *reader, const YamlNode *node, Ease *ease)
+typedef struct {
+    const YamlNode *keys;
+    Ease ease;
+} Animation;
+
+static bool read_ease(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    const YamlTree *tree = &reader->tree;
-    *ease = EASE_LINEAR;
-    for (const YamlNode *key = yaml_first(tree, node); key; key = yaml_next(tree, yaml_next(tree, key))) {
-        const YamlNode *value = yaml_next(tree, key);
-        if (key->kind == YAML_SCALAR && strcmp(yaml_text(tree, key), "keys") == 0) continue;
-        if (key->kind != YAML_SCALAR || strcmp(yaml_text(tree, key), "ease") != 0)
-            return report_error(&reader->report, key->offset, "beside 'keys' there may be 'ease' only");
-        size_t i = 0;
-        while (i < EASE_COUNT &&
-               (value->kind != YAML_SCALAR || strcmp(yaml_text(tree, value), ease_names[i]) != 0))
-            i++;
-        if (i == EASE_COUNT) return expected_report(reader, "ease", "linear, smooth or step", value);
-        *ease = (Ease)i;
-    }
+    size_t i = 0;
+    while (i < EASE_COUNT &&
+           (node->kind != YAML_SCALAR || strcmp(yaml_text(&reader->tree, node), ease_names[i]) != 0))
+        i++;
+    if (i == EASE_COUNT) return expected_report(reader, field->name, "linear, smooth or step", node);
+    *(Ease *)target = (Ease)i;
     return true;
 }
 
@@ -156,13 +156,19 @@ static uint32_t keys_value(YamlReader *reader, const Keys *keys, Ease ease, doub
     return value_between(reader, before->node, before[1].node, part);
 }
 
-static bool node_animate(YamlReader *reader, uint32_t index, const YamlNode *frames)
+static bool value_animate(YamlReader *reader, uint32_t index)
 {
+    static const Field fields[] = {
+        {"keys", read_node, offsetof(Animation, keys), FORM_ANY, REQUIRED, NULL},
+        {"ease", read_ease, offsetof(Animation, ease), FORM_ANY, OPTIONAL, NULL},
+    };
     Keys keys = {0};
-    Ease ease;
-    const bool is_read = keys_read(reader, frames, &keys) && ease_read(reader, node_at(reader, index), &ease);
+    Animation animation = {.ease = EASE_LINEAR};
+    const bool is_read = fields_read(reader, node_at(reader, index), "animation", fields, COUNT_OF(fields),
+                                     &animation, NULL) &&
+                         keys_read(reader, animation.keys, &keys);
     if (is_read) {
-        YamlNode value = *node_at(reader, keys_value(reader, &keys, ease, reader->options->frame));
+        YamlNode value = *node_at(reader, keys_value(reader, &keys, animation.ease, reader->options->frame));
         value.next = node_at(reader, index)->next;
         reader->tree.nodes.items[index] = value;
         reader->scene->is_animated = true;
@@ -172,13 +178,27 @@ static bool node_animate(YamlReader *reader, uint32_t index, const YamlNode *fra
     return is_read;
 }
 
+// Animates the values in a node. `visited` has a bit for each node, which is set where aliases may share
+// children, or is NULL.
+static bool node_animate(YamlReader *reader, uint32_t index, uint8_t *visited)
+{
+    if (yaml_has_keys(reader, node_at(reader, index))) return value_animate(reader, index);
+    bool all_read = true;
+    const uint32_t first = node_at(reader, index)->kind == YAML_SCALAR ? 0 : node_at(reader, index)->first;
+    if (first > 0 && visited) {
+        if (visited[first / 8] >> first % 8 & 1) return true;
+        visited[first / 8] |= (uint8_t)(1 << first % 8);
+    }
+    for (uint32_t child = first; child > 0; child = node_at(reader, child)->next)
+        if (node_at(reader, child)->kind != YAML_SCALAR) all_read &= node_animate(reader, child, visited);
+    return all_read;
+}
+
 bool yaml_animate(YamlReader *reader)
 {
-    bool all_read = true;
-    const size_t count = reader->tree.nodes.count; // later ones are values
-    for (uint32_t i = 0; i < count; i++) {
-        const YamlNode *frames = frames_of(reader, node_at(reader, i));
-        if (frames) all_read &= node_animate(reader, i, frames);
-    }
+    uint8_t *visited =
+        reader->tree.has_aliases ? memory_allocate_zeroed(reader->tree.nodes.count / 8 + 1, 1) : NULL;
+    const bool all_read = node_animate(reader, 0, visited);
+    free(visited);
     return all_read;
 }

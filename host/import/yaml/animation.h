@@ -7,3 +7,6 @@
 // or a list of numbers, and notes in the scene that it is animated. Reports errors and returns false if one
 // cannot be read.
 bool yaml_animate(YamlReader *reader);
+
+// Returns whether a node of the tree is such a mapping.
+bool yaml_has_keys(const YamlReader *reader, const YamlNode *node);

@@ -181,6 +181,12 @@ static void light_read(YamlReader *reader, const YamlNode *item)
                      &fields, &form))
         return;
     if (fields.light.kind == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
+    const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1]));
+    if (fields.light.area == AREA_RECTANGLE && vector_length(across) < 1e-9) {
+        report_error(&reader->report, field_node(reader, mapping, "edges")->offset,
+                     "'edges' must not be parallel");
+        return;
+    }
     area_set(&fields);
     fields.light.color = vector_scale(fields.light.color, fields.intensity);
     light_fold_fading(&fields.light);

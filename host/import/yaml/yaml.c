@@ -8,19 +8,15 @@
 
 #include <stdlib.h>
 
-// Turns a vector about a unit axis, counterclockwise seen from the axis' tip (Rodrigues).
+// Turns a vector about a unit axis, counterclockwise seen from the axis' tip.
 static Vector3 vector_turned(Vector3 v, Vector3 axis, double degrees)
 {
-    const double angle = fmod(degrees, 360) * (M_PI / 180), cosine = portable_cosine(angle);
-    const Vector3 along = vector_scale(axis, vector_dot(axis, v) * (1 - cosine));
-    const Vector3 across = vector_scale(vector_cross(axis, v), portable_sine(angle));
-    return vector_add(vector_add(vector_scale(v, cosine), across), along);
+    return vector_rotated(v, axis, fmod(degrees, 360) * (M_PI / 180));
 }
 
 typedef struct {
     Camera camera;
     double fov_degrees, focal_length, frame[2], height, aperture, turn;
-    Vector3 focus; // the point, unless camera.focal_distance is set
 } CameraFields;
 
 static bool read_frame(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -32,23 +28,11 @@ static bool read_frame(YamlReader *reader, const Field *field, const YamlNode *n
 static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     CameraFields *read = target;
-    if (node->kind != YAML_SCALAR) return read_vector(reader, field, node, &read->focus);
+    read->camera.has_focus = node->kind != YAML_SCALAR;
+    if (read->camera.has_focus) return read_vector(reader, field, node, &read->camera.focus);
     Field distance = *field;
     distance.range = &range_positive;
     return read_number(reader, &distance, node, &read->camera.focal_distance);
-}
-
-// Sets the lens. `focus` is its key, or the camera's mapping.
-static void camera_set_lens(YamlReader *reader, const CameraFields *read, const YamlNode *focus)
-{
-    Camera *camera = &reader->scene->camera;
-    camera->lens_radius = read->aperture / 2;
-    if (camera->focal_distance > 0) return;
-    const Vector3 view = vector_subtract(camera->look_at, camera->position);
-    camera->focal_distance =
-        vector_dot(vector_subtract(read->focus, camera->position), vector_normalize(view));
-    if (camera->focal_distance <= 0)
-        report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
 }
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
@@ -66,7 +50,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         {"aperture", read_number, offsetof(CameraFields, aperture), FORM_ANY, OPTIONAL, &range_not_negative},
         {"focus", read_focus, 0, FORM_ANY, OPTIONAL, NULL},
     };
-    CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50, .focus = vector_all(NAN)};
+    CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
     Form form;
     if (!fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read, &form)) return;
     Camera *camera = &reader->scene->camera;
@@ -81,8 +65,12 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         camera->position =
             vector_add(camera->look_at, vector_turned(from, vector_normalize(camera->up), read.turn));
     }
-    if (isnan(read.focus.x)) read.focus = camera->look_at;
-    camera_set_lens(reader, &read, field_node(reader, node, "focus"));
+    camera->lens_radius = read.aperture / 2;
+    const YamlNode *focus = field_node(reader, node, "focus");
+    if (camera->lens_radius == 0 && focus != node)
+        report_warning(&reader->report, focus->offset, "'focus' has no effect without an 'aperture'");
+    else if (camera->lens_radius > 0 && camera_focal_distance(camera) == 0)
+        report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
     if (form == FORM_THIRD) {
         camera->orthographic = true;
         camera->half_tangent = read.height / 2;
