@@ -20,6 +20,7 @@
     FEATURE(REFLECTION, )         \
     FEATURE(TRANSMISSION, )       \
     FEATURE(TINTS, )              \
+    FEATURE(FILTERS, )            \
     FEATURE(EMISSION, )           \
     FEATURE(FRESNEL, )            \
     FEATURE(ABSORPTION, )         \

@@ -70,7 +70,7 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
     vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);
     vector_store(refracted.origin, result + RESULT_REFRACTED_ORIGIN);
     vector_store(refracted.direction, result + RESULT_REFRACTED_DIRECTION);
-    result[RESULT_REFRACTED_WEIGHT].all = refracted.weight.x;
+    result[RESULT_REFRACTED_WEIGHT].all = weight_largest(refracted.weight);
     result[RESULT_TRANSMITTANCE].all = transmittance(scene, &ray);
 #endif
     IntegerLanes object = {hit.object};

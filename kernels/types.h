@@ -223,14 +223,15 @@ typedef struct {
     scalar4 other_color; // the checker's second color, w: shininess
     scalar4 grid;        // xyz: the eye's position in checker cells, w: cells per unit; 0: no checker
     scalar4 reflection_transmission_ior; // w: texels of the texture per unit of length, on planes and discs
-    scalar4 reflection_tint; // factors of what is reflected, the largest 1; w: 1 with Fresnel's equations
-    scalar4 specular_tint;   // factors of highlights
-    scalar4 emission;        // rgb
+    scalar4 reflection_tint;   // factors of what is reflected, the largest 1; w: 1 with Fresnel's equations
+    scalar4 specular_tint;     // factors of highlights
+    scalar4 transmission_tint; // factors of what is refracted
+    scalar4 emission;          // rgb
     scalar4 absorption; // rgb, density: within the body exp(-density d) of light is left after a length d
     // The loss of a shadow ray here: -log2(transmission) in integer steps, whose sum does not depend on the
     // order of the objects. x counts steps of 2^-24, for float; y and z are the low and high half of the
-    // steps of 2^-48, for double.
-    uint4 optical_depth;
+    // steps of 2^-48, for double. Red's is that of all channels unless materials have filters.
+    uint4 optical_depth, optical_depth_green, optical_depth_blue;
     // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_… along u and v
     uint4 texture;
 } Material;

@@ -28,6 +28,7 @@ static Material random_material(Random *random, size_t index)
     }
     if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
     // from numbers that are drawn anyway: others would change all scenes
+    if (index == 2) material.transmission_tint = color_tint(material.color);
     if (index == 0) material.emission = (Color){material.diffuse.y, 0, 1.5 * material.diffuse.x};
     if (index == 3) {
         material.checker = true;

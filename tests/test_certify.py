@@ -64,6 +64,20 @@ objects:
   - sphere: {center: [1, -1, 0], radius: 0.8, material: {emission: 0.5}}
   - box: {min: [-9, -9, -9], max: [9, 9, 9], material: {transmission: 1, ior: 1, absorption: {color: 0.5, distance: 20}}}
 """
+# Filters one behind the other, with colored shadows, and total reflection.
+FILTERS = """\
+camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
+background: [0.3, 0.5, 0.9]
+lights: [{point: {position: [3, 5, -5]}}, {directional: {direction: [-1, -2, 0.5], color: [0.2, 0.3, 0.5]}}]
+materials:
+  red: {diffuse: 0.1, transmission: [0.9, 0.3, 0], ior: 1.5}
+  cyan: {diffuse: 0.1, specular: [0.5, 0.2, 0], transmission: [0, 0.7, 0.9], ior: 1.3}
+objects:
+  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: {color: [0.5, 0.4, 0.3]}}
+  - sphere: {center: [-1, 1.1, 0], radius: 1, material: red}
+  - sphere: {center: [0.2, 2, -1], radius: 0.5, material: cyan}
+  - box: {min: [0.5, 0.1, -0.5], max: [1.5, 1, 0.5], material: red}
+"""
 HAS_DOUBLE = need_device()["fp64"]
 
 
@@ -99,6 +113,16 @@ class Certify(TestCase):
         for scene in FRESNEL, ABSORPTION:
             write("scene.yaml", scene)
             for name, row in self.certify("scene.yaml", "--precision single,strict" + ",double" * HAS_DOUBLE).items():
+                self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
+                self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
+
+    def test_filters(self):
+        """Colored transmission has bounds: what is decided is right at every precision."""
+        write("scene.yaml", FILTERS)
+        for name, row in self.certify("scene.yaml", "--precision single,strict" + ",double,certified" * HAS_DOUBLE).items():
+            if name == "certified":
+                self.assertEqual((row["wrong_decided"], row["undecided"]["pixels"]), (0, 0))
+            else:
                 self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 

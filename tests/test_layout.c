@@ -87,9 +87,12 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_transmission_ior)   \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, reflection_tint)               \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, specular_tint)                 \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, transmission_tint)             \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, emission)                      \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, absorption)                    \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_green)        \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_blue)         \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \

@@ -265,9 +265,9 @@ static void missing_materials_are_reported(void **state)
     assert_vector(triangle_material(&scene, 0)->color, 0, 0, 1);
     scene_free(&scene);
     // read once, however often it is named
-    file_write("a.mtl", "newmtl red\nKd 1 0 0\nTf 1 0 0\n");
+    file_write("a.mtl", "newmtl red\nKd 1 0 0\nPr 1\n");
     scene = scene_of_obj("mtllib a.mtl\nmtllib ./a.mtl\nmtllib missing.mtl\nusemtl red\n" FACE,
-                         "a.mtl:3:1: warning: 'Tf' is not used\n");
+                         "a.mtl:3:1: warning: 'Pr' is not used\n");
     scene_free(&scene);
     // what might wait or never end is not read
     unlink("a.mtl");
@@ -353,7 +353,7 @@ static void what_is_not_used_is_reported_once(void **state)
     (void)state;
     file_write(
         "a.mtl",
-        "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf 0 1 1\nmap_Bump b.png\n"
+        "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf xyz 1\nmap_Bump b.png\n"
         "newmtl more\nTf 1 0 0\nmap_Bump b.png\nPr 0.5\n");
     Scene scene = scene_of_obj(
         "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt nan 0\nvt 0 1e31\nvn 0 inf 0\n"
@@ -367,7 +367,7 @@ static void what_is_not_used_is_reported_once(void **state)
         "a.mtl:5:2: warning: no number up to 1e+30: the default is used\n"
         "a.mtl:6:4: warning: no number up to 1e+30: the default is used\n"
         "a.mtl:7:4: warning: must be 0 or more, not -1: the default is used\n"
-        "a.mtl:8:1: warning: 'Tf' is not used\n"
+        "a.mtl:8:4: warning: no number up to 1e+30: the default is used\n"
         "a.mtl:9:1: warning: 'map_Bump' is not used\n"
         "a.mtl:13:1: warning: 'Pr' is not used\n"
         "a.obj:3:11: warning: colors of vertices are not used\n"

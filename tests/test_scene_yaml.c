@@ -103,7 +103,7 @@ static void test_tints(void **state)
                                 "  gray: {reflection: [0.5, 0.5, 0.5], specular: 2}\n"
                                 "  lamp: {emission: [30, 2.5, 0]}\n"
                                 "  ink: {absorption: {color: [1, 0.5, 0], distance: 2}}\n"
-                                "  tea: {absorption: {color: 0.25}}\n");
+                                "  tea: {absorption: {color: 0.25}, transmission: [0.2, 0.5, 1]}\n");
     const Material *gold = &scene.materials.items[0], *gray = gold + 1;
     assert_number(gold->reflection, 0.5);
     assert_vector(gold->reflection_tint, 1, 0.8, 0);
@@ -120,6 +120,10 @@ static void test_tints(void **state)
     assert_vector(gray[1].absorption, 0, 0, 0);
     assert_vector(gray[2].absorption, 0, log(2) / 2, log(1e6) / 2);
     assert_vector(gray[3].absorption, log(4), log(4), log(4));
+    assert_number(gray[3].transmission, 1);
+    assert_vector(gray[3].transmission_tint, 0.2, 0.5, 1);
+    assert_vector(material_passing(&gray[3]), 0.2, 0.5, 1);
+    assert_vector(material_passing(&gray[2]), 0, 0, 0);
     scene_free(&scene);
 }
 

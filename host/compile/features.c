@@ -26,6 +26,8 @@ static FeatureSet material_features(const Material *material)
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
     // shadow rays must pass through it
     if (material->shadow == SHADOW_NONE) set |= FEATURE_TRANSMISSION;
+    if (material->transmission > 0 && !vector_is_zero(material->transmission_tint))
+        set |= FEATURE_FILTERS | FEATURE_TINTS;
     if (material->transmission > 0 && !vector_is_zero(material->absorption))
         set |= FEATURE_ABSORPTION | FEATURE_TINTS;
     if (!vector_is_zero(material->reflection_tint) || !vector_is_zero(material->specular_tint))

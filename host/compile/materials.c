@@ -36,6 +36,7 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
         const Material *material = &scene->materials.items[i];
         double size = material->checker_size;
         Vector3 eye = rounding->eye;
+        const Color passed = material_passing(material);
         materials[i] = (FlatMaterial){
             .color = scalar4_of(material->checker ? material->checker_colors[0] : material->color,
                                 material->ambient),
@@ -45,11 +46,14 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
                                             part_of_light(material->transmission), material->ior, 0},
             .reflection_tint = scalar4_of(tint_factors(material->reflection_tint), material->fresnel),
             .specular_tint = scalar4_of(tint_factors(material->specular_tint), 0),
+            .transmission_tint = scalar4_of(tint_factors(material->transmission_tint), 0),
             .emission = scalar4_of(material->emission, 0),
             .absorption = {density_of(material->absorption.x, rounding->is_double),
                            density_of(material->absorption.y, rounding->is_double),
                            density_of(material->absorption.z, rounding->is_double), 0},
-            .optical_depth = optical_depth_of(material_passing(material)),
+            .optical_depth = optical_depth_of(passed.x),
+            .optical_depth_green = optical_depth_of(passed.y),
+            .optical_depth_blue = optical_depth_of(passed.z),
         };
         if (material->checker) // the remainders are exact, quotients far from the origin are not
             materials[i].grid = (scalar4){fmod(eye.x, 2 * size) / size, fmod(eye.y, 2 * size) / size,

@@ -106,10 +106,11 @@ double camera_focal_distance(const Camera *camera)
     return fmax(vector_dot(to_focus, vector_normalize(view)), 0);
 }
 
-double material_passing(const Material *material)
+Color material_passing(const Material *material)
 {
-    if (material->shadow == SHADOW_OF_TRANSMISSION) return material->transmission;
-    return material->shadow == SHADOW_NONE ? 1 : 0;
+    if (material->shadow == SHADOW_OF_TRANSMISSION)
+        return vector_scale(tint_factors(material->transmission_tint), material->transmission);
+    return vector_all(material->shadow == SHADOW_NONE ? 1 : 0);
 }
 
 static void lamp_add(Scene *scene, const Light *light, uint32_t material)

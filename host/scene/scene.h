@@ -73,9 +73,10 @@ typedef struct {
     double specular;                 // ks, the largest channel's
     double shininess;                // Phong's power, >= 0
     double reflection, transmission; // weights of the reflected and the refracted ray, the largest channel's
-    Color reflection_tint, specular_tint; // the channels over the largest, or 0 where they are equal
-    Color emission;                       // added to what the surface shows; lights nothing else
-    bool fresnel; // the surface reflects a part of `transmission`, or of `reflection` without it
+    // the channels over the largest, or 0 where they are equal
+    Color reflection_tint, transmission_tint, specular_tint;
+    Color emission; // added to what the surface shows; lights nothing else
+    bool fresnel;   // the surface reflects a part of `transmission`, or of `reflection` without it
     double ior;
     ShadowKind shadow;
     Color absorption; // of what is transmitted exp(-absorption d) is left after a length d within
@@ -248,7 +249,7 @@ void scene_free(Scene *scene); // and zeroes
 double camera_focal_distance(const Camera *camera);
 
 // Returns the part of the light that a surface lets through to what it shadows.
-double material_passing(const Material *material);
+Color material_passing(const Material *material);
 
 // Adds the objects of visible lights.
 void scene_add_lamps(Scene *scene);

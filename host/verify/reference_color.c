@@ -101,23 +101,23 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     // a light before the shading normal but behind the surface
     const Quad height = quad3_dot(surface->geometric, to_light);
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(height) * surface->scale));
-    if (height <= 0) strength *= material_passing(material);
+    Color passed = height <= 0 ? material_passing(material) : vector_all(1);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Material *medium = &scene->materials.items[object->material];
         ReferenceHit blocker = reference_scene_hit_object(world, i, &shadow, surface->index);
         sum->margin = fmin(sum->margin, (double)blocker.margin);
-        if (blocker.found) strength *= material_passing(medium);
+        if (blocker.found) passed = vector_multiply(passed, material_passing(medium));
     }
     double diffuse = (double)(strength * facing);
     Quad highlight_part =
         reference_highlight(surface->normal, to_light, surface->to_eye, material->shininess);
     const Color highlight = vector_scale(tint_factors(material->specular_tint),
                                          (double)(strength * highlight_part) * material->specular);
-    sum->color.x += light->color.x * (material->diffuse.x * base.x * diffuse + highlight.x);
-    sum->color.y += light->color.y * (material->diffuse.y * base.y * diffuse + highlight.y);
-    sum->color.z += light->color.z * (material->diffuse.z * base.z * diffuse + highlight.z);
-    return strength > 0;
+    const Color reflected =
+        vector_add(vector_scale(vector_multiply(material->diffuse, base), diffuse), highlight);
+    sum->color = vector_add(sum->color, vector_multiply(vector_multiply(light->color, passed), reflected));
+    return strength > 0 && vector_largest(passed) > 0;
 }
 
 static Quad3 random_offset(Random *random, double size)
@@ -373,7 +373,10 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
         add_path(tree, &reflected, hit.object, vector_multiply(weight, reflected_weight), medium,
                  bounces_left - 1);
     if (transmission > 0)
-        add_path(tree, &refracted, hit.object, vector_scale(weight, transmission), behind, bounces_left - 1);
+        add_path(
+            tree, &refracted, hit.object,
+            vector_scale(vector_multiply(weight, tint_factors(material->transmission_tint)), transmission),
+            behind, bounces_left - 1);
 }
 
 bool reference_is_undecided(const ReferencePixel *pixel)

@@ -313,7 +313,8 @@ static inline real weight_largest(Color3 weight)
 
 // Computes the reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of
 // total internal reflection, whose reflected ray carries the transmission in addition, as it carries a part
-// of it by Fresnel's equations. Unless `all`, a ray that no lane carries is not set.
+// of it by Fresnel's equations, in both cases without its tint. Unless `all`, a ray that no lane carries is
+// not set.
 static inline mask surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
                                   Bounce *reflected, Bounce *refracted)
 {
@@ -332,7 +333,9 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
         kept = lanes_select(total, surface->transmission, kept);
         real transmission = lanes_select(total, (real)(0), surface->transmission - kept);
         refracted->origin = secondary_ray_origin(surface, true);
-        refracted->weight = weight_part(weight, transmission);
+        refracted->weight =
+            HAS_FILTERS ? weight_tinted(weight, vector_scale(surface->transmission_tint, transmission))
+                        : weight_part(weight, transmission);
         total = total & transparent;
     }
     if (all || lanes_any(reflection + kept > (real)(0))) {

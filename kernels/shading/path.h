@@ -66,12 +66,15 @@ static inline void hit_add_light(const Scene *scene, uint index, LightVisibility
         mask matters = glossy | !light->facing_doubt;
         hit->doubt = hit->doubt | (light->doubt & matters) | (light->facing_doubt & glossy);
     }
+    Color3 fractions;
+    if (HAS_FILTERS) fractions = vector_scale(traversal_filter(traversal), light->fraction);
     light_occlude(light, traversal_transmittance(traversal));
     if (IS_CERTIFIED)
         hit->color_error =
             hit->color_error + lanes_select(light->lit | light->facing_doubt, light->color_error, (real)(0));
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
-    Color3 arriving = vector_scale(vector_of(scene->lights[index].color), light->fraction);
+    Color3 arriving = vector_of(scene->lights[index].color);
+    arriving = HAS_FILTERS ? color_multiply(arriving, fractions) : vector_scale(arriving, light->fraction);
     Color3 reflected = vector_select(light->lit, color_multiply(light->reflected, arriving), black);
     hit->color = vector_add(hit->color, reflected);
 }

@@ -36,6 +36,7 @@ typedef struct {
     Color3 reflection_tint, specular_tint; // with HAS_TINTS
     mask fresnel;                          // with HAS_FRESNEL
     Sample sample;                         // with HAS_AREA_LIGHTS
+    Color3 transmission_tint;              // with HAS_FILTERS
     Color3 absorption;                     // with HAS_ABSORPTION: the density within
     mask entering;                         // the ray runs into the solid, against its outward normal
     real travelled;                        // distance from the eye along the path
@@ -275,6 +276,9 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
     if (!HAS_TRANSMISSION) return;
     surface->transmission = lanes_select(lanes, (real)(bounces.y), surface->transmission);
     surface->ior = lanes_select(lanes, (real)(bounces.z), surface->ior);
+    if (HAS_FILTERS)
+        surface->transmission_tint =
+            vector_select(lanes, vector_of(material->transmission_tint), surface->transmission_tint);
     if (HAS_ABSORPTION)
         surface->absorption = vector_select(lanes, vector_of(material->absorption), surface->absorption);
 }
@@ -333,6 +337,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     if (HAS_REFLECTION) surface.reflection = (real)(0);
     if (HAS_TINTS) surface.reflection_tint = surface.specular_tint = surface.ambient;
     if (HAS_FRESNEL) surface.fresnel = mask_none();
+    if (HAS_FILTERS) surface.transmission_tint = surface.ambient;
     if (HAS_ABSORPTION) surface.absorption = surface.ambient;
     if (HAS_TRANSMISSION) {
         surface.transmission = (real)(0);

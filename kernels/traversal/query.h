@@ -16,7 +16,8 @@ typedef struct {
     Query query;
     mask active; // lanes that still traverse
     Hit hit;
-    integer optical_depth; // for OCCLUSION, of the objects hit so far
+    // For OCCLUSION, of the objects hit so far; green and blue with HAS_FILTERS.
+    integer optical_depth, optical_depth_green, optical_depth_blue;
     // At `certified`: the exact hit is no farther than hit.high, and none but hit.object's before `rival`.
     // For OCCLUSION hit.doubt has the lanes with a hit in doubt.
     real rival;
@@ -36,14 +37,20 @@ typedef struct {
 #define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
 
-static inline integer object_optical_depth(const Scene *scene, uint id)
+static inline integer optical_depth_steps(uint4 steps)
 {
-    uint4 steps = scene->materials[scene->objects[id].kind_index_material.z].optical_depth;
 #if IS_DOUBLE
     return (integer)(steps.x == OPAQUE ? OPTICAL_DEPTH_MAX : upsample(as_int(steps.z), steps.y));
 #else
     return (integer)((scalar_integer)steps.x);
 #endif
+}
+
+static inline integer optical_depth_sum(integer sum, integer added)
+{
+    const integer opaque = (integer)(OPTICAL_DEPTH_MAX);
+    integer largest = lanes_select(added < opaque, (integer)(OPTICAL_DEPTH_PASSING), opaque);
+    return lanes_select(sum < largest - added, sum + added, largest);
 }
 
 static inline bool object_is_opaque(const Scene *scene, uint id)
@@ -58,13 +65,22 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
         traversal->active = traversal->active & !found;
         return;
     }
-    integer optical_depth = object_optical_depth(scene, id);
-    const integer opaque = (integer)(OPTICAL_DEPTH_MAX);
-    integer largest = lanes_select(optical_depth < opaque, (integer)(OPTICAL_DEPTH_PASSING), opaque);
-    integer saturated_sum = lanes_select(traversal->optical_depth < largest - optical_depth,
-                                         traversal->optical_depth + optical_depth, largest);
-    traversal->optical_depth = lanes_select(found, saturated_sum, traversal->optical_depth);
-    traversal->active = traversal->active & (traversal->optical_depth < opaque);
+    global const Material *material = &scene->materials[scene->objects[id].kind_index_material.z];
+    integer optical_depth =
+        optical_depth_sum(traversal->optical_depth, optical_depth_steps(material->optical_depth));
+    traversal->optical_depth = lanes_select(found, optical_depth, traversal->optical_depth);
+    integer least = traversal->optical_depth;
+    if (HAS_FILTERS) {
+        integer green = optical_depth_sum(traversal->optical_depth_green,
+                                          optical_depth_steps(material->optical_depth_green));
+        integer blue = optical_depth_sum(traversal->optical_depth_blue,
+                                         optical_depth_steps(material->optical_depth_blue));
+        traversal->optical_depth_green = green = lanes_select(found, green, traversal->optical_depth_green);
+        traversal->optical_depth_blue = blue = lanes_select(found, blue, traversal->optical_depth_blue);
+        least = lanes_select(green < least, green, least);
+        least = lanes_select(blue < least, blue, least);
+    }
+    traversal->active = traversal->active & (least < (integer)(OPTICAL_DEPTH_MAX));
 }
 
 // Records crossings in the lanes `found`. Of equally near ones the lowest id counts, so that the image does

@@ -16,6 +16,7 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     traversal->hit.t = ray->tmax;
     traversal->hit.object = (integer)(-1);
     if (HAS_TRANSMISSION) traversal->optical_depth = (integer)(0);
+    if (HAS_FILTERS) traversal->optical_depth_green = traversal->optical_depth_blue = (integer)(0);
     if (IS_CERTIFIED) {
         traversal->hit.low = (real)(LARGEST);                           // of no hit: no rival
         traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
@@ -70,15 +71,38 @@ static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
     return traversal.hit;
 }
 
-// The fraction of light that passes, after a traversal for OCCLUSION: 1 if nothing occludes it, 0 behind an
-// opaque object. Each transparent object transmits its fraction, without bending the ray.
+// The part of light that an optical depth leaves.
+static inline real depth_transmittance(integer optical_depth)
+{
+    const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);
+    real passed = real_exp_negative(real_from_integer(optical_depth) * ln2_of_step);
+    if (!HAS_FILTERS) return passed;
+    // a channel may be occluded where others pass
+    return lanes_select(optical_depth < (integer)(OPTICAL_DEPTH_MAX), passed, (real)(0));
+}
+
+// The fraction of each channel's light that passes, after a traversal for OCCLUSION.
+static inline Vector traversal_filter(const Traversal *traversal)
+{
+    const Vector none = {(real)(0), (real)(0), (real)(0)};
+    Vector passed = {depth_transmittance(traversal->optical_depth),
+                     depth_transmittance(traversal->optical_depth_green),
+                     depth_transmittance(traversal->optical_depth_blue)};
+    return vector_select(traversal->active, passed, none);
+}
+
+// The fraction of light that passes, the largest channel's, after a traversal for OCCLUSION: 1 if nothing
+// occludes it, 0 behind an opaque object. Each transparent object transmits its fraction, without bending the
+// ray.
 static inline real traversal_transmittance(const Traversal *traversal)
 {
     const real none = (real)(0), all = (real)(1);
     if (!HAS_TRANSMISSION) return lanes_select(traversal->active, all, none);
-    const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);
-    real passed = real_exp_negative(real_from_integer(traversal->optical_depth) * ln2_of_step);
-    return lanes_select(traversal->active, passed, none);
+    if (HAS_FILTERS) {
+        Vector passed = traversal_filter(traversal);
+        return real_max(real_max(passed.x, passed.y), passed.z);
+    }
+    return lanes_select(traversal->active, depth_transmittance(traversal->optical_depth), none);
 }
 
 // Of each active ray, between tmin and tmax.

@@ -300,9 +300,9 @@ def spot_strength(light, from_light, turn, rounding):
 
 
 def passing(scene, hit, way, end, turn, rounding):
-    """The part of a light that gets through, or None where that is open."""
+    """The parts of a light's channels that get through, or None where that is open."""
     beam = leaving(hit, way, turn, rounding)
-    part, is_open = arb(1), False
+    parts, is_open = [arb(1)] * 3, False
     for thing in scene.things:
         met = crossing(thing, beam, rounding)
         if met.low >= end:
@@ -310,10 +310,10 @@ def passing(scene, hit, way, end, turn, rounding):
         if met.high >= end:
             is_open = True
         else:
-            part *= thing.material.transmission
-            if part == 0:
-                return part
-    return None if is_open else part
+            parts = [part * passed for part, passed in zip(parts, thing.material.filter)]
+            if not any(parts):
+                return parts
+    return None if is_open else parts
 
 
 def highlight(hit, to_light, facing, facing_error, turn, rounding):
@@ -363,21 +363,21 @@ def lit(scene, light, hit, base, rounding, total):
         fading = 1 / (light.fading[0] + distance * (light.fading[1] + distance * light.fading[2]))
         off = 2.1 * hit.off / length(way) + rounding.arithmetic * u
         strength, strength_error = strength * fading, (strength_error + off) * as_float(fading)
-    part = passing(scene, hit, way, inf if infinite else 1.0, turn, rounding)
-    if part is None:
+    parts = passing(scene, hit, way, inf if infinite else 1.0, turn, rounding)
+    if parts is None:
         return None
-    if part == 0:
+    if not any(parts):
         return True
     shine, shine_error = highlight(hit, to_light, facing, facing_error, turn, rounding)
     color, errors = [], []
     for k in range(3):
         surface = material.diffuse[k] * base[k] * facing + material.specular[k] * shine
         error = as_float(material.diffuse[k] * base[k]) * facing_error + as_float(material.specular[k]) * shine_error
-        reached = light.color[k] * strength * part
+        reached = light.color[k] * strength * parts[k]
         color.append(reached * surface)
         errors.append(
             as_float(reached) * error
-            + as_float(light.color[k] * surface * part) * strength_error
+            + as_float(light.color[k] * surface * parts[k]) * strength_error
             + rounding.arithmetic * u * as_float(reached * surface)
         )
     total.add(color, max(errors))
@@ -473,7 +473,8 @@ def follow(scene, hit, beam, rounding, bounces, total):
         if passed is None:
             kept, transmission = arb(material.transmission), arb(0)
     mirrored = [arb(r) + kept for r in reflection]
-    for weights, kind in ((mirrored, "mirrored"), ([transmission] * 3, "passed")):
+    filtered = [transmission * channel / material.transmission for channel in material.filter] if transmission != 0 else [arb(0)] * 3
+    for weights, kind in ((mirrored, "mirrored"), (filtered, "passed")):
         if all(weight == 0 for weight in weights):
             continue
         if kind == "mirrored":

@@ -30,7 +30,7 @@ materials:
   veil: {color: [0.5, 1, 0.5], diffuse: 0.5, transmission: 0.5, ior: 1}
   mirror: {color: [0.5, 0.5, 0.5], diffuse: 0.25, specular: [0.5, 0.375, 0.125], shininess: 1000, reflection: [0.75, 0.5, 0.25]}
   glass: {color: [1, 1, 1], diffuse: 0.125, reflection: 0.125, transmission: 0.75, ior: 1.5}
-  clear: {color: [1, 1, 1], diffuse: 0.125, transmission: 0.75, ior: 1.25, fresnel: true}
+  clear: {color: [1, 1, 1], diffuse: 0.125, transmission: [0.75, 0.5, 0.25], ior: 1.25, fresnel: true}
   plastic: {color: [0.25, 0.5, 1], diffuse: 0.5, reflection: 0.875, ior: 1.5, fresnel: true, emission: [0.0625, 0, 0.125]}
 objects:
   - plane: {point: [0, -0.5, 0], normal: [0, 1, 0], material: floor}

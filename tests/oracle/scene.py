@@ -30,7 +30,8 @@ class Material:
         self.color = color(given.get("color", [1, 1, 1]))
         self.diffuse, self.specular = channels("diffuse", 1), channels("specular", 0)
         self.ambient, self.shininess = number("ambient", 1), number("shininess", 32)
-        self.reflection, self.transmission = channels("reflection", 0), number("transmission", 0)
+        self.reflection, self.filter = channels("reflection", 0), channels("transmission", 0)
+        self.transmission = max(self.filter)
         self.ior, self.fresnel = number("ior", 1.5), given.get("fresnel", False)
         self.emission = channels("emission", 0)
         self.checker = None

@@ -31,7 +31,7 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
     [GLTF_TEXTURE_ALPHA] = "the alpha of textures is not used: that of baseColorFactor is",
     [GLTF_TEXTURE_PLACE] = "the mesh lacks the texture's coordinates: the color is used",
     [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
-    [GLTF_GLASS_COLOR] = "transmitted light is not colored",
+    [GLTF_GLASS_COLOR] = "transmitted light does not have the colors of a texture",
 };
 
 static const char *const extensions_read[] = {

@@ -271,7 +271,9 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
         look->specular = opaque.specular;
         look->reflection = opaque.reflection;
         look->emission = opaque.emission;
-        if (surface->base_texture.json || mean_of(surface->base) < 1) gltf_lose(gltf, GLTF_GLASS_COLOR, item);
+        look->transmission *= fmin(vector_largest(look->color), 1);
+        look->transmission_tint = color_tint(look->color);
+        if (surface->base_texture.json) gltf_lose(gltf, GLTF_GLASS_COLOR, item);
         // without thickness a surface has no inside
         if (surface->thickness > 0 && surface->ior > 0) look->ior = surface->ior;
         if (surface->thickness > 0 && surface->attenuation_distance < DBL_MAX)

@@ -18,6 +18,7 @@ typedef struct {
     double dissolve;       // d: the opacity; NAN: not given
     double transparency;   // Tr: 1 - d; NAN: not given
     size_t opacity_offset; // of the last of them
+    Color filter;          // Tf: factors of the transmitted light
     double illumination;   // illum; NAN: not given
     size_t illumination_offset;
 } MtlMaterial;
@@ -75,6 +76,8 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
     if (opacity == 1) return;
     const double specular = look->specular, ior = look->ior;
     material_set_opacity(look, opacity);
+    look->transmission *= fmin(vector_largest(material->filter), 1);
+    look->transmission_tint = color_tint(vector_min(material->filter, vector_all(1)));
     if (is_glass) look->specular = specular;
     if (refracts || isnan(illumination)) look->ior = ior;
 }
@@ -88,6 +91,7 @@ static void name_read(MtlReader *reader, MtlMaterial *previous)
                             .scene_index = DRAFT_NONE,
                             .dissolve = NAN,
                             .transparency = NAN,
+                            .filter = {1, 1, 1},
                             .illumination = NAN};
     material.material.ior = 1;
     array_push(reader->materials, material);
@@ -141,6 +145,11 @@ static void specular_read(MtlReader *reader, MtlMaterial *material)
 static void emission_read(MtlReader *reader, MtlMaterial *material)
 {
     color_of_line(reader, &material->material.emission);
+}
+
+static void filter_read(MtlReader *reader, MtlMaterial *material)
+{
+    color_of_line(reader, &material->filter);
 }
 
 static void shininess_read(MtlReader *reader, MtlMaterial *material)
@@ -225,16 +234,6 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
     free(path);
 }
 
-// Reads and ignores numbers, with a warning unless they have the value that means no effect: no filter.
-static void neutral_read(MtlReader *reader, Word word, double neutral)
-{
-    double numbers[3] = {neutral, neutral, neutral};
-    for (int i = 0; i < 3 && scan_more(&reader->scan); i++)
-        if (scan_number(&reader->scan, &numbers[i]) != NUMBER_READ) numbers[i] = NAN;
-    if (numbers[0] != neutral || numbers[1] != neutral || numbers[2] != neutral)
-        unused_note(&reader->unused, &reader->report, word, "is not used");
-}
-
 static void nothing_read(MtlReader *reader, MtlMaterial *material)
 {
     (void)reader;
@@ -247,7 +246,7 @@ static const struct {
 } statements[] = {
     {"newmtl", name_read}, {"Kd", diffuse_read},         {"Ks", specular_read}, {"Ns", shininess_read},
     {"Ni", ior_read},      {"Tr", transparency_read},    {"d", dissolve_read},  {"map_Kd", texture_read},
-    {"Ka", nothing_read},  {"illum", illumination_read}, {"Ke", emission_read},
+    {"Ka", nothing_read},  {"illum", illumination_read}, {"Ke", emission_read}, {"Tf", filter_read},
 };
 
 static void line_read(MtlReader *reader)
@@ -263,10 +262,7 @@ static void line_read(MtlReader *reader)
             statements[i].read(reader, material);
         return;
     }
-    if (word_is(word, "Tf"))
-        neutral_read(reader, word, 1);
-    else
-        unused_note(&reader->unused, &reader->report, word, "is not used");
+    unused_note(&reader->unused, &reader->report, word, "is not used");
 }
 
 // Returns whether the file was read, by whatever name.

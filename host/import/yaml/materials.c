@@ -122,6 +122,12 @@ static bool read_reflection(YamlReader *reader, const Field *field, const YamlNo
     return read_tinted(reader, field, node, &material->reflection, &material->reflection_tint);
 }
 
+static bool read_transmission(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    Material *material = target;
+    return read_tinted(reader, field, node, &material->transmission, &material->transmission_tint);
+}
+
 static bool read_specular(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Material *material = target;
@@ -148,7 +154,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
         {"shininess", read_number, offsetof(Material, shininess), FORM_ANY, OPTIONAL, &range_not_negative},
         {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},
-        {"transmission", read_number, offsetof(Material, transmission), FORM_ANY, OPTIONAL, &range_unit},
+        {"transmission", read_transmission, 0, FORM_ANY, OPTIONAL, &range_unit},
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
         {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL, NULL},
         {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL, NULL},
