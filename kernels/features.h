@@ -23,6 +23,7 @@
     FEATURE(FILTERS, )            \
     FEATURE(EMISSION, )           \
     FEATURE(FRESNEL, )            \
+    FEATURE(CONDUCTORS, )         \
     FEATURE(ABSORPTION, )         \
     FEATURE(EYE_POWERS, )         \
     FEATURE(BVH, )

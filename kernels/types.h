@@ -231,6 +231,8 @@ typedef struct {
     // The loss of a shadow ray here: -log2(transmission) in integer steps, whose sum does not depend on the
     // order of the objects. x counts steps of 2^-24, for float; y and z are the low and high half of the
     // steps of 2^-48, for double. Red's is that of all channels unless materials have filters.
+    // of a conductor with the index n + i k, rgb: n^2 - k^2, w: 1 if it is one; and (2 n k)^2
+    scalar4 conductor_real, conductor_imaginary_squared;
     uint4 optical_depth, optical_depth_green, optical_depth_blue;
     // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_… along u and v
     uint4 texture;

@@ -64,6 +64,15 @@ objects:
   - sphere: {center: [1, -1, 0], radius: 0.8, material: {emission: 0.5}}
   - box: {min: [-9, -9, -9], max: [9, 9, 9], material: {transmission: 1, ior: 1, absorption: {color: 0.5, distance: 20}}}
 """
+METALS = """\
+camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
+background: [0.3, 0.5, 0.9]
+lights: [{point: {position: [3, 5, -5]}}]
+objects:
+  - plane: {point: [0, 0, 0], normal: [0, 1, 0], material: {conductor: {n: [1.5, 0.3, 2], k: [0, 1, 0.2]}, diffuse: 0.2}}
+  - sphere: {center: [-1, 1.2, 0], radius: 1, material: {conductor: gold}}
+  - box: {min: [0.4, 0.1, -0.5], max: [1.6, 1, 0.5], material: {conductor: aluminium, reflection: [0.9, 0.7, 0.3]}}
+"""
 # Filters one behind the other, with colored shadows, and total reflection.
 FILTERS = """\
 camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
@@ -110,7 +119,7 @@ class Certify(TestCase):
 
     def test_materials_without_bounds(self):
         """Neither a path nor a color differs from the exact ones, at all precisions that take these materials."""
-        for scene in FRESNEL, ABSORPTION:
+        for scene in FRESNEL, METALS, ABSORPTION:
             write("scene.yaml", scene)
             for name, row in self.certify("scene.yaml", "--precision single,strict" + ",double" * HAS_DOUBLE).items():
                 self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)

@@ -532,6 +532,7 @@ class Trace(CliTestCase):
         ink = "absorption: {color: red}"
         for material, refused in (
             ("{fresnel: true, transmission: 1}", "fresnel"), ("{fresnel: true}", None),
+            ("{conductor: gold}", "conductor"), ("{conductor: gold, reflection: 0}", None),
             (f"{{{ink}, transmission: 1}}", "absorption"), (f"{{{ink}, reflection: 0.5}}", None),
         ):
             write("glass.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [5, 5, 5]}}]\n"

@@ -90,6 +90,8 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, transmission_tint)             \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, emission)                      \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, absorption)                    \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, conductor_real)                \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, conductor_imaginary_squared)   \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_green)        \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_blue)         \

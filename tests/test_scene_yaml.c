@@ -103,7 +103,9 @@ static void test_tints(void **state)
                                 "  gray: {reflection: [0.5, 0.5, 0.5], specular: 2}\n"
                                 "  lamp: {emission: [30, 2.5, 0]}\n"
                                 "  ink: {absorption: {color: [1, 0.5, 0], distance: 2}}\n"
-                                "  tea: {absorption: {color: 0.25}, transmission: [0.2, 0.5, 1]}\n");
+                                "  tea: {absorption: {color: 0.25}, transmission: [0.2, 0.5, 1]}\n"
+                                "  gilt: {conductor: gold}\n"
+                                "  lead: {ambient: 2, conductor: {n: 2, k: [1, 3, 4]}, reflection: 0.5}\n");
     const Material *gold = &scene.materials.items[0], *gray = gold + 1;
     assert_number(gold->reflection, 0.5);
     assert_vector(gold->reflection_tint, 1, 0.8, 0);
@@ -124,6 +126,16 @@ static void test_tints(void **state)
     assert_vector(gray[3].transmission_tint, 0.2, 0.5, 1);
     assert_vector(material_passing(&gray[3]), 0.2, 0.5, 1);
     assert_vector(material_passing(&gray[2]), 0, 0, 0);
+    assert_vector(gray->conductor_n, 0, 0, 0);
+    assert_vector(gray[4].conductor_n, 0.15557, 0.42415, 1.3831);
+    assert_vector(gray[4].conductor_k, 3.6024, 2.4721, 1.9155);
+    assert_number(gray[4].reflection, 1);
+    assert_number(gray[4].ambient, 0);
+    assert_vector(gray[4].diffuse, 0, 0, 0);
+    assert_vector(gray[5].conductor_n, 2, 2, 2);
+    assert_vector(gray[5].conductor_k, 1, 3, 4);
+    assert_number(gray[5].reflection, 0.5);
+    assert_number(gray[5].ambient, 2);
     scene_free(&scene);
 }
 

@@ -148,6 +148,9 @@ static const struct {
      "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: [0, 0.9, 0.4]}}},\n"
      "  {sphere: {center: [-0.4, 1.8, -1], radius: 0.3, material: {transmission: [0.8, 0, 0.4]}}},\n"
      "  {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
+    {FEATURE_SPHERES | FEATURE_REFLECTION | FEATURE_TINTS | FEATURE_CONDUCTORS,
+     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {conductor: gold}}},\n"
+                "  {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}]\n"},
     {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_TINTS | FEATURE_ABSORPTION,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9,\n"
                 "  absorption: {color: [0.1, 0.9, 0]}}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},

@@ -33,6 +33,7 @@ static FeatureSet material_features(const Material *material)
     if (!vector_is_zero(material->reflection_tint) || !vector_is_zero(material->specular_tint))
         set |= FEATURE_TINTS;
     if (!vector_is_zero(material->emission)) set |= FEATURE_EMISSION;
+    if (material->conductor_n.x > 0 && set & FEATURE_REFLECTION) set |= FEATURE_CONDUCTORS | FEATURE_TINTS;
     // which needs the index of refraction and the side of the surface
     if (material->fresnel && set & (FEATURE_REFLECTION | FEATURE_TRANSMISSION))
         set |= FEATURE_FRESNEL | FEATURE_TRANSMISSION;

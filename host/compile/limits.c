@@ -75,6 +75,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         const char *text;
     } unbounded[] = {
         {FEATURE_FRESNEL, "a material has 'fresnel'"},
+        {FEATURE_CONDUCTORS, "a material has 'conductor'"},
         {FEATURE_ABSORPTION, "a material has 'absorption'"},
         {FEATURE_AREA_LIGHTS, "a light has an area"},
         {FEATURE_LENS, "the camera has an 'aperture'"},

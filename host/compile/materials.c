@@ -28,6 +28,18 @@ static double density_of(double absorption, bool is_double)
     return absorption > 0 ? fmin(fmax(absorption, 0x1p10 / largest), largest) : 0;
 }
 
+static scalar4 conductor_real(const Material *material)
+{
+    const Color n = material->conductor_n, k = material->conductor_k;
+    return scalar4_of(vector_subtract(vector_multiply(n, n), vector_multiply(k, k)), n.x > 0);
+}
+
+static scalar4 conductor_imaginary_squared(const Material *material)
+{
+    const Color root = vector_scale(vector_multiply(material->conductor_n, material->conductor_k), 2);
+    return scalar4_of(vector_multiply(root, root), 0);
+}
+
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
     flat_array_renew(compiled, FLAT_MATERIALS, scene->materials.count);
@@ -51,6 +63,8 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             .absorption = {density_of(material->absorption.x, rounding->is_double),
                            density_of(material->absorption.y, rounding->is_double),
                            density_of(material->absorption.z, rounding->is_double), 0},
+            .conductor_real = conductor_real(material),
+            .conductor_imaginary_squared = conductor_imaginary_squared(material),
             .optical_depth = optical_depth_of(passed.x),
             .optical_depth_green = optical_depth_of(passed.y),
             .optical_depth_blue = optical_depth_of(passed.z),

@@ -77,6 +77,7 @@ typedef struct {
     Color reflection_tint, transmission_tint, specular_tint;
     Color emission; // added to what the surface shows; lights nothing else
     bool fresnel;   // the surface reflects a part of `transmission`, or of `reflection` without it
+    Color conductor_n, conductor_k; // reflects by the complex index n + i k; n is 0 if it does not
     double ior;
     ShadowKind shadow;
     Color absorption; // of what is transmitted exp(-absorption d) is left after a length d within

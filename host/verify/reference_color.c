@@ -281,6 +281,24 @@ static Quad reflectance(Quad cosine, Quad ior, bool entering)
     return (across * across + along * along) / 2;
 }
 
+// Returns the same of a conductor, from the complex amplitudes. With the index m and its square M, across the
+// plane of incidence that is (c - q) / (c + q) with q^2 = M - sine^2, along it (M c - q) / (M c + q).
+static double conductor_reflectance(Quad cosine, double n, double k)
+{
+    const Quad real = (Quad)n * n - (Quad)k * k, imaginary = 2 * (Quad)n * k;
+    const Quad difference = real - (1 - cosine * cosine);
+    const Quad size = QUAD_CALL(sqrt)(difference * difference + imaginary * imaginary);
+    const Quad q_real = QUAD_CALL(sqrt)((size + difference) / 2),
+               q_imaginary = QUAD_CALL(sqrt)((size - difference) / 2);
+    Quad sum = 0;
+    for (int along = 0; along < 2; along++) {
+        const Quad a = along ? real * cosine : cosine, b = along ? imaginary * cosine : 0;
+        sum += ((a - q_real) * (a - q_real) + (b - q_imaginary) * (b - q_imaginary)) /
+               ((a + q_real) * (a + q_real) + (b + q_imaginary) * (b + q_imaginary));
+    }
+    return (double)(sum / 2);
+}
+
 // What a ray travels in: how strongly the body around it absorbs light, and the one around that.
 typedef struct {
     Color density, outer;
@@ -360,6 +378,13 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
             reflection *= part;
             reflected_weight = vector_scale(reflected_weight, part);
         }
+    }
+    if (material->conductor_n.x > 0) {
+        const Color n = material->conductor_n, k = material->conductor_k;
+        const Quad cosine = -quad3_dot(direction, surface.normal);
+        const Color part = {conductor_reflectance(cosine, n.x, k.x), conductor_reflectance(cosine, n.y, k.y),
+                            conductor_reflectance(cosine, n.z, k.z)};
+        reflected_weight = vector_multiply(reflected_weight, part);
     }
     signature_add(tree, hit.object,
                   (reflection > 0 ? PATH_REFLECTED : 0u) | (transmission > 0 ? PATH_REFRACTED : 0u) |

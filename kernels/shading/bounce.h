@@ -87,6 +87,38 @@ static inline real fresnel_reflectance(Vector direction, Vector normal, mask ent
     return lanes_select(squared < zero, one, reflectance);
 }
 
+// Returns the part of unpolarized light that a conductor reflects, for the cosine c and the sine s of the
+// angle. With (a + i b)^2 = (n + i k)^2 - s^2 the part of light across the plane of incidence is
+// (a^2 + b^2 - 2 a c + c^2) / (a^2 + b^2 + 2 a c + c^2), and along it that times
+// (c^2 (a^2 + b^2) - 2 a c s^2 + s^4) / (c^2 (a^2 + b^2) + 2 a c s^2 + s^4) (Born, Wolf, section 14.2). The
+// smaller of a^2 and b^2 is computed from their product, which does not cancel.
+static inline real conductor_channel(real cosine, real cosine_squared, real sine_squared, real index_real,
+                                     real index_imaginary_squared)
+{
+    const real zero = (real)(0), one_half = (real)(0.5f);
+    real difference = index_real - sine_squared;                                     // a^2 - b^2
+    real sum = real_sqrt(real_fma(difference, difference, index_imaginary_squared)); // a^2 + b^2
+    real larger = one_half * (sum + fabs(difference));
+    real smaller =
+        real_divide((real)(0.25f) * index_imaginary_squared, real_max(larger, (real)(SMALLEST_RATIO)));
+    real twice_a_c = (cosine + cosine) * real_sqrt(lanes_select(difference < zero, smaller, larger));
+    real across = real_max(relative_difference(sum + cosine_squared, twice_a_c), zero);
+    real rest = relative_difference(real_fma(cosine_squared, sum, sine_squared * sine_squared),
+                                    twice_a_c * sine_squared);
+    return one_half * across * ((real)(1) + real_max(rest, zero));
+}
+
+static inline Color3 conductor_reflectance(const Surface *surface, Vector direction)
+{
+    const real one = (real)(1), zero = (real)(0);
+    real cosine = real_min(real_max(-vector_dot(direction, surface->shading_normal), zero), one);
+    real cosine_squared = cosine * cosine, sine_squared = one - cosine_squared;
+    Color3 index_real = surface->conductor_real, squared = surface->conductor_imaginary_squared;
+    return (Color3){conductor_channel(cosine, cosine_squared, sine_squared, index_real.x, squared.x),
+                    conductor_channel(cosine, cosine_squared, sine_squared, index_real.y, squared.y),
+                    conductor_channel(cosine, cosine_squared, sine_squared, index_real.z, squared.z)};
+}
+
 // Refracts a unit direction by Snell's law at a unit normal that faces it. Returns the lanes of total
 // internal reflection. With k = (n - 1)(n + 1) and the cosine c, the ray into a body of index n runs along d
 // + N (c - sqrt(c^2 + k)), and the ray out of it along n d + N (n c - sqrt((n c)^2 - k)). In this form
@@ -341,11 +373,16 @@ static inline mask surface_bounce(const Surface *surface, Vector direction, Colo
     if (all || lanes_any(reflection + kept > (real)(0))) {
         reflected->direction = surface_reflect(surface, direction);
         reflected->origin = secondary_ray_origin(surface, false);
-        if (HAS_TINTS)
-            reflected->weight = weight_tinted(
-                weight, vector_fma(surface->reflection_tint, reflection, (Color3){kept, kept, kept}));
-        else
+        if (HAS_TINTS) {
+            Color3 tint = surface->reflection_tint;
+            if (HAS_CONDUCTORS && lanes_any(surface->conductor))
+                tint = vector_select(surface->conductor,
+                                     color_multiply(tint, conductor_reflectance(surface, direction)), tint);
+            reflected->weight =
+                weight_tinted(weight, vector_fma(tint, reflection, (Color3){kept, kept, kept}));
+        } else {
             reflected->weight = weight_part(weight, reflection + kept);
+        }
     }
     if (HAS_IMAGES) reflected->travelled = refracted->travelled = surface->travelled;
     if (HAS_AREA_LIGHTS) {

@@ -36,10 +36,12 @@ typedef struct {
     Color3 reflection_tint, specular_tint; // with HAS_TINTS
     mask fresnel;                          // with HAS_FRESNEL
     Sample sample;                         // with HAS_AREA_LIGHTS
-    Color3 transmission_tint;              // with HAS_FILTERS
-    Color3 absorption;                     // with HAS_ABSORPTION: the density within
-    mask entering;                         // the ray runs into the solid, against its outward normal
-    real travelled;                        // distance from the eye along the path
+    mask conductor;                        // with HAS_CONDUCTORS, and the square of its index:
+    Color3 conductor_real, conductor_imaginary_squared;
+    Color3 transmission_tint; // with HAS_FILTERS
+    Color3 absorption;        // with HAS_ABSORPTION: the density within
+    mask entering;            // the ray runs into the solid, against its outward normal
+    real travelled;           // distance from the eye along the path
     // At `certified`, bounds on the distance of the position from the exact one; on that of the shading
     // normal and, with HAS_TRIANGLES, of the geometric normal from the exact ones; on that of to_eye; and the
     // uncertain lanes.
@@ -271,6 +273,14 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
         surface->reflection_tint = vector_select(lanes, reflected, surface->reflection_tint);
         surface->specular_tint = vector_select(lanes, specular, surface->specular_tint);
     }
+    if (HAS_CONDUCTORS) {
+        Color3 index_real = vector_of(material->conductor_real),
+               index_imaginary_squared = vector_of(material->conductor_imaginary_squared);
+        surface->conductor = surface->conductor | (lanes & ((real)(material->conductor_real.w) > (real)(0)));
+        surface->conductor_real = vector_select(lanes, index_real, surface->conductor_real);
+        surface->conductor_imaginary_squared =
+            vector_select(lanes, index_imaginary_squared, surface->conductor_imaginary_squared);
+    }
     if (HAS_FRESNEL)
         surface->fresnel = surface->fresnel | (lanes & ((real)(material->reflection_tint.w) > (real)(0)));
     if (!HAS_TRANSMISSION) return;
@@ -337,6 +347,10 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     if (HAS_REFLECTION) surface.reflection = (real)(0);
     if (HAS_TINTS) surface.reflection_tint = surface.specular_tint = surface.ambient;
     if (HAS_FRESNEL) surface.fresnel = mask_none();
+    if (HAS_CONDUCTORS) {
+        surface.conductor = mask_none();
+        surface.conductor_real = surface.conductor_imaginary_squared = surface.ambient;
+    }
     if (HAS_FILTERS) surface.transmission_tint = surface.ambient;
     if (HAS_ABSORPTION) surface.absorption = surface.ambient;
     if (HAS_TRANSMISSION) {

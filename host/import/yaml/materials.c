@@ -58,6 +58,63 @@ static bool read_absorption(YamlReader *reader, const Field *field, const YamlNo
     return true;
 }
 
+typedef struct {
+    Color n, k;
+} Conductor;
+
+// Reads three numbers, or one for all channels.
+static bool read_channels(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    double number;
+    if (node->kind != YAML_SCALAR) return read_vector(reader, field, node, target);
+    if (!read_number(reader, field, node, &number)) return false;
+    *(Color *)target = vector_all(number);
+    return true;
+}
+
+// The indices of refraction at 650, 550 and 450 nm, between neighbors of the tables of Johnson, Christy,
+// Optical constants of the noble metals, Phys. Rev. B 6(12), 1972, and for aluminium of Rakic, Algorithm for
+// the determination of intrinsic optical constants of metal films, Applied Optics 34(22), 1995.
+static const struct {
+    const char *name;
+    Conductor index;
+} conductors[] = {
+    {"gold", {{0.15557, 0.42415, 1.3831}, {3.6024, 2.4721, 1.9155}}},
+    {"silver", {{0.052225, 0.059582, 0.04}, {4.4094, 3.5974, 2.6484}}},
+    {"copper", {{0.2378, 1.0066, 1.2404}, {3.6264, 2.5823, 2.3929}}},
+    {"aluminium", {{1.558, 1.0152, 0.63324}, {7.7124, 6.6273, 5.4544}}},
+    {"aluminum", {{1.558, 1.0152, 0.63324}, {7.7124, 6.6273, 5.4544}}},
+};
+
+// Reads the name of a metal, or its index of refraction.
+static bool read_conductor(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    static const Field fields[] = {
+        {"n", read_channels, offsetof(Conductor, n), FORM_ANY, REQUIRED, &range_positive},
+        {"k", read_channels, offsetof(Conductor, k), FORM_ANY, REQUIRED, &range_not_negative},
+    };
+    Material *material = target;
+    Conductor index = {0};
+    if (node->kind == YAML_SCALAR) {
+        const char *names[COUNT_OF(conductors)], *text = yaml_text(&reader->tree, node);
+        for (size_t i = 0; i < COUNT_OF(conductors); i++) {
+            names[i] = conductors[i].name;
+            if (!strcmp(text, names[i])) index = conductors[i].index;
+        }
+        if (index.n.x == 0) {
+            unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
+            return false;
+        }
+    } else if (node->kind == YAML_SEQUENCE) {
+        return expected_report(reader, field->name, "the name of a metal or a mapping of n and k", node);
+    } else if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &index, NULL)) {
+        return false;
+    }
+    material->conductor_n = index.n;
+    material->conductor_k = index.k;
+    return true;
+}
+
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 {
     if (node->kind != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
@@ -158,11 +215,21 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
         {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL, NULL},
         {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL, NULL},
+        {"conductor", read_conductor, 0, FORM_ANY, OPTIONAL, NULL},
         {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL, NULL},
         {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL, NULL},
     };
     Material material = material_default();
+    const YamlNode *conductor = node ? field_node(reader, node, "conductor") : NULL;
+    if (conductor != node) { // a metal's default
+        material.reflection = 1;
+        material.ambient = 0;
+        material.diffuse = vector_all(0);
+    }
     if (node) fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
+    if (conductor != node && (material.fresnel || material.transmission > 0))
+        report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
+                     material.fresnel ? "fresnel" : "transmission");
     scene_add_material(reader->scene, &material, name);
 }
 
