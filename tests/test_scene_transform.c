@@ -1,5 +1,6 @@
 // Tests that transformed objects are hit where the same objects are, written out.
 #include "host/scene/affine.h"
+#include "host/scene/describe.h"
 #include "tests/files.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
@@ -145,7 +146,11 @@ static void an_instance_may_have_a_material(void **state)
     assert_string_equal(scene.material_names.items[scene.objects.items[2].material], "blue");
     assert_string_equal(scene.material_names.items[scene.objects.items[3].material], "blue");
     assert_non_null(scene.meshes.items[scene.objects.items[1].as.mesh.index].materials);
-    assert_null(scene.meshes.items[scene.objects.items[3].as.mesh.index].materials);
+    assert_int_equal(scene.objects.items[1].as.mesh.index, scene.objects.items[3].as.mesh.index);
+    assert_string_equal(scene.material_names.items[object_material(&scene, &scene.objects.items[1], 0)],
+                        "gray");
+    assert_string_equal(scene.material_names.items[object_material(&scene, &scene.objects.items[3], 0)],
+                        "blue");
     assert_int_equal(scene.objects.items[3].line, 5);
     scene_free(&scene);
     scratch_close(folder);

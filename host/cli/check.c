@@ -43,10 +43,11 @@ typedef struct {
 static SceneFacts facts_of(const Scene *scene)
 {
     SceneFacts facts = {0};
-    for (size_t i = 0; i < scene->objects.count; i++)
-        facts.shapes[scene->objects.items[i].kind]++;
-    for (size_t i = 0; i < scene->meshes.count; i++)
-        facts.mesh_triangle_count += scene->meshes.items[i].triangle_count;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        facts.shapes[object->kind]++;
+        if (object->kind == SHAPE_MESH) facts.mesh_triangle_count += object_primitive_count(scene, object);
+    }
     facts.bounds = scene_bounds(scene, &facts.unbounded_count);
     facts.features = features_of(scene);
     return facts;

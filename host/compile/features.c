@@ -1,6 +1,9 @@
 #include "host/compile/features.h"
 
+#include "host/base/memory.h"
 #include "host/compile/shapes.h"
+#include "host/scene/mesh.h"
+#include <stdlib.h>
 
 #define FEATURE_NAME(name, ...) #name,
 const char *const feature_names[FEATURE_COUNT] = {FEATURE_LIST(FEATURE_NAME)};
@@ -43,14 +46,18 @@ static FeatureSet material_features(const Material *material)
 FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
 {
     FeatureSet set = 0;
+    bool *is_done = memory_allocate_zeroed(scene->meshes.count + 1, sizeof *is_done);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         set |= of(&scene->materials.items[object->material]);
-        if (object->kind != SHAPE_MESH) continue;
+        if (object->kind != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
-        for (size_t k = 0; mesh->materials && k < mesh->triangle_count; k++)
-            set |= of(&scene->materials.items[mesh->materials[k]]);
+        const uint32_t *materials = mesh_materials(mesh, object);
+        is_done[object->as.mesh.index] = materials != NULL;
+        for (size_t k = 0; materials && k < mesh->triangle_count; k++)
+            set |= of(&scene->materials.items[materials[k]]);
     }
+    free(is_done);
     return set;
 }
 

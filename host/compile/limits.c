@@ -7,10 +7,20 @@
 
 bool size_fits(const Scene *scene, MessageList *messages)
 {
-    const size_t largest = (size_t)1 << 28; // bits that the BVH counts with
-    size_t count = scene_primitive_count(scene);
-    if (count <= largest) return true;
-    return message_error(messages, "the scene has %zu objects and triangles, more than %zu", count, largest);
+    const size_t largest = (size_t)1 << 28;    // bits that the BVH counts with
+    const size_t copied_max = (size_t)1 << 24; // triangles of copies: the cost of a hostile file
+    size_t count = scene_primitive_count(scene), copied = 0;
+    if (count > largest)
+        return message_error(messages, "the scene has %zu objects and triangles, more than %zu", count,
+                             largest);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        if (object->kind == SHAPE_MESH && object->as.mesh.is_instance)
+            copied += object_primitive_count(scene, object);
+    }
+    if (copied <= copied_max) return true;
+    return message_error(messages, "copies of meshes for instances have %zu triangles, more than %zu", copied,
+                         copied_max);
 }
 
 typedef struct {

@@ -16,6 +16,20 @@ typedef struct {
     TriangleNeighbors *neighbors;
 } Triangles;
 
+// Appends an instance's triangles, whose ids follow each other.
+static void instance_add(Triangles *triangles, const Mesh *mesh, const Object *object, uint32_t first_id)
+{
+    Mesh *all = &triangles->all;
+    for (size_t i = 0; i < mesh->triangle_count; i++, all->triangle_count++) {
+        const MeshTriangle placed = mesh_triangle_at(mesh, object, i);
+        triangles->ids[all->triangle_count] = first_id + (uint32_t)i;
+        for (int k = 0; k < 3; k++) {
+            all->triangles[all->triangle_count][k] = (uint32_t)all->vertex_count;
+            all->vertices[all->vertex_count++] = placed.vertices[k];
+        }
+    }
+}
+
 // Appends vertices and the triangles of them, whose ids follow each other.
 static void triangles_add(Triangles *triangles, const Mesh *mesh, uint32_t first_id)
 {
@@ -36,8 +50,11 @@ static Triangles triangles_open(const Scene *scene)
         const Object *object = &scene->objects.items[i];
         const bool is_mesh = object->kind == SHAPE_MESH;
         if (!is_mesh && object->kind != SHAPE_TRIANGLE) continue;
-        count += object_primitive_count(scene, object);
-        vertex_count += is_mesh ? scene->meshes.items[object->as.mesh.index].vertex_count : 3;
+        const size_t triangle_count = object_primitive_count(scene, object);
+        const bool has_vertices = is_mesh && !object->as.mesh.is_instance;
+        count += triangle_count;
+        vertex_count +=
+            has_vertices ? scene->meshes.items[object->as.mesh.index].vertex_count : 3 * triangle_count;
     }
     Triangles triangles = {.ids = memory_allocate(count, sizeof *triangles.ids)};
     triangles.all.vertices = memory_allocate(vertex_count, sizeof *triangles.all.vertices);
@@ -45,8 +62,11 @@ static Triangles triangles_open(const Scene *scene)
     uint32_t id = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        if (object->kind == SHAPE_MESH)
-            triangles_add(&triangles, &scene->meshes.items[object->as.mesh.index], id);
+        const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
+        if (mesh && object->as.mesh.is_instance)
+            instance_add(&triangles, mesh, object, id);
+        else if (mesh)
+            triangles_add(&triangles, mesh, id);
         if (object->kind == SHAPE_TRIANGLE) {
             Object copy = *object;
             Mesh single = {.vertices = copy.as.triangle.vertices,

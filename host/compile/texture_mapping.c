@@ -49,14 +49,13 @@ void surface_grid(const Flattening *flattening, uint32_t material, Vector3 norma
     }
 }
 
-TriangleUvs triangle_uvs(const Mesh *mesh, const uint32_t *corners, const CompiledTexture *texture)
+TriangleUvs triangle_uvs(const Mesh *mesh, const Vector3 vertices[3], const uint32_t *corners,
+                         const CompiledTexture *texture)
 {
     const double *a = mesh->uvs[corners[0]], *b = mesh->uvs[corners[1]], *c = mesh->uvs[corners[2]];
-    const Vector3 *vertices = mesh->vertices, origin = vertices[corners[0]];
     // twice the areas, in texels and in the scene
     double texels = fabs((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) * texture->width *
                     texture->height;
-    double area = vector_length(vector_cross(vector_subtract(vertices[corners[1]], origin),
-                                             vector_subtract(vertices[corners[2]], origin)));
+    double area = vector_length(triangle_normal(vertices[0], vertices[1], vertices[2]));
     return (TriangleUvs){{a[0], a[1], b[0], b[1]}, {c[0], c[1], area > 0 ? sqrt(texels / area) : 0, 0}};
 }

@@ -8,4 +8,5 @@
 void surface_grid(const Flattening *flattening, uint32_t material, Vector3 normal, scalar4 *u, scalar4 *v);
 
 // The texture coordinates of a mesh's triangle.
-TriangleUvs triangle_uvs(const Mesh *mesh, const uint32_t *corners, const CompiledTexture *texture);
+TriangleUvs triangle_uvs(const Mesh *mesh, const Vector3 vertices[3], const uint32_t *corners,
+                         const CompiledTexture *texture);

@@ -45,15 +45,21 @@ void scene_scale(Scene *scene, double factor)
         Object *object = &scene->objects.items[i];
         for (const size_t *offset = shape_ops[object->kind]->lengths; *offset > 0; offset++)
             *(double *)(void *)((char *)object + *offset) *= factor;
+        for (int row = 0; row < 3 && object->kind == SHAPE_MESH && object->as.mesh.is_instance; row++)
+            object->as.mesh.transform.rows[row][3] *= factor;
     }
     for (size_t i = 0; i < scene->lights.count; i++) {
         scene->lights.items[i].radius *= factor;
         scene->lights.items[i].fading[1] /= factor;
         scene->lights.items[i].fading[2] /= factor * factor;
     }
-    for (size_t i = 0; i < scene->meshes.count; i++)
-        for (size_t k = 0; k < scene->meshes.items[i].vertex_count; k++)
-            vector_grow(&scene->meshes.items[i].vertices[k], factor);
+    for (size_t i = 0; i < scene->meshes.count; i++) {
+        Mesh *mesh = &scene->meshes.items[i];
+        for (size_t k = 0; k < mesh->vertex_count; k++)
+            vector_grow(&mesh->vertices[k], factor);
+        vector_grow(&mesh->bounds.min, factor);
+        vector_grow(&mesh->bounds.max, factor);
+    }
     for (size_t i = 0; i < scene->materials.count; i++) {
         scene->materials.items[i].checker_size *= factor;
         scene->materials.items[i].texture_size *= factor;

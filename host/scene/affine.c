@@ -59,6 +59,24 @@ Affine affine_for_normals(const Affine *affine)
     return cofactors;
 }
 
+Vector3 affine_normal(const Affine *for_normals, Vector3 normal)
+{
+    return vector_is_zero(normal) ? normal : vector_normalize(affine_direction(for_normals, normal));
+}
+
+void affine_triangle(const Affine *affine, Vector3 vertices[3], Vector3 normals[3])
+{
+    const Affine for_normals = affine_for_normals(affine);
+    for (int i = 0; i < 3; i++) {
+        vertices[i] = affine_point(affine, vertices[i]);
+        normals[i] = affine_normal(&for_normals, normals[i]);
+    }
+    if (affine_determinant(affine) >= 0) return;
+    const Vector3 vertex = vertices[1], normal = normals[1];
+    vertices[1] = vertices[2], normals[1] = normals[2];
+    vertices[2] = vertex, normals[2] = normal;
+}
+
 // Sine and cosine of degrees, exact at quarter turns.
 static void turn_of(double degrees, double *sine, double *cosine)
 {

@@ -20,8 +20,13 @@ Affine affine_about(Vector3 axis, double degrees);
 Vector3 affine_point(const Affine *affine, Vector3 p);
 Vector3 affine_direction(const Affine *affine, Vector3 v);
 double affine_determinant(const Affine *affine);
+// Transforms a triangle's vertices and, as unit vectors, its normals, of which those that are zero stay zero.
+// A mirroring transform inverts the winding; the corners b and c change places to keep the outer side.
+void affine_triangle(const Affine *affine, Vector3 vertices[3], Vector3 normals[3]);
 // Transforms normals: the transposed inverse times |determinant|.
 Affine affine_for_normals(const Affine *affine);
+// Transforms a normal to a unit vector by what affine_for_normals returns; one that is zero stays zero.
+Vector3 affine_normal(const Affine *for_normals, Vector3 normal);
 
 // The scales of a transform across an axis and the vector that the unit axis becomes.
 typedef struct {

@@ -1,5 +1,6 @@
 #include "host/scene/describe.h"
 
+#include "host/scene/mesh.h"
 #include <string.h>
 
 const Object *scene_find_object(const Scene *scene, size_t id, size_t *primitive)
@@ -16,8 +17,9 @@ const Object *scene_find_object(const Scene *scene, size_t id, size_t *primitive
 
 uint32_t object_material(const Scene *scene, const Object *object, size_t primitive)
 {
-    const uint32_t *of_triangles =
-        object->kind == SHAPE_MESH ? scene->meshes.items[object->as.mesh.index].materials : NULL;
+    const uint32_t *of_triangles = object->kind == SHAPE_MESH
+                                       ? mesh_materials(&scene->meshes.items[object->as.mesh.index], object)
+                                       : NULL;
     return of_triangles ? of_triangles[primitive] : object->material;
 }
 

@@ -175,6 +175,44 @@ void mesh_make_normals(Mesh *mesh)
         mesh->normals[i] = vector_normalize(mesh->normals[i]);
 }
 
+MeshTriangle mesh_triangle_at(const Mesh *mesh, const Object *object, size_t part)
+{
+    MeshTriangle triangle = {.normals = {{0}}};
+    const uint32_t *corners = mesh->triangles[part];
+    for (int i = 0; i < 3; i++) {
+        triangle.vertices[i] = mesh->vertices[corners[i]];
+        if (mesh->normals) triangle.normals[i] = mesh->normals[corners[i]];
+    }
+    if (object->as.mesh.is_instance)
+        affine_triangle(&object->as.mesh.transform, triangle.vertices, triangle.normals);
+    return triangle;
+}
+
+const uint32_t *mesh_materials(const Mesh *mesh, const Object *object)
+{
+    return object->as.mesh.has_own_material ? NULL : mesh->materials;
+}
+
+void mesh_bound(Mesh *mesh)
+{
+    mesh->bounds = bounds_empty();
+    for (size_t i = 0; i < mesh->vertex_count; i++)
+        mesh->bounds = bounds_join(mesh->bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+}
+
+Bounds instance_bounds(const Mesh *mesh, const Object *object)
+{
+    const Vector3 low = mesh->bounds.min, high = mesh->bounds.max;
+    Bounds all = bounds_empty();
+    for (unsigned i = 0; i < 8 && mesh->vertex_count > 0; i++) {
+        const Vector3 corner =
+            affine_point(&object->as.mesh.transform,
+                         (Vector3){i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z});
+        all = bounds_join(all, (Bounds){corner, corner});
+    }
+    return all;
+}
+
 size_t mesh_degenerate_count(const Mesh *mesh)
 {
     size_t count = 0;

@@ -12,5 +12,18 @@ void mesh_join_vertices(Mesh *mesh);
 // them has an area.
 void mesh_make_normals(Mesh *mesh);
 
+// A triangle of an object that is a mesh, in world coordinates.
+typedef struct {
+    Vector3 vertices[3], normals[3]; // normals if the mesh has any
+} MeshTriangle;
+
+MeshTriangle mesh_triangle_at(const Mesh *mesh, const Object *object, size_t part);
+// Returns the materials of the object's triangles, or NULL if all have the object's.
+const uint32_t *mesh_materials(const Mesh *mesh, const Object *object);
+// Sets the bounds, as instances need them.
+void mesh_bound(Mesh *mesh);
+// Returns a box around the instance's box.
+Bounds instance_bounds(const Mesh *mesh, const Object *object);
+
 // Returns how many triangles have no area.
 size_t mesh_degenerate_count(const Mesh *mesh);

@@ -12,24 +12,6 @@ static void *items_copy(const void *items, size_t count, size_t size)
     return items ? memcpy(memory_allocate(count, size), items, count * size) : NULL;
 }
 
-Mesh mesh_copy(const Mesh *mesh)
-{
-    Mesh copy = *mesh;
-    copy.vertices = items_copy(mesh->vertices, mesh->vertex_count, sizeof *mesh->vertices);
-    copy.normals = items_copy(mesh->normals, mesh->vertex_count, sizeof *mesh->normals);
-    copy.uvs = items_copy(mesh->uvs, mesh->vertex_count, sizeof *mesh->uvs);
-    copy.triangles = items_copy(mesh->triangles, mesh->triangle_count, sizeof *mesh->triangles);
-    copy.materials = items_copy(mesh->materials, mesh->triangle_count, sizeof *mesh->materials);
-    copy.path = mesh->path ? memory_copy_text(mesh->path) : NULL;
-    return copy;
-}
-
-// A normal that is zero, where shading is flat, stays zero.
-static Vector3 normal_transform(const Affine *for_normals, Vector3 normal)
-{
-    return vector_is_zero(normal) ? normal : vector_normalize(affine_direction(for_normals, normal));
-}
-
 // A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side.
 static bool mesh_transform(Mesh *mesh, const Affine *affine)
 {
@@ -38,7 +20,7 @@ static bool mesh_transform(Mesh *mesh, const Affine *affine)
     for (size_t i = 0; i < mesh->vertex_count; i++) {
         mesh->vertices[i] = affine_point(affine, mesh->vertices[i]);
         fits &= vector_is_within(mesh->vertices[i], NUMBER_LARGEST);
-        if (mesh->normals) mesh->normals[i] = normal_transform(&for_normals, mesh->normals[i]);
+        if (mesh->normals) mesh->normals[i] = affine_normal(&for_normals, mesh->normals[i]);
     }
     const bool is_mirrored = affine_determinant(affine) < 0;
     for (size_t i = 0; i < mesh->triangle_count && is_mirrored; i++) {
@@ -51,17 +33,15 @@ static bool mesh_transform(Mesh *mesh, const Affine *affine)
 
 static bool triangle_transform(Object *object, const Affine *affine)
 {
-    const Affine for_normals = affine_for_normals(affine);
-    Vector3 *vertices = object->as.triangle.vertices, *normals = object->as.triangle.normals;
-    for (int i = 0; i < 3; i++) {
-        vertices[i] = affine_point(affine, vertices[i]);
-        normals[i] = normal_transform(&for_normals, normals[i]);
-    }
-    if (affine_determinant(affine) >= 0) return true;
-    const Vector3 vertex = vertices[1], normal = normals[1];
-    vertices[1] = vertices[2], normals[1] = normals[2];
-    vertices[2] = vertex, normals[2] = normal;
+    affine_triangle(affine, object->as.triangle.vertices, object->as.triangle.normals);
     return true;
+}
+
+static bool instance_transform(const Mesh *mesh, Object *object, const Affine *affine)
+{
+    object->as.mesh.transform = affine_multiply(affine, &object->as.mesh.transform);
+    const Bounds bounds = instance_bounds(mesh, object);
+    return vector_is_within(bounds.min, NUMBER_LARGEST) && vector_is_within(bounds.max, NUMBER_LARGEST);
 }
 
 static bool keeps_axes(const Affine *affine)
@@ -115,7 +95,7 @@ static bool plane_transform(Object *object, const Affine *affine)
 {
     const Affine for_normals = affine_for_normals(affine);
     object->as.plane.point = affine_point(affine, object->as.plane.point);
-    object->as.plane.normal = normal_transform(&for_normals, object->as.plane.normal);
+    object->as.plane.normal = affine_normal(&for_normals, object->as.plane.normal);
     return true;
 }
 
@@ -125,7 +105,7 @@ static bool disc_transform(Object *object, const Affine *affine)
     AxisScale scale;
     if (!affine_keeps_circles(affine, object->as.disc.normal, false, &scale)) return false;
     object->as.disc.center = affine_point(affine, object->as.disc.center);
-    object->as.disc.normal = normal_transform(&for_normals, object->as.disc.normal);
+    object->as.disc.normal = affine_normal(&for_normals, object->as.disc.normal);
     object->as.disc.radius *= scale.across;
     return true;
 }
@@ -252,8 +232,12 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
 {
     static const char *const out_of_range = "gets a size of 0 or a number beyond 1e30";
     if (object->kind == SHAPE_BOX && !keeps_axes(affine)) box_make_mesh(scene, object);
-    if (object->kind == SHAPE_MESH)
-        return mesh_transform(&scene->meshes.items[object->as.mesh.index], affine) ? NULL : out_of_range;
+    if (object->kind == SHAPE_MESH) {
+        Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+        const bool fits = object->as.mesh.is_instance ? instance_transform(mesh, object, affine)
+                                                      : mesh_transform(mesh, affine);
+        return fits ? NULL : out_of_range;
+    }
     if (!shapes[object->kind].transform(object, affine)) return shapes[object->kind].need;
     return numbers_fit(object) ? NULL : out_of_range;
 }

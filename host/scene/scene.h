@@ -3,6 +3,8 @@
 #pragma once
 
 #include "host/base/text.h"
+#include "host/scene/affine.h"
+#include "host/scene/bounds.h"
 #include "host/scene/vector.h"
 #include <stdbool.h>
 #include <stddef.h>
@@ -171,13 +173,16 @@ typedef struct {
             bool finite, caps;
         } paraboloid;
         struct {
-            uint32_t index; // into the scene's meshes
+            uint32_t index;        // into the scene's meshes
+            bool is_instance;      // which `transform` places, of a mesh that other objects may have
+            bool has_own_material; // instead of the mesh's
+            Affine transform;
         } mesh;
     } as;
 } Object;
 
-// Triangles that share vertices, in world coordinates. A mesh is one object in the file, and each of its
-// triangles has an id.
+// Triangles that share vertices, in world coordinates unless it has instances. A mesh or an instance is one
+// object in the file, and each of its triangles has an id.
 typedef struct {
     Vector3 *vertices;
     Vector3 *normals; // one for each vertex, unit or zero (flat there), or NULL: flat
@@ -186,6 +191,7 @@ typedef struct {
     uint32_t (*triangles)[3];
     uint32_t *materials; // one for each triangle, or NULL: the object's
     size_t triangle_count;
+    Bounds bounds;                    // of the vertices, if the mesh has instances
     char *path;                       // that it was read from, or NULL
     uint64_t file_device, file_index; // of that file, by whatever name
 } Mesh;

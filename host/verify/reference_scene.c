@@ -1,20 +1,22 @@
 #include "host/verify/reference_scene.h"
 
 #include "host/base/memory.h"
+#include "host/scene/mesh.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 // A normal that is zero is that of the triangle.
-static Object mesh_triangle(const Mesh *mesh, size_t part, uint32_t material)
+static Object mesh_triangle(const Mesh *mesh, const Object *whole, size_t part)
 {
-    const uint32_t *corners = mesh->triangles[part];
-    Object object = {.kind = SHAPE_TRIANGLE, .material = material};
+    const MeshTriangle triangle = mesh_triangle_at(mesh, whole, part);
+    const uint32_t *materials = mesh_materials(mesh, whole);
+    Object object = {.kind = SHAPE_TRIANGLE, .material = materials ? materials[part] : whole->material};
     Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
-    for (int i = 0; i < 3; i++)
-        vertices[i] = mesh->vertices[corners[i]];
+    memcpy(vertices, triangle.vertices, sizeof triangle.vertices);
     const Vector3 flat = triangle_normal(vertices[0], vertices[1], vertices[2]);
     for (int i = 0; i < 3; i++) {
-        normals[i] = mesh->normals ? mesh->normals[corners[i]] : flat;
+        normals[i] = mesh->normals ? triangle.normals[i] : flat;
         if (vector_dot(normals[i], normals[i]) == 0) normals[i] = flat;
     }
     object.as.triangle.smooth = mesh->normals != NULL;
@@ -36,7 +38,7 @@ ReferenceScene reference_scene_open(const Scene *scene)
         }
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         for (size_t k = 0; k < mesh->triangle_count; k++)
-            objects[next++] = mesh_triangle(mesh, k, mesh->materials ? mesh->materials[k] : object->material);
+            objects[next++] = mesh_triangle(mesh, object, k);
     }
     made.scene.objects.items = objects;
     made.scene.objects.count = made.scene.objects.capacity = count;

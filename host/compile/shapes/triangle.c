@@ -4,6 +4,7 @@
 #endif
 #include "host/compile/shapes.h"
 #include "host/compile/texture_mapping.h"
+#include "host/scene/mesh.h"
 #include "host/scene/polygon.h"
 #include <math.h>
 #include <string.h>
@@ -133,12 +134,14 @@ static uint32_t normals_add(Flattening *flattening, Vector3 a, Vector3 b, Vector
 }
 
 // What a triangle's id.z holds.
-static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const uint32_t *corners, uint32_t material)
+static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const MeshTriangle *triangle,
+                        const uint32_t *corners, uint32_t material)
 {
     uint32_t texture = flattening->scene->materials.items[material].texture;
     if (!mesh->uvs || texture == 0) return 0;
     TriangleUvs *uvs = flattening->compiled->arrays[FLAT_TRIANGLE_UVS].items;
-    uvs[flattening->uvs_count++] = triangle_uvs(mesh, corners, &flattening->compiled->textures[texture - 1]);
+    uvs[flattening->uvs_count++] =
+        triangle_uvs(mesh, triangle->vertices, corners, &flattening->compiled->textures[texture - 1]);
     return (uint32_t)flattening->uvs_count;
 }
 
@@ -154,21 +157,30 @@ static void triangle_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, KIND_TRIANGLES, &triangle, object->material);
 }
 
+// Corners of the triangle in the order of mesh_triangle_at.
+static void corners_ordered(const Mesh *mesh, const Object *object, size_t part, uint32_t corners[3])
+{
+    memcpy(corners, mesh->triangles[part], 3 * sizeof *corners);
+    if (!object->as.mesh.is_instance || affine_determinant(&object->as.mesh.transform) >= 0) return;
+    corners[1] = mesh->triangles[part][2];
+    corners[2] = mesh->triangles[part][1];
+}
+
 static void mesh_flatten(Flattening *flattening, const Object *object)
 {
     const Mesh *mesh = &flattening->scene->meshes.items[object->as.mesh.index];
-    const Vector3 *vertices = mesh->vertices, *normals = mesh->normals;
-    const uint32_t *corners = mesh->triangles[flattening->part];
-    const uint32_t material = mesh->materials ? mesh->materials[flattening->part] : object->material;
-    Triangle triangle =
-        triangle_make(flattening, vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]);
+    const MeshTriangle placed = mesh_triangle_at(mesh, object, flattening->part);
+    const Vector3 *vertices = placed.vertices, *normals = placed.normals;
+    const uint32_t *materials = mesh_materials(mesh, object);
+    const uint32_t material = materials ? materials[flattening->part] : object->material;
+    Triangle triangle = triangle_make(flattening, vertices[0], vertices[1], vertices[2]);
     if (flattening->moved) {
         triangle_keep_attributes(&triangle, flattening->moved);
     } else {
-        if (normals)
-            triangle.id.y =
-                normals_add(flattening, normals[corners[0]], normals[corners[1]], normals[corners[2]]);
-        triangle.id.z = uvs_add(flattening, mesh, corners, material);
+        if (mesh->normals) triangle.id.y = normals_add(flattening, normals[0], normals[1], normals[2]);
+        uint32_t corners[3];
+        corners_ordered(mesh, object, flattening->part, corners);
+        triangle.id.z = uvs_add(flattening, mesh, &placed, corners, material);
     }
     primitive_add(flattening, KIND_TRIANGLES, &triangle, material);
 }
@@ -184,7 +196,8 @@ static bool triangle_bounds(const Scene *scene, const Object *object, Bounds *bo
 static bool mesh_bounds(const Scene *scene, const Object *object, Bounds *bounds)
 {
     const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
-    *bounds = bounds_empty();
+    *bounds = object->as.mesh.is_instance ? instance_bounds(mesh, object) : bounds_empty();
+    if (object->as.mesh.is_instance) return true;
     for (size_t i = 0; i < mesh->vertex_count; i++)
         *bounds = bounds_join(*bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
     return true;

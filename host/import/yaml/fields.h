@@ -20,8 +20,6 @@ typedef struct {
     const char *name; // in the tree's texts
     Object *objects;
     size_t object_count;
-    Mesh *meshes;
-    size_t mesh_count;
 } Definition;
 
 typedef struct {

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The most objects that definitions have and instances copy. Four triangles of a mesh count as one object, a
-// box as four, and a member of a group that is read again, through an alias, as GROUP_COST of them. Bounds
-// the cost of a hostile file, as DEFINITIONS_MAX does.
+// The most objects that definitions have and instances repeat. A mesh counts as one object, a box as four,
+// and a member of a group that is read again, through an alias, as GROUP_COST of them. Bounds the cost of a
+// hostile file, as DEFINITIONS_MAX does.
 enum { COPIES_MAX = 1 << 22, GROUP_COST = 16, DEFINITIONS_MAX = 1000 };
 
 static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
@@ -21,9 +21,7 @@ static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
     reader->copy_count += count;
     return reader->copy_count <= largest ||
            report_error(&reader->report, node->offset,
-                        "definitions, instances and repeated groups have more than %d objects, or four times "
-                        "as many triangles",
-                        COPIES_MAX);
+                        "definitions, instances and repeated groups have more than %d objects", COPIES_MAX);
 }
 
 // Returns whether the look of the object depends on where or how it lies in the world, so that a transform
@@ -78,25 +76,21 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
     if (transform != mapping) yaml_transform_objects(reader, first, &group.transform, transform);
 }
 
-// Moves the scene's objects and meshes from the given indices on to a definition.
-static Definition definition_move(YamlReader *reader, const char *name, size_t first_object,
-                                  size_t first_mesh)
+// Moves the scene's objects from the given index on to a definition. Their meshes stay in the scene.
+static Definition definition_move(YamlReader *reader, const char *name, size_t first_object)
 {
     Scene *scene = reader->scene;
-    Definition definition = {.name = name,
-                             .object_count = scene->objects.count - first_object,
-                             .mesh_count = scene->meshes.count - first_mesh};
+    Definition definition = {.name = name, .object_count = scene->objects.count - first_object};
     definition.objects = memory_allocate(definition.object_count, sizeof *definition.objects);
-    definition.meshes = memory_allocate(definition.mesh_count, sizeof *definition.meshes);
     for (size_t i = 0; i < definition.object_count; i++) {
-        definition.objects[i] = scene->objects.items[first_object + i];
-        if (definition.objects[i].kind == SHAPE_MESH)
-            definition.objects[i].as.mesh.index -= (uint32_t)first_mesh;
+        Object *object = &definition.objects[i];
+        *object = scene->objects.items[first_object + i];
+        if (object->kind != SHAPE_MESH || object->as.mesh.is_instance) continue;
+        mesh_bound(&scene->meshes.items[object->as.mesh.index]);
+        object->as.mesh.is_instance = true;
+        object->as.mesh.transform = affine_identity;
     }
-    for (size_t i = 0; i < definition.mesh_count; i++)
-        definition.meshes[i] = scene->meshes.items[first_mesh + i];
     scene->objects.count = reader->places.object_count = first_object;
-    scene->meshes.count = first_mesh;
     return definition;
 }
 
@@ -110,12 +104,10 @@ static const Definition *definition_find(const YamlReader *reader, const char *n
 // A box may become a mesh of 12 triangles.
 static size_t definition_cost(const Definition *definition)
 {
-    size_t triangles = 0, cost = 1;
-    for (size_t i = 0; i < definition->mesh_count; i++)
-        triangles += definition->meshes[i].triangle_count;
+    size_t cost = 1;
     for (size_t i = 0; i < definition->object_count; i++)
         cost += definition->objects[i].kind == SHAPE_BOX ? 4 : 1;
-    return cost + triangles / 4;
+    return cost;
 }
 
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
@@ -131,7 +123,7 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
         value = yaml_next(&reader->tree, key);
         if (!key_is_word(reader, key)) continue;
         const char *name = yaml_text(&reader->tree, key);
-        const size_t first_object = reader->scene->objects.count, first_mesh = reader->scene->meshes.count;
+        const size_t first_object = reader->scene->objects.count;
         const YamlNode *objects = NULL;
         if (definition_find(reader, name)) {
             report_error(&reader->report, key->offset, "'%.*s' is given twice", WORD_SHOWN, name);
@@ -144,21 +136,28 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
         if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL) &&
             copies_add(reader, GROUP_COST * (1 + (size_t)objects->child_count), value))
             yaml_read_object_list(reader, objects, false);
-        const Definition definition = definition_move(reader, name, first_object, first_mesh);
+        const Definition definition = definition_move(reader, name, first_object);
         array_push(reader->definitions, definition);
         copies_add(reader, definition_cost(&definition), value);
     }
 }
 
+// Frees the meshes that no object of the scene has, and leaves them empty.
+static void unused_meshes_free(Scene *scene)
+{
+    bool *is_used = memory_allocate_zeroed(scene->meshes.count + 1, sizeof *is_used);
+    for (size_t i = 0; i < scene->objects.count; i++)
+        if (scene->objects.items[i].kind == SHAPE_MESH) is_used[scene->objects.items[i].as.mesh.index] = true;
+    for (size_t i = 0; i < scene->meshes.count; i++)
+        if (!is_used[i]) mesh_free(&scene->meshes.items[i]);
+    free(is_used);
+}
+
 void yaml_definitions_free(YamlReader *reader)
 {
-    for (size_t i = 0; i < reader->definitions.count; i++) {
-        Definition *definition = &reader->definitions.items[i];
-        for (size_t k = 0; k < definition->mesh_count; k++)
-            mesh_free(&definition->meshes[k]);
-        free(definition->meshes);
-        free(definition->objects);
-    }
+    if (reader->definitions.count > 0) unused_meshes_free(reader->scene);
+    for (size_t i = 0; i < reader->definitions.count; i++)
+        free(reader->definitions.items[i].objects);
     free(reader->definitions.items);
 }
 
@@ -202,15 +201,7 @@ void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)
     for (size_t i = 0; i < definition->object_count; i++) {
         Object object = definition->objects[i];
         if (own_material) object.material = instance.material;
-        if (object.kind == SHAPE_MESH) {
-            Mesh mesh = mesh_copy(&definition->meshes[object.as.mesh.index]);
-            if (own_material) {
-                free(mesh.materials);
-                mesh.materials = NULL;
-            }
-            object.as.mesh.index = (uint32_t)scene->meshes.count;
-            array_push(scene->meshes, mesh);
-        }
+        if (object.kind == SHAPE_MESH) object.as.mesh.has_own_material |= own_material;
         if (!yaml_material_fits(reader, &object, field_node(reader, mapping, "material"))) return;
         array_push(scene->objects, object);
     }
