@@ -1,12 +1,12 @@
 // Lists the kernel features that a scene may need, shared by host and kernels. In kernels each NAME is
-// HAS_NAME, 0 or 1. docs/performance.md has the cost of each where it is not needed. Every shape of
-// SHAPE_LIST (kernels/types.h) is a feature, so FEATURE takes a name and ignores the rest of a shape's row.
+// HAS_NAME, 0 or 1. docs/performance.md has the cost of each where it is not needed. Every primitive of
+// PRIMITIVE_LIST (kernels/types.h) is a feature, so FEATURE takes a name and ignores the rest of its row.
 #ifndef FEATURES_H
 #define FEATURES_H
 
 // clang-format off
 #define FEATURE_LIST(FEATURE)     \
-    SHAPE_LIST(FEATURE)           \
+    PRIMITIVE_LIST(FEATURE)       \
     FEATURE(POINT_LIGHTS, )       \
     FEATURE(DIRECTIONAL_LIGHTS, ) \
     FEATURE(SPOT_LIGHTS, )        \

@@ -139,8 +139,31 @@ typedef struct {
     SHAPE(PARABOLOIDS, Paraboloid, paraboloid, paraboloids)
 // clang-format on
 
+// An instance of a mesh that instances share, a primitive of the scene's BVH with a BVH inside. It maps the
+// mesh's space, in which its box is around 0 and its largest coordinate is 1/2 to 1, to that of the eye.
+typedef struct {
+    scalar4 rows[3];     // of the map; w: where the mesh's 0 lies
+    scalar4 inverses[3]; // rows of its inverse; w of the first: the root of the map's |determinant|
+    scalar4 extent;      // half of the box around the instance; w: its condition
+    uint4 id;            // x: its first triangle's, y: its SharedMesh, z: 1 + the material, or 0: the mesh's
+} Instance;
+
+// The condition of an instance is the largest sum over a row of |map| |inverse|, by which the roundings of a
+// ray that is mapped and of the points that it hits grow. The host copies meshes instead if it is more.
+enum { INSTANCE_CONDITION_MAX = 32 };
+// What mapping a ray moves it by within a distance, in u of that distance times the condition
+// (docs/numerics.md).
+enum { INSTANCE_RAY_SLACK = 10 };
+
+// Every kind of primitive: the shapes and the instance.
+// clang-format off
+#define PRIMITIVE_LIST(PRIMITIVE) \
+    SHAPE_LIST(PRIMITIVE)         \
+    PRIMITIVE(INSTANCES, Instance, instance, instances)
+// clang-format on
+
 #define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
-enum { SHAPE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 };
+enum { PRIMITIVE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 };
 
 // A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
 // high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. With
@@ -212,7 +235,20 @@ enum { CERTIFIED_CULL_SPHERE_SLACK = 1 << 10, CERTIFIED_CULL_DIRECTION_SLACK = 1
 
 enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };
 
-// The shape and the material that an object's id refers to.
+// A mesh that instances share. Its triangles, whose id.x counts from 0, follow those of the scene.
+typedef struct {
+    scalar4 extent; // half of its box
+    uint4 place;    // x: its BVH's root, y: the ObjectEntry of its first triangle
+} SharedMesh;
+
+// The ids of an instance. There is one for each instance, in the order of ids; the ids between them are those
+// of other objects, which have an ObjectEntry each, as has every instance.
+typedef struct {
+    uint4
+        ids; // x: the first, y: the one behind the last, z: what an id behind is above its entry, w: instance
+} InstanceIds;
+
+// The shape and the material that an object's id refers to. Ids are indices unless there are instances.
 typedef struct {
     uint4 kind_index_material; // x: KIND_…, y: index in that shape's array, z: index of the material
 } ObjectEntry;
@@ -340,7 +376,7 @@ typedef struct {
     scalar4 eye, forward, right, up;
     scalar4 lens_right, lens_up;
     scalar4 bounds;                  // those of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
-    scalar4 bounds_low, bounds_high; // its corners
+    scalar4 bounds_low, bounds_high; // its corners; low.w: what mapping rays to instances adds to box slacks
     // The corners of a box around all points where a transparent object may touch an opaque one. Low is above
     // high if there are no such points.
     scalar4 contact_low, contact_high;
@@ -361,7 +397,7 @@ typedef struct {
 // struct, a shape's name, name of the array).
 // clang-format off
 #define ARENA_LIST(ARRAY)                                              \
-    SHAPE_LIST(ARRAY)                                                  \
+    PRIMITIVE_LIST(ARRAY)                                              \
     ARRAY(TRIANGLE_NORMALS, TriangleNormals, , triangle_normals)       \
     ARRAY(TRIANGLE_UVS, TriangleUvs, , triangle_uvs)                   \
     ARRAY(TRIANGLE_NEIGHBORS, TriangleNeighbors, , triangle_neighbors) \
@@ -372,7 +408,9 @@ typedef struct {
     ARRAY(OBJECTS, ObjectEntry, , objects)                             \
     ARRAY(MATERIALS, Material, , materials)                            \
     ARRAY(LIGHTS, Light, , lights)                                     \
-    ARRAY(TEXTURE_LEVELS, TextureLevel, , texture_levels)
+    ARRAY(TEXTURE_LEVELS, TextureLevel, , texture_levels)              \
+    ARRAY(SHARED_MESHES, SharedMesh, , shared_meshes)                  \
+    ARRAY(INSTANCE_IDS, InstanceIds, , instance_ids)
 // clang-format on
 
 // Where each array begins, in units of the largest alignment, that of a double16.

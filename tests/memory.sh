@@ -14,8 +14,9 @@ E2
 # peak WIDTHxHEIGHT OPTIONS…: the largest memory of a render, of its ranks the largest one's, in MiB, with its seconds, on
 # standard output.
 program=("$GLINT")
+scene=ball.yaml
 peak() {
-    python3 - "${program[@]}" render ball.yaml --quiet --size "$@" <<'E2'
+    python3 - "${program[@]}" render "$scene" --quiet --size "$@" <<'E2'
 import resource, subprocess, sys, time
 start = time.monotonic()
 subprocess.run(sys.argv[1:], check=True)
@@ -37,7 +38,30 @@ bounded() {
 }
 
 # builds the kernels of these options: the memory of the driver's compiler, half a GiB in PoCL 7.1, does not count
-built() { check "64x64 $*" "$GLINT" render ball.yaml --quiet --size 64x64 "$@"; }
+built() { check "64x64 $*" "$GLINT" render "$scene" --quiet --size 64x64 "$@"; }
+
+# 10,000 instances of a mesh of 20,000 triangles, which share it
+python3 - <<'E2'
+SIDE, INSTANCES = 100, 10000
+with open("mesh.obj", "w") as mesh:
+    for i in range((SIDE + 1) ** 2):
+        x, z = i % (SIDE + 1), i // (SIDE + 1)
+        mesh.write(f"v {x / SIDE} {x * z % 7 / 70} {z / SIDE}\n")
+    for i in range(SIDE ** 2):
+        a = i // SIDE * (SIDE + 1) + i % SIDE + 1
+        mesh.write(f"f {a} {a + 1} {a + SIDE + 2}\nf {a} {a + SIDE + 2} {a + SIDE + 1}\n")
+with open("many.yaml", "w") as scene:
+    scene.write("camera: {position: [0, 80, -90], look_at: [0, 0, 0], fov: 60}\n"
+                "lights: [{directional: {direction: [1, -1, 2]}}]\n"
+                "define: {tile: {objects: [{mesh: {file: mesh.obj}}]}}\nobjects:\n")
+    for i in range(INSTANCES):
+        place = f"[{i % 100 - 50}, {i % 3}, {i // 100 - 50}]"
+        scene.write(f"  - instance: {{of: tile, transform: {{rotate: [{i % 50}, {i}, 0], translate: {place}}}}}\n")
+E2
+scene=many.yaml
+built -o many.png
+bounded 200 1280x720 -o many.png
+scene=ball.yaml
 
 built -o small.png
 bounded 200 64x64 -o small.png

@@ -105,7 +105,10 @@ typedef struct {
     REALS(FLAT_LIGHTS, Light, FlatLight, across_v)                               \
     INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)                                \
     INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
-    INTEGERS(FLAT_TEXELS, Texel, Texel, color)
+    INTEGERS(FLAT_TEXELS, Texel, Texel, color)                                   \
+    REALS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, extent)                    \
+    INTEGERS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, place)                  \
+    INTEGERS(FLAT_INSTANCE_IDS, InstanceIds, InstanceIds, ids)
 // clang-format on
 
 typedef struct {
@@ -121,7 +124,7 @@ typedef struct {
     {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), true},
 #define SHAPE_ENTRY(feature, Type, name, names)                                                              \
     INTEGERS_ENTRY(FLAT_FIRST_SHAPE + KIND_##feature, Type, Type, id)
-static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY) SHAPE_LIST(SHAPE_ENTRY)};
+static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY) PRIMITIVE_LIST(SHAPE_ENTRY)};
 enum { MEMBER_COUNT = sizeof members / sizeof *members };
 
 // One object of every shape and a texture, so that the compiled scene has every struct's layout.
@@ -141,26 +144,39 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "  - mesh: {file: tests/textures/quad.obj, material: {image: "
                                  "scenes/images/globe.png}}\n";
 
-static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
+static const char instance_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
+                                    "define: {quad: {objects: [{mesh: {file: tests/textures/quad.obj}}]}}\n"
+                                    "objects: [{instance: {of: quad}}]\n";
+
+static void layouts_of_scene(FlatLayout layouts[FLAT_COUNT], const char *text, bool is_double, bool certifies)
 {
-    Scene scene = scene_of_text("layout.yaml", scene_text);
+    Scene scene = scene_of_text("layout.yaml", text);
     CompiledScene compiled;
     const CompileSettings settings = {.width = 1,
                                       .height = 1,
                                       .sample_count = 1,
                                       .precision = is_double ? PRECISION_DOUBLE : PRECISION_SINGLE,
-                                      .certifies = true,
+                                      .certifies = certifies,
+                                      .instances = INSTANCES_SHARED,
                                       .lanes = BVH_WIDTH_MIN, // with blocks of triangles
                                       .bvh = BVH_ON,
                                       .shift_to_eye = true};
     MessageList messages = {0};
     assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        assert_true(compiled.arrays[kind].count > 0);
-        layouts[kind] = compiled.arrays[kind].layout;
-    }
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        if (compiled.arrays[kind].count > 0) layouts[kind] = compiled.arrays[kind].layout;
     compiled_scene_free(&compiled);
     scene_free(&scene);
+}
+
+// `certified` has the triangles' neighbors and copies instances.
+static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
+{
+    memset(layouts, 0, FLAT_COUNT * sizeof *layouts);
+    layouts_of_scene(layouts, instance_text, is_double, false);
+    layouts_of_scene(layouts, scene_text, is_double, true);
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        assert_true(layouts[kind].size > 0);
 }
 
 // Writes kernels that follow lanes.h and types.h and return the device's layout of each member, and its value

@@ -53,9 +53,9 @@ static void same_and_freed(Film *film, const Film *expected, const char *what)
 static void scene_has_every_feature(void **state)
 {
     (void)state;
-    // test_textures has textures, which a mirror image would have to mirror
+    // test_textures has textures, which a mirror image would have to mirror, test_instances instances
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
-                         SAMPLED_FEATURES,
+                         FEATURE_INSTANCES | SAMPLED_FEATURES,
                      FEATURE_ALL);
     assert_int_equal(features_of(&sampled) & SAMPLED_FEATURES, FEATURE_AREA_LIGHTS | FEATURE_LENS);
 }
@@ -214,7 +214,7 @@ static void features_alone_and_all_together_agree(void **state)
         scene_free(&scene);
     }
     // these depend on numbers and settings, and have separate tests
-    assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS, FEATURE_ALL);
+    assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_INSTANCES, FEATURE_ALL);
 
     // No scene needs checkers alone: built in without need, on an empty scene.
     Scene empty = scene_of_text("feature.yaml", SCENE_HEAD);

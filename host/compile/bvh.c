@@ -4,6 +4,7 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/bvh_split.h"
+#include "host/compile/flat_types.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -78,6 +79,7 @@ static bool range_divide(const Builder *builder, const Range *range, unsigned de
         const bool fits = count <= builder->leaves.size_max;
         if (fits) range_sort_by_kind(builder, range);
         left = fits ? range_kind_boundary(builder, range) - range->begin : count / 2;
+        if (left == count && count > 1 && reference_kind(references) == KIND_INSTANCES) left = count / 2;
         if (left == count) return false;
         bounds[0] = range_bounds_of(references, left);
         bounds[1] = range_bounds_of(references + left, count - left);

@@ -1,5 +1,6 @@
 // The bounding volume hierarchy over a scene's bounded primitives: a binary tree by the surface area
-// heuristic (bvh_split.h), both sides of a large split built by two threads, every leaf of one kind of shape.
+// heuristic (bvh_split.h), both sides of a large split built by two threads, every leaf of one kind of shape,
+// those of instances of one each.
 // The tree is the same whatever the number of threads; only the order of its nodes is not.
 #pragma once
 

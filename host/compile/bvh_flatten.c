@@ -1,6 +1,7 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/bvh_widen.h"
+#include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <float.h>
@@ -139,6 +140,7 @@ static void array_permute(FlatArray *array, uint32_t *from)
 }
 
 typedef struct {
+    const CompiledScene *compiled;
     const FlatArray *array;
     ObjectEntry *entries;
 } Entering;
@@ -148,7 +150,7 @@ static void range_enter(void *context, size_t begin, size_t end)
     const Entering *entering = context;
     for (size_t i = begin; i < end; i++) {
         const uint32_t id = *flat_id(entering->array, flat_array_at(entering->array, i));
-        entering->entries[id].kind_index_material.y = (uint32_t)i;
+        entering->entries[entry_of_id(entering->compiled, id)].kind_index_material.y = (uint32_t)i;
     }
 }
 
@@ -171,7 +173,7 @@ static void array_reorder(CompiledScene *compiled, size_t kind, const Bvh *bvh, 
     free(in_tree);
     array_permute(array, from);
     free(from);
-    Entering entering = {array, compiled->arrays[FLAT_OBJECTS].items};
+    Entering entering = {compiled, array, compiled->arrays[FLAT_OBJECTS].items};
     parallel_run(array->count, FLAT_RANGE_MIN, range_enter, &entering);
 }
 
@@ -377,27 +379,15 @@ static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
     return (BvhLeaves){has_blocks && lanes < LEAF_SIZE_MAX ? lanes : LEAF_SIZE_MAX, false};
 }
 
-void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
+// Builds the BVH of what is bounded, and orders it.
+static void tree_flatten(CompiledScene *compiled, const CompileSettings *settings, Bounded *bounded)
 {
-    flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
-    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN, false);
-    flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, 0, BVH_WIDTH_MIN, false);
-    flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
-    if (settings->bvh == BVH_OFF) return;
-    Bounded bounded;
-    bounded_collect(&bounded, compiled);
-    huge_remove(&bounded);
-    if (bounded.count < (settings->bvh == BVH_ON ? 1 : BVH_WORTHWHILE)) {
-        bounded_free(&bounded);
-        return;
-    }
-    compiled->features |= FEATURE_BVH;
     Bvh bvh;
-    stage_begin(settings->stage, "building the BVH", NULL, bounded.count);
-    bvh_build(&bvh, bounded.boxes, bounded.kinds, bounded.count, leaves_for(&bounded, settings->lanes),
+    stage_begin(settings->stage, "building the BVH", NULL, bounded->count);
+    bvh_build(&bvh, bounded->boxes, bounded->kinds, bounded->count, leaves_for(bounded, settings->lanes),
               settings->stage);
-    free(bounded.boxes);
-    bounded.boxes = NULL;
+    free(bounded->boxes);
+    bounded->boxes = NULL;
     stage_begin(settings->stage, "widening the BVH", NULL, 0);
     nodes_write(compiled, &bvh, settings->lanes < BVH_WIDTH_MIN ? BVH_WIDTH_MIN : settings->lanes);
     if (settings->lanes > 1) blocks_place(compiled, settings->lanes, settings->precision == PRECISION_DOUBLE);
@@ -405,11 +395,51 @@ void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
     free(bvh.nodes);
     bvh.nodes = NULL;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        array_reorder(compiled, kind, &bvh, &bounded);
+        array_reorder(compiled, kind, &bvh, bounded);
     blocks_fill(compiled);
-    memcpy(compiled->bvh_counts, bounded.kind_counts, sizeof compiled->bvh_counts);
+    memcpy(compiled->bvh_counts, bounded->kind_counts, sizeof compiled->bvh_counts);
     bvh_free(&bvh);
+}
+
+static void tree_arrays_renew(CompiledScene *compiled)
+{
+    flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN, false);
+    flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, 0, BVH_WIDTH_MIN, false);
+    flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
+}
+
+void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
+{
+    tree_arrays_renew(compiled);
+    if (settings->bvh == BVH_OFF) return;
+    Bounded bounded;
+    bounded_collect(&bounded, compiled);
+    huge_remove(&bounded);
+    if (bounded.count >= (settings->bvh == BVH_ON ? 1 : BVH_WORTHWHILE)) {
+        compiled->features |= FEATURE_BVH;
+        tree_flatten(compiled, settings, &bounded);
+    }
     bounded_free(&bounded);
+}
+
+void mesh_bvh_flatten(CompiledScene *compiled, const CompileSettings *settings)
+{
+    tree_arrays_renew(compiled);
+    Bounded bounded;
+    bounded_collect(&bounded, compiled);
+    tree_flatten(compiled, settings, &bounded);
+    bounded_free(&bounded);
+}
+
+void bvh_shift(CompiledScene *compiled, uint32_t node_base, uint32_t leaf_base)
+{
+    for (size_t i = 0; i < compiled->arrays[FLAT_NODES].count; i++) {
+        const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
+        for (unsigned k = 0; k < node.width; k++)
+            if (node.child_kind[k] != BVH_EMPTY)
+                node.child_index[k] += node.child_kind[k] == BVH_NODE ? node_base : leaf_base;
+    }
 }
 
 // The boxes of the leaves around their primitives.
@@ -447,7 +477,10 @@ static Bounds node_bounds(const FlatNode *node)
 
 void bvh_refit(CompiledScene *compiled)
 {
-    if (compiled->pending_children_max == 0) return; // no BVH, though the kernel may be built for one
+    uint32_t count = 0;
+    for (size_t kind = 0; kind < KIND_COUNT; kind++)
+        count += compiled->bvh_counts[kind];
+    if (count == 0) return; // no BVH, though the kernel may be built for one
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     compiled->changed[FLAT_NODES] = true;
     parallel_run(nodes->count, FLAT_RANGE_MIN / 16, leaves_fit, compiled);

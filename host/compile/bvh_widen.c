@@ -80,7 +80,7 @@ static void subtree_count(const Widening *widening, const Subtree *first, const 
     const uint8_t *kinds = widening->bvh->kinds;
     bool joins = first->count > 0 && second->count > 0 &&
                  first->count + second->count <= widening->bvh->leaves.size_max &&
-                 kinds[first->first] == kinds[second->first];
+                 kinds[first->first] == kinds[second->first] && kinds[first->first] != KIND_INSTANCES;
     subtree->first = first->first < second->first ? first->first : second->first;
     subtree->count = joins ? first->count + second->count : 0;
 }

@@ -2,6 +2,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/hash.h"
+#include "host/compile/instances.h"
 #include "host/compile/stages.h"
 #include "host/compile/transform.h"
 
@@ -16,15 +17,19 @@ static Vector3 eye_of(const Scene *scene, const CompileSettings *settings)
 
 static Rounding rounding_from(Vector3 eye, const CompileSettings *settings)
 {
-    return (Rounding){eye, settings->precision == PRECISION_DOUBLE, settings->shift_to_eye,
-                      settings->certifies};
+    return (Rounding){.eye = eye,
+                      .is_double = settings->precision == PRECISION_DOUBLE,
+                      .has_eye = settings->shift_to_eye,
+                      .certifies = settings->certifies};
 }
 
 // The stages of a scene in the device's unit.
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
 {
-    if (!features_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages) ||
+    compiled->instances = instances_plan(scene, settings);
+    if (!size_fits(compiled, scene, messages) || !features_fit(scene, settings, messages) ||
+        !lights_fit(compiled, scene, settings, messages) ||
         !textures_load(compiled, scene, settings, messages))
         return false;
     const Rounding rounding = rounding_from(eye_of(scene, settings), settings);
@@ -36,6 +41,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     if (!numbers_fit(compiled, scene, settings, messages)) return false;
     neighbors_find(compiled, scene, settings);
     compiled->features |= features_of(scene) | settings->extra_features;
+    if (compiled->instances) compiled->features |= FEATURE_INSTANCES;
     if (settings->hashes_primitives) {
         compiled->primitives_hash = HASH_START;
         for (size_t kind = 0; kind < FLAT_COUNT; kind++)
@@ -49,6 +55,9 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     culling_fill(compiled, settings);
     if (compiled->features & FEATURE_TRANSMISSION) compiled->contact = contact_find(compiled);
     header_write(compiled, scene, settings);
+    start = clock_seconds();
+    shared_meshes_append(compiled, scene, settings);
+    compiled->bvh_seconds += clock_seconds() - start;
     return true;
 }
 
@@ -56,7 +65,6 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
                    MessageList *messages)
 {
     double start = clock_seconds();
-    if (!size_fits(scene, messages)) return false;
     sizes_check(scene, settings, messages);
     *compiled = (CompiledScene){.unit = scene_unit(scene, settings)};
     Scene scaled = {0};
@@ -120,11 +128,13 @@ bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettin
     compiled->bvh_seconds = 0;
     if (!features_fit(scene, settings, messages) || !lights_fit(compiled, scene, settings, messages))
         return false;
+    shared_meshes_toggle(compiled);
     const bool is_near = eye_shift(compiled, scene, settings);
-    if (is_near ? !numbers_fit(compiled, scene, settings, messages)
-                : !eye_move(compiled, scene, settings, messages))
-        return false;
-    header_write(compiled, scene, settings);
+    const bool fits = is_near ? numbers_fit(compiled, scene, settings, messages)
+                              : eye_move(compiled, scene, settings, messages);
+    if (fits) header_write(compiled, scene, settings);
+    shared_meshes_toggle(compiled);
+    if (!fits) return false;
     compiled->flatten_seconds = clock_seconds() - start - compiled->bvh_seconds;
     return true;
 }

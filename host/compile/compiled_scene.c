@@ -3,6 +3,7 @@
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
+#include "host/compile/instances.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -16,7 +17,7 @@
 static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_HEADER] = LAYOUT(SceneHeader, image, bvh_counts),
 #define SHAPE_LAYOUT(feature, Type, name, names) [FLAT_FIRST_SHAPE + KIND_##feature] = LAYOUT(Type, id, id),
-    SHAPE_LIST(SHAPE_LAYOUT)
+    PRIMITIVE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
     [FLAT_TRIANGLE_NEIGHBORS] = LAYOUT(TriangleNeighbors, ids_sides, ids_sides),
@@ -32,6 +33,8 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, texture),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
+    [FLAT_SHARED_MESHES] = LAYOUT(SharedMesh, place, place),
+    [FLAT_INSTANCE_IDS] = LAYOUT(InstanceIds, ids, ids),
     [FLAT_TEXELS] = LAYOUT(Texel, color, color),
 };
 // clang-format on
@@ -49,6 +52,11 @@ static void array_renew(CompiledScene *compiled, size_t kind, FlatLayout layout,
     *array = (FlatArray){memory_allocate_large(count, layout.size), count, layout};
     parallel_run(count, FLAT_RANGE_MIN, range_zero, array);
     compiled->changed[kind] = true;
+}
+
+void flat_array_renew_as(CompiledScene *compiled, size_t kind, size_t count, FlatLayout layout)
+{
+    array_renew(compiled, kind, layout, count);
 }
 
 void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count)
@@ -79,7 +87,7 @@ bool is_ordered_by_bvh(size_t kind)
 {
     return (kind >= FLAT_FIRST_SHAPE && kind < FLAT_FIRST_SHAPE + KIND_COUNT) || kind == FLAT_OBJECTS ||
            kind == FLAT_NODES || kind == FLAT_TRIANGLE_BLOCKS || kind == FLAT_SPHERE_BLOCKS ||
-           kind == FLAT_BLOCK_PLACES;
+           kind == FLAT_BLOCK_PLACES || kind == FLAT_SHARED_MESHES || kind == FLAT_INSTANCE_IDS;
 }
 
 uint64_t flat_array_hash(uint64_t hash, const FlatArray *array)
@@ -102,6 +110,7 @@ void compiled_scene_free(CompiledScene *compiled)
     for (size_t kind = 0; kind < FLAT_COUNT; kind++)
         free(compiled->arrays[kind].items);
     free(compiled->textures);
+    instance_plan_free(compiled->instances);
     *compiled = (CompiledScene){0};
 }
 

@@ -46,6 +46,7 @@ typedef struct {
     double flatten_seconds;   // everything else in scene_compile or scene_move
     // What the stages leave for later ones and for the header.
     CompiledTexture *textures;       // of each of the scene's textures
+    struct InstancePlan *instances;  // NULL: no mesh is shared
     uint32_t bvh_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;               // of these; 0 where there are none
     uint32_t cull_sphere_count;      // of each common origin
@@ -71,6 +72,7 @@ static inline scalar4 scalar4_of(Vector3 v, double w)
 void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count);
 void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width,
                            bool is_narrow);
+void flat_array_renew_as(CompiledScene *compiled, size_t kind, size_t count, FlatLayout layout);
 void *flat_array_at(const FlatArray *array, size_t index);
 // Whether the order of an array, or all of it, follows from the BVH, and so from the kernel's lanes.
 bool is_ordered_by_bvh(size_t kind);

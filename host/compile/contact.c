@@ -1,4 +1,5 @@
 #include "host/base/memory.h"
+#include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <math.h>
@@ -7,7 +8,8 @@
 // Surfaces count as touching within this, relative to the scene's largest coordinate. It has to exceed 620 u,
 // about 2^-14.7 with the u of float: the kernels look for an opaque surface behind a transparent one up to 5
 // error bounds away (surface_find_opaque), each of at most 16 u per number of a shape, 7 of a cylinder, and 4
-// u per coordinate of the point. For double it is larger than needed.
+// u per coordinate of the point. For double it is larger than needed. Five error bounds of an instance are
+// 140 u and 180 u times its condition at most.
 #define NEARNESS 0x1p-14
 
 // More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives
@@ -98,6 +100,15 @@ static Bounds regions_meet(const ContactRegion *a, const ContactRegion *b, doubl
     return both;
 }
 
+// Returns whether an instance has transparent triangles, or opaque ones.
+static bool instance_has(const CompiledScene *compiled, const Instance *instance, bool is_transparent,
+                         bool transparent)
+{
+    const SharedMeshPlan *shared = &compiled->instances->meshes[instance->id.y];
+    if (instance->id.z > 0) return is_transparent == transparent;
+    return transparent ? shared->is_transparent_somewhere : shared->is_opaque_somewhere;
+}
+
 // The transparent primitives, or the opaque ones. Returns their largest coordinate.
 static double regions_collect(ContactRegionList *list, const CompiledScene *compiled, bool transparent)
 {
@@ -109,9 +120,13 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
         for (size_t i = 0; i < array->count; i++) {
-            const FlatMaterial *material =
-                &materials[entries[*flat_id(array, flat_array_at(array, i))].kind_index_material.z];
-            if (transparent != (material->reflection_transmission_ior.y > 0)) continue;
+            const void *primitive = flat_array_at(array, i);
+            const uint32_t entry = entry_of_id(compiled, *flat_id(array, flat_array_at(array, i)));
+            const FlatMaterial *material = &materials[entries[entry].kind_index_material.z];
+            const bool is_transparent = material->reflection_transmission_ior.y > 0;
+            if (kind == KIND_INSTANCES ? !instance_has(compiled, primitive, is_transparent, transparent)
+                                       : transparent != is_transparent)
+                continue;
             list->items[list->count] = region_of(kind, flat_array_at(array, i));
             largest = fmax(largest, list->items[list->count++].largest_coordinate);
         }
@@ -168,7 +183,8 @@ Bounds contact_find(const CompiledScene *compiled)
     ContactRegionList transparent, opaque;
     double coordinate = regions_collect(&transparent, compiled, true);
     coordinate = fmax(coordinate, regions_collect(&opaque, compiled, false));
-    Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * coordinate);
+    const double condition = compiled->instances ? compiled->instances->condition : 0;
+    Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * (1 + condition / 5) * coordinate);
     free(transparent.items);
     free(opaque.items);
     return contact;

@@ -1,20 +1,26 @@
+#include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <float.h>
 #include <math.h>
 
-// `slack`: of |v|^2.
-static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, double slack)
+// The slacks of |v|^2, and of the distance to what a sphere has in it, if that has instances.
+typedef struct {
+    double squared, distance;
+} CullSlack;
+
+static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, CullSlack slack)
 {
     Vector3 v = vector_subtract(sphere.center, common_origin);
-    double squared = vector_dot(v, v), power = squared * (1 - slack) - sphere.radius * sphere.radius;
+    if (slack.distance > 0) sphere.radius += slack.distance * 2 * (vector_length(v) + sphere.radius);
+    double squared = vector_dot(v, v), power = squared * (1 - slack.squared) - sphere.radius * sphere.radius;
     if (!(fabs(power) <= CULL_SPHERE_MAX && squared <= CULL_SPHERE_MAX))
         return (CullSphere){{0, 0, 0, -CULL_SPHERE_MAX}};
     return (CullSphere){{v.x, v.y, v.z, power}};
 }
 
 // Where the BVH is empty all rays miss.
-static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, double slack)
+static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, CullSlack slack)
 {
     uint32_t count = 0;
     for (size_t kind = 0; kind < KIND_COUNT; kind++)
@@ -35,14 +41,15 @@ static Outside outside_bvh(const CompiledScene *compiled, size_t kind)
     return (Outside){first, kind == KIND_PLANES ? first : compiled->arrays[FLAT_FIRST_SHAPE + kind].count};
 }
 
-static void row_fill(const CompiledScene *compiled, Vector3 common_origin, double slack, CullSphere *row)
+static void row_fill(const CompiledScene *compiled, Vector3 common_origin, CullSlack slack, CullSphere *row)
 {
     *row++ = bvh_cull_sphere(compiled, common_origin, slack);
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {
         Outside outside = outside_bvh(compiled, kind);
         for (size_t i = outside.first; i < outside.end; i++) {
             const void *primitive = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], i);
-            *row++ = cull_sphere(primitive_bounding_sphere(kind, primitive), common_origin, slack);
+            const CullSlack own = {slack.squared, kind == KIND_INSTANCES ? slack.distance : 0};
+            *row++ = cull_sphere(primitive_bounding_sphere(kind, primitive), common_origin, own);
         }
     }
 }
@@ -53,9 +60,10 @@ enum { CULL_SPHERES_MAX = 1 << 20 };
 void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
 {
     const double roundoff = (settings->precision == PRECISION_DOUBLE ? DBL_EPSILON : FLT_EPSILON) / 2;
-    const double slack = roundoff * CULL_SPHERE_SLACK,
-                 light_slack =
-                     roundoff * (settings->certifies ? CERTIFIED_CULL_SPHERE_SLACK : CULL_SPHERE_SLACK);
+    const CullSlack slack = {roundoff * CULL_SPHERE_SLACK, instance_slack(compiled, settings)},
+                    light_slack = {
+                        roundoff * (settings->certifies ? CERTIFIED_CULL_SPHERE_SLACK : CULL_SPHERE_SLACK),
+                        slack.distance};
     const FlatArray *lights = &compiled->arrays[FLAT_LIGHTS];
     size_t count = 1;
     for (size_t kind = 0; kind < KIND_COUNT; kind++) {

@@ -11,7 +11,8 @@ typedef struct {
     void *moved;         // the flat struct to replace, as another eye saw it; NULL: they are appended
     size_t part;         // of the object: which of a mesh's triangles
     FeatureSet features; // that primitives need beyond those of their kinds
-    size_t counts[KIND_COUNT], normals_count, uvs_count, primitive_count; // so far
+    size_t counts[KIND_COUNT], normals_count, uvs_count, entry_count; // so far
+    size_t primitive_count;                                           // so far: the next id
 } Flattening;
 
 // Whether the kernel's precision can hold the eye's power of a primitive, which then defines it (HAS_POWER).

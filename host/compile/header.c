@@ -1,4 +1,5 @@
 #include "host/compile/camera_basis.h"
+#include "host/compile/instances.h"
 #include "host/compile/stages.h"
 #include <float.h>
 #include <string.h>
@@ -52,7 +53,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .lens_up = scalar4_of(vector_scale(vector_normalize(basis.up), lens_radius),
                               scene->camera.orthographic ? 1 : 0),
         .bounds = center_and_half_extent(&compiled->bvh_bounds),
-        .bounds_low = scalar4_of(compiled->bvh_bounds.min, 0),
+        .bounds_low = scalar4_of(compiled->bvh_bounds.min, instance_slack(compiled, settings)),
         .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),
         .contact_low = scalar4_within_floats(compiled->contact.min),
         .contact_high = scalar4_within_floats(compiled->contact.max),

@@ -1,26 +1,35 @@
 #include "host/base/parallel.h"
 #include "host/compile/camera_basis.h"
+#include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <float.h>
 #include <stdatomic.h>
 
-bool size_fits(const Scene *scene, MessageList *messages)
+bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages)
 {
-    const size_t largest = (size_t)1 << 28;    // bits that the BVH counts with
-    const size_t copied_max = (size_t)1 << 24; // triangles of copies: the cost of a hostile file
-    size_t count = scene_primitive_count(scene), copied = 0;
-    if (count > largest)
-        return message_error(messages, "the scene has %zu objects and triangles, more than %zu", count,
+    const size_t id_max = INT32_MAX - 1, largest = (size_t)1 << 28; // bits that the BVH counts with
+    const size_t copied_max = (size_t)1 << 24;                      // the cost of a hostile file
+    const InstancePlan *plan = compiled->instances;
+    const size_t count = scene_primitive_count(scene), single = count - (plan ? plan->triangle_count : 0);
+    if (count > id_max)
+        return message_error(messages, "the scene has %zu objects and triangles with IDs, more than %zu",
+                             count, id_max);
+    if (single > largest)
+        return message_error(messages, "the scene has %zu objects and triangles, more than %zu", single,
                              largest);
+    size_t copied = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        if (object->kind == SHAPE_MESH && object->as.mesh.is_instance)
+        if (object->kind == SHAPE_MESH && object->as.mesh.is_instance && instance_mesh(compiled, i) == 0)
             copied += object_primitive_count(scene, object);
     }
     if (copied <= copied_max) return true;
-    return message_error(messages, "copies of meshes for instances have %zu triangles, more than %zu", copied,
-                         copied_max);
+    return message_error(
+        messages,
+        "copies of meshes for instances have %zu triangles, more than %zu: precision certified "
+        "copies all, other precisions those that a transform stretches unevenly",
+        copied, copied_max);
 }
 
 typedef struct {

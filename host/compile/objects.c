@@ -1,5 +1,6 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
+#include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
 #include <math.h>
@@ -9,13 +10,13 @@
 
 void primitive_add(Flattening *flattening, int kind, const void *primitive, uint32_t material)
 {
-    const uint32_t id = (uint32_t)flattening->primitive_count++;
+    const uint32_t id = (uint32_t)flattening->primitive_count++, entry = (uint32_t)flattening->entry_count++;
     FlatArray *array = &flattening->compiled->arrays[FLAT_FIRST_SHAPE + kind];
     void *target = flattening->moved;
     if (!target) {
         const uint32_t index = (uint32_t)flattening->counts[kind]++;
         ObjectEntry *entries = flattening->compiled->arrays[FLAT_OBJECTS].items;
-        entries[id].kind_index_material = (uint4){(uint32_t)kind, index, material, 0};
+        entries[entry].kind_index_material = (uint4){(uint32_t)kind, index, material, 0};
         target = flat_array_at(array, index);
     }
     memcpy(target, primitive, array->layout.size);
@@ -47,6 +48,10 @@ static void arrays_make(CompiledScene *compiled, const Scene *scene)
         const Object *object = &scene->objects.items[i];
         const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
         size_t count = object_primitive_count(scene, object);
+        if (instance_mesh(compiled, i) > 0) {
+            counts[KIND_INSTANCES]++;
+            continue;
+        }
         counts[shape_ops[object->kind]->kind] += count;
         bool smooth =
             mesh ? mesh->normals != NULL : object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth;
@@ -57,7 +62,12 @@ static void arrays_make(CompiledScene *compiled, const Scene *scene)
         flat_array_renew(compiled, FLAT_FIRST_SHAPE + kind, counts[kind]);
     flat_array_renew(compiled, FLAT_TRIANGLE_NORMALS, normals_count);
     flat_array_renew(compiled, FLAT_TRIANGLE_UVS, uvs_count);
-    flat_array_renew(compiled, FLAT_OBJECTS, scene_primitive_count(scene));
+    const InstancePlan *plan = compiled->instances;
+    const size_t instance_count = plan ? plan->instance_count : 0;
+    flat_array_renew(compiled, FLAT_OBJECTS,
+                     scene_primitive_count(scene) - (plan ? plan->triangle_count : 0) + instance_count);
+    flat_array_renew(compiled, FLAT_SHARED_MESHES, plan ? plan->mesh_count : 0);
+    flat_array_renew(compiled, FLAT_INSTANCE_IDS, instance_count);
 }
 
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
@@ -67,7 +77,9 @@ void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const size_t count = object_primitive_count(scene, object);
-        for (flattening.part = 0; flattening.part < count; flattening.part++)
+        const uint32_t shared = instance_mesh(compiled, i);
+        if (shared > 0) instance_flatten(&flattening, object, shared - 1);
+        for (flattening.part = 0; shared == 0 && flattening.part < count; flattening.part++)
             shape_ops[object->kind]->flatten(&flattening, object);
     }
     compiled->features |= flattening.features;
@@ -104,7 +116,11 @@ static void range_move(void *context, size_t begin, size_t end)
         flattening.primitive_count = id;
         flattening.part = id - first_ids[object];
         const Object *of_id = &scene->objects.items[object];
-        shape_ops[of_id->kind]->flatten(&flattening, of_id);
+        const uint32_t shared = instance_mesh(flattening.compiled, object);
+        if (shared > 0)
+            instance_flatten(&flattening, of_id, shared - 1);
+        else
+            shape_ops[of_id->kind]->flatten(&flattening, of_id);
     }
     atomic_fetch_or(&move->features, flattening.features);
 }

@@ -9,6 +9,7 @@ typedef struct {
     Vector3 eye;
     bool is_double; // the kernel's precision is double: numbers stay
     bool has_eye;   // rays start there, or where they lead; else anywhere
+    bool is_local;  // numbers are a shared mesh's, in its own space
     bool certifies; // bounds are by the eye's power where the eye is near, for the shape's size
 } Rounding;
 

@@ -20,6 +20,13 @@ extern const char *const precision_names[PRECISION_COUNT];
 typedef enum { BVH_AUTO, BVH_ON, BVH_OFF, BVH_CHOICE_COUNT } BvhChoice;
 extern const char *const bvh_choice_names[BVH_CHOICE_COUNT];
 
+// Whether instances of a mesh share it, or each has a copy.
+typedef enum {
+    INSTANCES_AUTO, // shared if copies would be large
+    INSTANCES_SHARED,
+    INSTANCES_COPIED
+} InstanceChoice;
+
 typedef struct {
     uint32_t width, height; // of the whole image
     uint32_t sample_count;  // per pixel, >= 1
@@ -28,6 +35,7 @@ typedef struct {
     bool certifies; // at `certified`, and at `double` what that repeats: culls are wider
     uint32_t lanes; // of the kernel: 1, 4, 8, 16
     BvhChoice bvh;
+    InstanceChoice instances;
     FeatureSet extra_features; // built in although the scene does not need them
     bool shift_to_eye;         // positions are relative to the eye; else as they are
     bool hashes_primitives;    // sets CompiledScene.primitives_hash

@@ -7,7 +7,8 @@ extern const ShapeOps mesh_ops;
 
 #define SHAPE_ROW(feature, Type, name, names) [KIND_##feature] = &name##_ops,
 const ShapeOps *const shape_ops[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)[SHAPE_MESH] = &mesh_ops};
-_Static_assert((int)SHAPE_MESH == (int)KIND_COUNT, "ShapeKind follows SHAPE_LIST, the mesh last");
+_Static_assert((int)SHAPE_MESH == (int)KIND_INSTANCES && KIND_INSTANCES + 1 == KIND_COUNT,
+               "ShapeKind follows PRIMITIVE_LIST: a mesh, which is last, may be an instance");
 
 bool primitive_bounds(size_t kind, const void *primitive, Bounds *bounds)
 {

@@ -4,8 +4,9 @@
 #include "host/compile/compile.h"
 #include "host/compile/rounding.h"
 
-// limits.c: false with a message where the scene has more primitives than a BVH counts.
-bool size_fits(const Scene *scene, MessageList *messages);
+// limits.c: false with a message where the scene has more primitives than ids, more that are not shared than
+// a BVH counts, or more copies than may be made for instances.
+bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages);
 
 // limits.c: warns of a scene whose sizes differ by more than a trillion, if the precision is in float.
 void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages);
@@ -50,6 +51,11 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
 // orders each shape's array as the leaves have it, what is unbounded or huge last. Without a BVH, one empty
 // node.
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
+
+// The same of a shared mesh alone, whatever the settings choose. bvh_shift adds to the indices of its nodes
+// and to those of its leaves: the blocks', or the triangles' without blocks.
+void mesh_bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
+void bvh_shift(CompiledScene *compiled, uint32_t node_base, uint32_t leaf_base);
 
 // The same tree, with boxes around the primitives as they are now.
 void bvh_refit(CompiledScene *compiled);

@@ -35,7 +35,10 @@ bool has_message(int rank, int tag, MPI_Status *status)
 static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm ranks)
 {
     broadcast(compiled, sizeof *compiled, ranks);
-    if (!is_sender) compiled->textures = NULL; // only a renderer that moves reads them
+    if (!is_sender) { // only a renderer that moves reads these
+        compiled->textures = NULL;
+        compiled->instances = NULL;
+    }
     for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
         FlatArray *array = &compiled->arrays[kind];
         if (!is_sender) array->items = memory_allocate_large(array->count, array->layout.size);

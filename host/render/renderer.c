@@ -196,6 +196,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, SceneVar
         .certifies = settings->precision == PRECISION_CERTIFIED || variant.pass == PASS_IN_DOUBT,
         .lanes = variant.lanes,
         .bvh = settings->bvh,
+        .instances = settings->instances,
         .extra_features = settings->extra_features,
         .shift_to_eye = settings->shift_to_eye,
         .hashes_primitives = settings->hashes_scene,

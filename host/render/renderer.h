@@ -23,6 +23,7 @@ typedef struct {
     Precision precision;
     uint32_t lanes; // rays per work-item: 1, 4, 8 or 16, or 0 for device_lanes
     BvhChoice bvh;
+    InstanceChoice instances;
     bool counting; // counts the image's rays, not those of AOVs, by type in a slower build
     uint32_t
         perturb_seed; // unless 0, injects rounding errors that OpenCL permits (kernels/numerics/perturb.h)

@@ -109,11 +109,12 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
 // Marks lanes that are done: larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
 
-// Returns the surface points of the triangles of one material among the objects hit. In a fine mesh each lane
-// hits a different triangle, so vertices are gathered triangle by triangle, then evaluated for all lanes at
-// once.
+// Returns the surface points of the triangles of one material among the objects hit that are in the range. In
+// a fine mesh each lane hits a different triangle, so vertices are gathered triangle by triangle, then
+// evaluated for all lanes at once.
 static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
-                                                             uint material, const Ray *ray, real t)
+                                                             const ObjectRange *range, uint material,
+                                                             const Ray *ray, real t)
 {
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     LaneSurfacePoints hit;
@@ -126,9 +127,10 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     for (;;) {
         scalar_integer object = lanes_smallest(objects);
         if (object == INT_MAX) break;
+        if (HAS_INSTANCES && object >= (scalar_integer)range->end) break;
         mask same = objects == (integer)(object);
         objects = lanes_select(same, NO_OBJECT, objects);
-        uint4 entry = scene->objects[object].kind_index_material;
+        uint4 entry = range_entry(scene, range, object);
         if (entry.x != KIND_TRIANGLES || entry.z != material) continue;
         hit.lanes = hit.lanes | same;
         Triangle triangle = scene->triangles[entry.y];
@@ -146,8 +148,21 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
             density = lanes_select(same, (real)(own.c_density.z), density);
         }
     }
-    TriangleWeights weights = triangle_weights(corners, ray);
-    hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
+    TriangleWeights weights;
+    if (HAS_INSTANCES && range->is_instance) {
+        const Instance instance = scene->instances[range->instance];
+        Ray own = instance_ray(&instance, ray);
+        ray_prepare(&own);
+        weights = triangle_weights(corners, &own);
+        hit.point = instance_surface_point(&instance, corners, normal, weights);
+        if (smooth) normals = instance_normals(&instance, normals);
+        if (HAS_IMAGES)
+            density =
+                real_divide(density, lanes_select(hit.lanes, instance_stretch(&instance, normal), (real)(1)));
+    } else {
+        weights = triangle_weights(corners, ray);
+        hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
+    }
     if (smooth) triangle_smooth(normals, weights, &hit.point);
 #if IS_CERTIFIED
     triangle_set_normal_errors(corners, normals, weights, &hit.point);
@@ -374,10 +389,11 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     for (;;) {
         scalar_integer object = lanes_smallest(pending);
         if (object == INT_MAX) break;
-        uint4 entry = scene->objects[object].kind_index_material;
+        const ObjectRange range = object_range(scene, (uint)object);
+        uint4 entry = range_entry(scene, &range, object);
         LaneSurfacePoints found;
         if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
-            found = triangles_surface_point(scene, pending, entry.z, ray, hit->t);
+            found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t);
         } else {
             found.lanes = pending == (integer)(object);
             found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);

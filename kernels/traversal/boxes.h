@@ -55,21 +55,29 @@ static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
            (real)(1 + 16 * UNIT_ROUNDOFF);
 }
 
-static inline real box_slack(const Ray *ray, scalar4 bounds)
+// The slack for the hit, relative to the distance to the farthest corner, in the scene's BVH. Mapping a ray
+// to an instance moves its hits as well.
+static inline scalar bvh_hit_slack(const Scene *scene)
+{
+    const scalar slack = BOX_HIT_SLACK * UNIT_ROUNDOFF;
+    return HAS_INSTANCES ? slack + scene->header->bounds_low.w : slack;
+}
+
+static inline real box_slack(const Ray *ray, scalar4 bounds, scalar hit_slack)
 {
     const real max_norm1 = bounds_max_norm1(ray->origin, bounds);
     if (IS_CERTIFIED) // the exact hit lies in its box
         return real_fma((real)(2 * BOX_ROUNDING_SLACK * UNIT_ROUNDOFF), max_norm1,
                         bounds_place_error(ray, bounds)) -
                ray->length * ray->tmin;
-    return real_fma((real)(BOX_HIT_SLACK * UNIT_ROUNDOFF), bounds_farthest(ray->origin, bounds),
+    return real_fma((real)(hit_slack), bounds_farthest(ray->origin, bounds),
                     (real)(BOX_ROUNDING_SLACK * UNIT_ROUNDOFF) * max_norm1);
 }
 
-static inline BoxRays box_rays(const Ray *ray, scalar4 bounds)
+static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, scalar hit_slack)
 {
     real max_norm1 = bounds_max_norm1(ray->origin, bounds);
-    real slack = box_slack(ray, bounds);
+    real slack = box_slack(ray, bounds, hit_slack);
     const real huge = (real)(1 / SMALLEST_RATIO);
     real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);
     Vector inverse = HAS_BOXES ? ray->inverse : ray_inverse(ray);

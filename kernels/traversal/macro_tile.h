@@ -173,8 +173,9 @@ static inline void tile_bound_reach(MacroTile *tile)
 
 // By which boxes are enlarged, from upper bounds of 1-norms: of a hit's distance from the ray's start, and of
 // its coordinates. `norm1_per_w`: of the rays.
-static inline scalar tile_slack(const MacroTile *tile, scalar4 bounds, scalar norm1_per_w)
+static inline scalar tile_slack(const MacroTile *tile, const Scene *scene, scalar norm1_per_w)
 {
+    const scalar4 bounds = scene->header->bounds;
     const OriginFrame *frame = &tile->frame;
     const scalar center = fabs(bounds.x) + fabs(bounds.y) + fabs(bounds.z);
     const scalar origin = fabs(frame->u) + fabs(frame->v) + fabs(frame->w);
@@ -182,7 +183,8 @@ static inline scalar tile_slack(const MacroTile *tile, scalar4 bounds, scalar no
     const scalar farthest = origin + start + center + bounds.w, largest = 2 * center + farthest;
     const scalar units = BOX_HIT_SLACK * farthest + (BOX_ROUNDING_SLACK + TILE_POSITION_SLACK) * largest +
                          TILE_POSITION_SLACK * origin;
-    return units * UNIT_ROUNDOFF;
+    const scalar slack = units * UNIT_ROUNDOFF;
+    return HAS_INSTANCES ? slack + scene->header->bounds_low.w * farthest : slack;
 }
 
 // Sets the bounds over all packets, once all have been added.
@@ -199,7 +201,7 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     // above sqrt(1 + u^2 + v^2), by less than 1 % below a slope of 1/2
     const scalar squared_slope = steepest_u * steepest_u + steepest_v * steepest_v;
     tile->ray_per_w = (scalar)(1.0001f) * fmin(1 + (scalar)(0.5f) * squared_slope, norm1_per_w);
-    tile->slack = tile_slack(tile, scene->header->bounds, norm1_per_w);
+    tile->slack = tile_slack(tile, scene, norm1_per_w);
     tile->vertex_error0 = 0;
     tile->vertex_error1 = (VERTEX_TEST_ERROR + VERTEX_BLOCK_ERROR) * UNIT_ROUNDOFF;
     if (IS_CERTIFIED) {

@@ -241,38 +241,28 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
 {
     global const scalar *boxes = (global const scalar *)node->planes;
     MetChildren met = group_meets_children(group, lanes, boxes);
-    const uint leaves = met.children & node_leaves(node);
+    const uint leaves = met.children & node_leaves(node), bottom = stack->count;
     for (uint left = leaves; left != 0; left &= left - 1) {
         uint leaf = lowest_bit(left);
         uint hit_by = child_lanes(group, &met, leaf, boxes);
         uint first = ((global const uint *)node->child_index)[leaf];
         uint kind = ((global const uint *)node->child_kind)[leaf];
         if (hit_by == 0 || kind == BVH_EMPTY) continue;
+        if (HAS_INSTANCES && (kind & 0xff) == KIND_INSTANCES) {
+            stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, met.entry.each[leaf]});
+            continue;
+        }
         const bool is_hit = HAS_SPHERES && (kind & 0xff) == KIND_SPHERES
                                 ? intersect_sphere_block(traversal, scene, ray, first, kind >> 8, hit_by)
                                 : intersect_leaf(traversal, scene, ray, kind, first);
         if (is_hit) group_shrink(group, traversal);
         if (group->active == 0) return;
     }
-    const uint bottom = stack->count;
     for (uint left = met.children & ~leaves; left != 0; left &= left - 1) {
         uint child = lowest_bit(left), hit_by = child_lanes(group, &met, child, boxes);
         uint index = ((global const uint *)node->child_index)[child];
         StackEntry entry = {index, hit_by, met.entry.each[child]};
         if (hit_by != 0) stack_push_node(stack, bottom, scene, entry);
-    }
-}
-
-// Traverses the BVH with a group; visits what any of its active lanes intersects.
-static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
-{
-    StackEntry entries[STACK_CAPACITY], next = {0, group->active, -LARGEST};
-    TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
-    for (;; next = entries[--stack.count]) {
-        uint lanes = next.lanes & lanes_bits((real)(next.entry) <= group->tmax);
-        if (lanes != 0)
-            visit_node(traversal, &stack, scene, ray, &scene->nodes[next.child_index], group, lanes);
-        if (stack.count == 0 || group->active == 0) return;
     }
 }
 
@@ -297,12 +287,29 @@ static inline RayGroup next_group(const BoxRays *rays, SpilledRays *spilled, con
     return group;
 }
 
+// Traverses the BVH with a group; visits what any of its active lanes intersects.
+static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
+{
+    StackEntry entries[STACK_CAPACITY], next = {0, group->active, -LARGEST};
+    TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
+    for (;; next = entries[--stack.count]) {
+        uint lanes = next.lanes & lanes_bits((real)(next.entry) <= group->tmax);
+        if (HAS_INSTANCES && lanes != 0 && (next.child_index & INSTANCE_LEAF) != 0) {
+            if (instance_traverse(traversal, scene, ray, next.child_index & ~INSTANCE_LEAF, lanes))
+                group_shrink(group, traversal);
+        } else if (lanes != 0) {
+            visit_node(traversal, &stack, scene, ray, &scene->nodes[next.child_index], group, lanes);
+        }
+        if (stack.count == 0 || group->active == 0) return;
+    }
+}
+
 // Traverses the BVH with the rays that are active and intersect its bounds, group by group.
 static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *ray)
 {
     global const SceneHeader *header = scene->header;
     ray_prepare(ray);
-    BoxRays rays = box_rays(ray, header->bounds);
+    BoxRays rays = box_rays(ray, header->bounds, bvh_hit_slack(scene));
     mask hits_bvh =
         box_rays_intersect(&rays, header->bounds_low, header->bounds_high, traversal_tmax(traversal));
     uint remaining = lanes_bits(hits_bvh & traversal->active), divergent = 0;

@@ -15,7 +15,7 @@
 // Prefetches what shading reads of the closest hit.
 static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
 {
-    memory_prefetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
+    if (!HAS_INSTANCES) memory_prefetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
     if (HAS_TRIANGLES && kind == KIND_TRIANGLES && id.y > 0)
         memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
@@ -59,6 +59,11 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
 #endif
 SHAPE_LIST(INTERSECT_SHAPE)
 
+// Intersects an instance with the rays of some lanes, given as bits (traversal/instance_bvh.h). Returns
+// whether any may hit it.
+static bool instance_traverse(Traversal *traversal, const Scene *scene, const Ray *ray, uint index,
+                              uint lanes);
+
 // Intersects primitives first .. last - 1 of one kind. One function per kind: if one function tested all
 // kinds, Mesa, which inlines before it knows the kind asked for, would compile them all at each call.
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
@@ -74,6 +79,15 @@ SHAPE_LIST(INTERSECT_SHAPE)
         return found_any;                                                                                    \
     }
 SHAPE_LIST(INTERSECT_SHAPES)
+
+static inline bool intersect_instances(Traversal *traversal, const Scene *scene, const Ray *ray, uint first,
+                                       uint last)
+{
+    bool found_any = false;
+    for (uint i = first; i < last && lanes_any(traversal->active); i++)
+        found_any |= instance_traverse(traversal, scene, ray, i, lanes_bits(traversal->active));
+    return found_any;
+}
 
 // Intersects those of `count` primitives of one kind whose bits are set in `near` and whose cull spheres, if
 // these are not 0, a ray may hit. More than 32 primitives have no bits: all count as near.
@@ -92,7 +106,7 @@ SHAPE_LIST(INTERSECT_SHAPES)
             }                                                                                                \
         }                                                                                                    \
     }
-SHAPE_LIST(INTERSECT_NEAR_SHAPES)
+PRIMITIVE_LIST(INTERSECT_NEAR_SHAPES)
 
 // The first triangle of a block.
 static inline uint block_first(const Scene *scene, uint block)
@@ -169,7 +183,7 @@ static inline bool intersect_sphere_block(Traversal *traversal, const Scene *sce
 }
 #endif
 
-// A leaf is count << 8 | kind (BvhNode.child_kind) and its index there.
+// A leaf is count << 8 | kind (BvhNode.child_kind) and its index there. Instances are left out.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint index)
 {
@@ -207,7 +221,7 @@ static OUT_OF_LINE void intersect_outside_bvh(Traversal *traversal, const Scene 
         near = count < 32 ? ~(~near >> count) : ~0u;                                                         \
         if (cull_spheres) cull_spheres += count;                                                             \
     }
-    SHAPE_LIST(INTERSECT_OUTSIDE_BVH)
+    PRIMITIVE_LIST(INTERSECT_OUTSIDE_BVH)
 }
 
 #endif

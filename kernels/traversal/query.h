@@ -14,7 +14,8 @@ typedef enum {
 
 typedef struct {
     Query query;
-    mask active; // lanes that still traverse
+    ObjectRange within; // with HAS_INSTANCES: of the instance that is being traversed, if it is in one
+    mask active;        // lanes that still traverse
     Hit hit;
     // For OCCLUSION, of the objects hit so far; green and blue with HAS_FILTERS.
     integer optical_depth, optical_depth_green, optical_depth_blue;
@@ -37,6 +38,16 @@ typedef struct {
 #define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
 
+// Returns the index of an object's material. In an instance ids are those of its mesh, from 0 on.
+static inline uint object_material(const Traversal *traversal, const Scene *scene, uint id)
+{
+    if (!HAS_INSTANCES) return scene->objects[id].kind_index_material.z;
+    if (traversal->within.is_instance)
+        return range_entry(scene, &traversal->within, traversal->within.first + id).z;
+    const ObjectRange range = object_range(scene, id);
+    return range_entry(scene, &range, id).z;
+}
+
 static inline integer optical_depth_steps(uint4 steps)
 {
 #if IS_DOUBLE
@@ -53,9 +64,9 @@ static inline integer optical_depth_sum(integer sum, integer added)
     return lanes_select(sum < largest - added, sum + added, largest);
 }
 
-static inline bool object_is_opaque(const Scene *scene, uint id)
+static inline bool object_is_opaque(const Traversal *traversal, const Scene *scene, uint id)
 {
-    return scene->materials[scene->objects[id].kind_index_material.z].reflection_transmission_ior.y == 0;
+    return scene->materials[object_material(traversal, scene, id)].reflection_transmission_ior.y == 0;
 }
 
 // Reduces the light of the lanes that hit an object; those without light are done.
@@ -65,7 +76,7 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
         traversal->active = traversal->active & !found;
         return;
     }
-    global const Material *material = &scene->materials[scene->objects[id].kind_index_material.z];
+    global const Material *material = &scene->materials[object_material(traversal, scene, id)];
     integer optical_depth =
         optical_depth_sum(traversal->optical_depth, optical_depth_steps(material->optical_depth));
     traversal->optical_depth = lanes_select(found, optical_depth, traversal->optical_depth);
@@ -93,7 +104,9 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
         traversal_occlude(traversal, scene, found & traversal->active & (t < hit->t), id);
         return;
     }
-    if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(scene, id)) return;
+    if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(traversal, scene, id))
+        return;
+    if (HAS_INSTANCES) id += traversal->within.first;
     integer object = (integer)((scalar_integer)id);
     mask tie = (t == hit->t) & (object < hit->object);
     mask closer = found & ((t < hit->t) | tie);
@@ -113,7 +126,8 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
         traversal_occlude(traversal, scene, found->found & traversal->active, id);
         return;
     }
-    if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(scene, id)) return;
+    if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(traversal, scene, id))
+        return;
     integer object = (integer)((scalar_integer)id);
     mask is_new = (found->found | found->doubt) & (hit->object != object); // it may have been tested before
     mask closer = found->found & is_new & (found->t < hit->t);

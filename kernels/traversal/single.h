@@ -27,7 +27,7 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
 {
     global const SceneHeader *header = scene->header;
     ray_prepare(ray);
-    BoxRays box_ray = box_rays(ray, header->bounds);
+    BoxRays box_ray = box_rays(ray, header->bounds, bvh_hit_slack(scene));
     scalar tmax = traversal_tmax(traversal);
     if (!box_rays_intersect(&box_ray, header->bounds_low, header->bounds_high, tmax)) return;
     Octant octant = octant_of_lane(&box_ray, 0);
@@ -38,7 +38,10 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
             if (next.child_kind == BVH_NODE) {
                 visit_node(&stack, &scene->nodes[next.child_index], &box_ray, octant, tmax);
             } else {
-                intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
+                if (HAS_INSTANCES && (next.child_kind & 0xff) == KIND_INSTANCES)
+                    instance_traverse(traversal, scene, ray, next.child_index, 1);
+                else
+                    intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
                 if (!traversal->active) return;
                 tmax = traversal_tmax(traversal);
             }

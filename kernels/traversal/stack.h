@@ -16,6 +16,9 @@ typedef struct {
     scalar entry; // its entry distance
 } StackEntry;
 
+// Marks a child_index as that of an instance, the only leaf that packets keep on the stack.
+#define INSTANCE_LEAF 0x80000000u
+
 // `entries`, of STACK_CAPACITY, is an array of its own, so that the count stays in a register.
 typedef struct {
     StackEntry *entries;

@@ -91,6 +91,8 @@ static inline void entry_prefetch(const Scene *scene, uint kind, uint index)
     else if (HAS_SPHERES && (kind & 0xff) == KIND_SPHERES)
         memory_prefetch((global const char *)&scene->sphere_blocks[index],
                         sizeof(scene->sphere_blocks->rows) + sizeof(scene->sphere_blocks->ids));
+    else if (HAS_INSTANCES && (kind & 0xff) == KIND_INSTANCES)
+        memory_prefetch((global const char *)&scene->instances[index], sizeof(Instance));
 }
 
 // Intersects the primitives of a leaf with the rays of packets.
@@ -98,16 +100,25 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
 {
     for (; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
+        if (HAS_INSTANCES && (leaf->kind & 0xff) == KIND_INSTANCES) {
+            const uint rays = rays_within(tile, packet, &leaf->seen);
+            if (rays != 0 &&
+                instance_traverse(&tile->traversals[packet], scene, &tile->rays[packet], leaf->index, rays))
+                tile_update(tile, packet);
+            continue;
+        }
         tile_prepare(tile, packet);
         if (intersect_leaf(&tile->traversals[packet], scene, &tile->rays[packet], leaf->kind, leaf->index))
             tile_update(tile, packet);
     }
 }
 
-// Returns whether a child is visited only after all that are nearer to the common origin: nodes and blocks.
+// Returns whether a child is visited only after all that are nearer to the common origin: nodes, blocks and
+// instances.
 // Shadow rays do not end at the nearest hit, and gain nothing from that order between blocks of spheres.
 static inline bool child_waits(uint kind, bool is_shadow)
 {
+    if (HAS_INSTANCES && (kind & 0xff) == KIND_INSTANCES) return true;
     return kind == BVH_NODE || (kind & 0xff) == KIND_TRIANGLES ||
            (!is_shadow && (kind & 0xff) == KIND_SPHERES);
 }
@@ -173,6 +184,8 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
                 tile_visit_node(tile, scene, &scene->nodes[entry.index], packets, entries, count, is_shadow);
         else if (HAS_TRIANGLES && (entry.kind & 0xff) == KIND_TRIANGLES)
             tile_visit_triangles(tile, scene, &entry, packets, is_shadow);
+        else if (HAS_INSTANCES && (entry.kind & 0xff) == KIND_INSTANCES)
+            tile_visit_leaf(tile, scene, &entry, packets);
         else if (HAS_SPHERES && !is_shadow)
             tile_visit_spheres(tile, scene, &entry, packets, false);
     }

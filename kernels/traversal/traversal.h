@@ -3,6 +3,7 @@
 #ifndef TRAVERSAL_H
 #define TRAVERSAL_H
 
+#include "traversal/instance_bvh.h"
 #include "traversal/packet.h"
 #include "traversal/single.h"
 #include "traversal/tile_traversal.h"
@@ -17,6 +18,7 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     traversal->hit.object = (integer)(-1);
     if (HAS_TRANSMISSION) traversal->optical_depth = (integer)(0);
     if (HAS_FILTERS) traversal->optical_depth_green = traversal->optical_depth_blue = (integer)(0);
+    if (HAS_INSTANCES) traversal->within = outside_instances();
     if (IS_CERTIFIED) {
         traversal->hit.low = (real)(LARGEST);                           // of no hit: no rival
         traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival

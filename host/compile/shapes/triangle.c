@@ -112,7 +112,8 @@ static void triangle_take_height(Triangle *triangle, Flattening *flattening, Vec
 static Triangle triangle_make(Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
 {
     Triangle triangle = triangle_rounded(&flattening->rounding, a, b, c);
-    if (!triangle_is_far(&triangle)) triangle_take_height(&triangle, flattening, a, b, c);
+    if (!flattening->rounding.is_local && !triangle_is_far(&triangle))
+        triangle_take_height(&triangle, flattening, a, b, c);
     return triangle;
 }
 
@@ -203,6 +204,14 @@ static bool mesh_bounds(const Scene *scene, const Object *object, Bounds *bounds
     return true;
 }
 
+static bool instance_primitive_bounds(const void *primitive, Bounds *bounds)
+{
+    const Instance *instance = primitive;
+    *bounds = bounds_around((Vector3){instance->rows[0].w, instance->rows[1].w, instance->rows[2].w},
+                            vector3_of(&instance->extent));
+    return true;
+}
+
 static bool triangle_primitive_bounds(const void *primitive, Bounds *bounds)
 {
     const Triangle *triangle = primitive;
@@ -242,4 +251,5 @@ const ShapeOps mesh_ops = {
     .kind = KIND_TRIANGLES,
     .bounds = mesh_bounds,
     .flatten = mesh_flatten,
+    .primitive_bounds = instance_primitive_bounds,
 };

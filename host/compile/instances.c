@@ -1,0 +1,427 @@
+#include "host/compile/instances.h"
+
+#include "host/base/hash.h"
+#include "host/base/memory.h"
+#include "host/compile/stages.h"
+#include "host/scene/mesh.h"
+#include <stdlib.h>
+#include <string.h>
+
+// The triangles of instances up to which meshes are copied: rays take longer to hit shared ones.
+enum { COPIED_TRIANGLES_MAX = 1 << 18 };
+
+// A map's entries and a light's distance from an instance, in units of the mesh's size, are within this, so
+// that no square of a float overflows.
+#define ENTRY_MAX          0x1p50
+#define LIGHT_DISTANCE_MAX 0x1p59
+
+// A map from a shared mesh's space to the scene's, without its translation, and its inverse.
+typedef struct {
+    double rows[3][3], inverses[3][3];
+    double determinant;
+} InstanceMap;
+
+// `is_exact`: the inverse is rounded once from quadruple precision. Otherwise it is off by some roundings of
+// a double times the condition, which floats do not resolve.
+static InstanceMap instance_map(const Affine *transform, double scale, bool is_exact)
+{
+    InstanceMap map;
+    Vector3 rows[3];
+    for (int i = 0; i < 3; i++) {
+        const double *row = transform->rows[i];
+        rows[i] = (Vector3){row[0] / scale, row[1] / scale, row[2] / scale};
+        memcpy(map.rows[i], (const double[3]){rows[i].x, rows[i].y, rows[i].z}, sizeof map.rows[i]);
+    }
+    map.determinant = vector_dot(rows[0], vector_cross(rows[1], rows[2]));
+    for (int k = 0; k < 3; k++) {
+        const Vector3 one = rows[(k + 1) % 3], other = rows[(k + 2) % 3];
+        Vector3 column = vector_scale(vector_cross(one, other), 1 / map.determinant);
+        if (is_exact) {
+            const Quad3 cross = quad3_cross(quad3(one), quad3(other));
+            column = quad3_rounded(quad3_scale(cross, 1 / quad3_dot(quad3(rows[k]), cross)));
+        }
+        map.inverses[0][k] = column.x;
+        map.inverses[1][k] = column.y;
+        map.inverses[2][k] = column.z;
+    }
+    return map;
+}
+
+// The largest sum of a row of |map| |inverse|; NAN or infinite if there is no inverse.
+static double map_condition(const InstanceMap *map)
+{
+    double condition = 0;
+    for (int i = 0; i < 3; i++) {
+        double sum = 0;
+        for (int j = 0; j < 3; j++)
+            for (int k = 0; k < 3; k++)
+                sum += fabs(map->rows[i][k]) * fabs(map->inverses[k][j]);
+        if (!(sum <= condition)) condition = sum;
+    }
+    return condition;
+}
+
+static double map_largest(const double rows[3][3])
+{
+    double largest = 0;
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++)
+            if (!(fabs(rows[i][k]) <= largest)) largest = fabs(rows[i][k]);
+    return largest;
+}
+
+// Returns whether rays can be mapped to the instance without loss, and joins its condition.
+static bool map_suits(const Scene *scene, const Object *object, const SharedMeshPlan *shared,
+                      double *condition)
+{
+    const InstanceMap map = instance_map(&object->as.mesh.transform, shared->scale, false);
+    const double own_condition = map_condition(&map), inverse_largest = map_largest(map.inverses);
+    const Vector3 center = affine_point(&object->as.mesh.transform, shared->center);
+    bool suits = own_condition <= INSTANCE_CONDITION_MAX && map_largest(map.rows) <= ENTRY_MAX &&
+                 inverse_largest <= ENTRY_MAX;
+    for (size_t i = 0; i < scene->lights.count && suits; i++) {
+        const Light *light = &scene->lights.items[i];
+        suits =
+            light->kind == LIGHT_DIRECTIONAL ||
+            vector_largest(vector_subtract(light->position, center)) * inverse_largest <= LIGHT_DISTANCE_MAX;
+    }
+    if (suits) *condition = fmax(*condition, own_condition * (1 + 1e-9)); // more than its rounding
+    return suits;
+}
+
+static SharedMeshPlan shared_mesh_make(const Scene *scene, const Object *object, uint32_t material)
+{
+    const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+    SharedMeshPlan shared = {
+        .mesh = object->as.mesh.index,
+        .material = material,
+        .object_material = object->material,
+        .center = bounds_center(mesh->bounds),
+        .scale = 1,
+    };
+    shared.extent = vector_max(vector_subtract(mesh->bounds.max, shared.center),
+                               vector_subtract(shared.center, mesh->bounds.min));
+    int exponent;
+    frexp(vector_largest(shared.extent), &exponent);
+    if (!vector_is_zero(shared.extent)) shared.scale = ldexp(1, -exponent);
+    shared.extent = vector_scale(shared.extent, shared.scale);
+    return shared;
+}
+
+// Sets whether the mesh, with the materials that instances do not replace, is opaque and transparent.
+static void shared_mesh_classify(const Scene *scene, SharedMeshPlan *shared)
+{
+    const Mesh *mesh = &scene->meshes.items[shared->mesh];
+    const uint32_t *materials = shared->material > 0 ? NULL : mesh->materials;
+    for (size_t i = 0; i < (materials ? mesh->triangle_count : 1); i++) {
+        const uint32_t material = materials ? materials[i] : shared->object_material;
+        const bool is_transparent = scene->materials.items[material].transmission > 0;
+        shared->is_transparent_somewhere |= is_transparent;
+        shared->is_opaque_somewhere |= !is_transparent;
+    }
+}
+
+typedef struct {
+    InstancePlan *plan;
+    const Scene *scene;
+    uint32_t *first; // of each of the scene's meshes: 1 + its first shared one, or 0
+} Planning;
+
+// Returns 1 + the shared mesh of the object. If texture coordinates depend on the material that replaces the
+// mesh's, each such material has a separate one.
+static uint32_t shared_mesh_find(Planning *planning, const Object *object)
+{
+    InstancePlan *plan = planning->plan;
+    const Scene *scene = planning->scene;
+    const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+    const bool is_separate =
+        object->as.mesh.has_own_material && mesh->uvs && scene->materials.items[object->material].texture > 0;
+    const uint32_t material = is_separate ? 1 + object->material : 0;
+    uint32_t *link = &planning->first[object->as.mesh.index];
+    while (*link > 0) {
+        SharedMeshPlan *shared = &plan->meshes[*link - 1];
+        if (shared->material == material) return *link;
+        link = &shared->next;
+    }
+    *link = (uint32_t)plan->mesh_count + 1; // before the array moves
+    plan->meshes = memory_resize(plan->meshes, plan->mesh_count + 1, sizeof *plan->meshes);
+    plan->meshes[plan->mesh_count++] = shared_mesh_make(scene, object, material);
+    return (uint32_t)plan->mesh_count;
+}
+
+static bool is_instance(const Object *object)
+{
+    return object->kind == SHAPE_MESH && object->as.mesh.is_instance;
+}
+
+// Returns whether meshes are shared where that suits them.
+static bool sharing_is_wanted(const Scene *scene, const CompileSettings *settings)
+{
+    size_t count = 0;
+    if (settings->certifies || settings->instances == INSTANCES_COPIED) return false;
+    for (size_t i = 0; i < scene->objects.count; i++)
+        if (is_instance(&scene->objects.items[i]))
+            count += object_primitive_count(scene, &scene->objects.items[i]);
+    return count > (settings->instances == INSTANCES_SHARED ? 0 : COPIED_TRIANGLES_MAX);
+}
+
+InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings)
+{
+    if (!sharing_is_wanted(scene, settings)) return NULL;
+    InstancePlan *plan = memory_allocate_zeroed(1, sizeof *plan);
+    plan->of_objects = memory_allocate_zeroed(scene->objects.count, sizeof *plan->of_objects);
+    Planning planning = {plan, scene, memory_allocate_zeroed(scene->meshes.count, sizeof *planning.first)};
+    uint32_t *uses = memory_allocate_zeroed(scene->meshes.count, sizeof *uses);
+    for (size_t i = 0; i < scene->objects.count; i++)
+        if (is_instance(&scene->objects.items[i])) uses[scene->objects.items[i].as.mesh.index]++;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        if (!is_instance(object) || object_primitive_count(scene, object) == 0) continue;
+        if (uses[object->as.mesh.index] == 1 && settings->instances != INSTANCES_SHARED) continue;
+        const uint32_t shared = shared_mesh_find(&planning, object);
+        if (!map_suits(scene, object, &plan->meshes[shared - 1], &plan->condition)) continue;
+        if (!object->as.mesh.has_own_material) plan->meshes[shared - 1].object_material = object->material;
+        plan->of_objects[i] = shared;
+        plan->instance_count++;
+        plan->triangle_count += object_primitive_count(scene, object);
+    }
+    for (size_t i = 0; i < plan->mesh_count; i++)
+        shared_mesh_classify(scene, &plan->meshes[i]);
+    free(planning.first);
+    free(uses);
+    if (plan->instance_count > 0) return plan;
+    instance_plan_free(plan);
+    return NULL;
+}
+
+void instance_plan_free(InstancePlan *plan)
+{
+    if (!plan) return;
+    free(plan->of_objects);
+    free(plan->meshes);
+    free(plan);
+}
+
+uint32_t instance_mesh(const CompiledScene *compiled, size_t object)
+{
+    return compiled->instances ? compiled->instances->of_objects[object] : 0;
+}
+
+void instance_flatten(Flattening *flattening, const Object *object, uint32_t shared_mesh)
+{
+    const SharedMeshPlan *shared = &flattening->compiled->instances->meshes[shared_mesh];
+    const Affine *transform = &object->as.mesh.transform;
+    const Rounding *rounding = &flattening->rounding;
+    const InstanceMap map = instance_map(transform, shared->scale, rounding->is_double);
+    const Vector3 seen = vector_subtract(affine_point(transform, shared->center), rounding->eye);
+    double place[3] = {seen.x, seen.y, seen.z};
+    const double eye[3] = {rounding->eye.x, rounding->eye.y, rounding->eye.z};
+    const double half[3] = {shared->extent.x, shared->extent.y, shared->extent.z};
+    double rows[3][4], inverses[3][3], extent[3];
+    for (int i = 0; i < 3; i++) {
+        const double *row = transform->rows[i];
+        extent[i] = 0;
+        for (int k = 0; k < 3; k++) {
+            rows[i][k] = rounded(rounding, map.rows[i][k]);
+            inverses[i][k] = rounded(rounding, map.inverses[i][k]);
+            extent[i] += fabs(map.rows[i][k]) * half[k];
+        }
+        if (rounding->is_double)
+            place[i] =
+                (double)(quad3_dot((Quad3){row[0], row[1], row[2]}, quad3(shared->center)) + row[3] - eye[i]);
+        rows[i][3] = rounded(rounding, place[i]);
+    }
+    const bool replaces = object->as.mesh.has_own_material && shared->material == 0;
+    Instance instance = {
+        .extent = {extent[0], extent[1], extent[2], map_condition(&map)},
+        .id = {0, shared_mesh, replaces ? 1 + object->material : 0, 0},
+    };
+    for (int i = 0; i < 3; i++) {
+        instance.rows[i] = (scalar4){rows[i][0], rows[i][1], rows[i][2], rows[i][3]};
+        instance.inverses[i] = (scalar4){inverses[i][0], inverses[i][1], inverses[i][2], 0};
+    }
+    instance.inverses[0].w = sqrt(fabs(map.determinant));
+    const uint32_t first = (uint32_t)flattening->primitive_count,
+                   count = (uint32_t)object_primitive_count(flattening->scene, object);
+    primitive_add(flattening, KIND_INSTANCES, &instance, object->material);
+    if (flattening->moved) return;
+    flattening->primitive_count += count - 1;
+    InstanceIds *ids = flattening->compiled->arrays[FLAT_INSTANCE_IDS].items;
+    ids[flattening->counts[KIND_INSTANCES] - 1].ids =
+        (uint4){first, first + count, (uint32_t)(flattening->primitive_count - flattening->entry_count), 0};
+}
+
+double instance_slack(const CompiledScene *compiled, const CompileSettings *settings)
+{
+    const double roundoff = (settings->precision == PRECISION_DOUBLE ? DBL_EPSILON : FLT_EPSILON) / 2;
+    return compiled->instances ? INSTANCE_RAY_SLACK * roundoff * compiled->instances->condition : 0;
+}
+
+uint32_t entry_of_id(const CompiledScene *compiled, uint32_t id)
+{
+    const FlatArray *array = &compiled->arrays[FLAT_INSTANCE_IDS];
+    const InstanceIds *ids = array->items;
+    size_t low = 0, high = array->count; // `low` instances begin no later than the id
+    while (low < high) {
+        const size_t middle = (low + high) / 2;
+        if (ids[middle].ids.x <= id)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    if (low == 0) return id;
+    const uint4 before = ids[low - 1].ids;
+    return (id < before.y ? before.y - 1 : id) - before.z;
+}
+
+// The arrays that shared meshes add to.
+static const FlatKind extended[EXTENDED_COUNT] = {FLAT_FIRST_SHAPE + KIND_TRIANGLES,
+                                                  FLAT_TRIANGLE_NORMALS,
+                                                  FLAT_TRIANGLE_UVS,
+                                                  FLAT_OBJECTS,
+                                                  FLAT_NODES,
+                                                  FLAT_TRIANGLE_BLOCKS};
+
+// Compiles a shared mesh, alone and in its own space.
+static CompiledScene shared_mesh_compile(const CompiledScene *compiled, const Scene *scene,
+                                         const SharedMeshPlan *shared, const CompileSettings *settings,
+                                         uint64_t *hash)
+{
+    Mesh mesh = scene->meshes.items[shared->mesh];
+    Object object = {.kind = SHAPE_MESH, .material = shared->object_material};
+    if (shared->material > 0) mesh.materials = NULL;
+    mesh.vertices = memory_allocate(mesh.vertex_count, sizeof *mesh.vertices);
+    for (size_t i = 0; i < mesh.vertex_count; i++)
+        mesh.vertices[i] = vector_scale(
+            vector_subtract(scene->meshes.items[shared->mesh].vertices[i], shared->center), shared->scale);
+    Scene alone = *scene;
+    alone.objects.items = &object;
+    alone.objects.count = 1;
+    alone.meshes.items = &mesh;
+    alone.meshes.count = 1;
+    CompiledScene part = {.textures = compiled->textures, .unit = 1};
+    const Rounding rounding = {.is_double = settings->precision == PRECISION_DOUBLE, .is_local = true};
+    objects_flatten(&part, &alone, &rounding);
+    for (size_t i = 0; i < EXTENDED_COUNT && settings->hashes_primitives; i++)
+        *hash = flat_array_hash(*hash, &part.arrays[extended[i]]);
+    mesh_bvh_flatten(&part, settings);
+    free(mesh.vertices);
+    part.textures = NULL;
+    return part;
+}
+
+// Replaces an array by one that has room for more behind it.
+static void array_extend(CompiledScene *compiled, FlatKind kind, size_t count)
+{
+    FlatArray *array = &compiled->arrays[kind];
+    const size_t size = array->layout.size;
+    void *items = memory_allocate_large(array->count + count, size);
+    if (array->count > 0) memcpy(items, array->items, array->count * size);
+    free(array->items);
+    array->items = items;
+}
+
+static void array_append(CompiledScene *compiled, FlatKind kind, const FlatArray *added)
+{
+    FlatArray *array = &compiled->arrays[kind];
+    if (added->count > 0)
+        memcpy(flat_array_at(array, array->count), added->items, added->count * array->layout.size);
+    array->count += added->count;
+    compiled->changed[kind] = true;
+}
+
+// Points the structs of a shared mesh to their places behind those of `compiled`.
+static void shared_mesh_shift(const CompiledScene *compiled, CompiledScene *part)
+{
+    uint32_t bases[FLAT_COUNT];
+    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
+        bases[kind] = (uint32_t)compiled->arrays[kind].count;
+    const uint32_t triangle_base = bases[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
+    const FlatArray *triangles = &part->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
+    ObjectEntry *entries = part->arrays[FLAT_OBJECTS].items;
+    for (size_t i = 0; i < triangles->count; i++) {
+        Triangle *triangle = flat_array_at(triangles, i);
+        if (triangle->id.y > 0) triangle->id.y += bases[FLAT_TRIANGLE_NORMALS];
+        if (triangle->id.z > 0) triangle->id.z += bases[FLAT_TRIANGLE_UVS];
+        entries[i].kind_index_material.y += triangle_base;
+    }
+    const uint32_t block_count = (uint32_t)part->arrays[FLAT_TRIANGLE_BLOCKS].count;
+    bvh_shift(part, bases[FLAT_NODES], block_count > 0 ? bases[FLAT_TRIANGLE_BLOCKS] : triangle_base);
+    uint32_t *places = part->arrays[FLAT_BLOCK_PLACES].items;
+    for (uint32_t i = 0; i < block_count; i++)
+        places[i] += triangle_base;
+}
+
+static void block_places_append(CompiledScene *compiled, const CompiledScene *part)
+{
+    const size_t before = compiled->arrays[FLAT_TRIANGLE_BLOCKS].count,
+                 added = part->arrays[FLAT_TRIANGLE_BLOCKS].count;
+    FlatArray *places = &compiled->arrays[FLAT_BLOCK_PLACES];
+    places->count = (before + added + 3) / 4;
+    if (added > 0)
+        memcpy((uint32_t *)places->items + before, part->arrays[FLAT_BLOCK_PLACES].items,
+               added * sizeof(uint32_t));
+    compiled->changed[FLAT_BLOCK_PLACES] = true;
+}
+
+// Makes arrays ready for appending: blocks and nodes are as wide as the kernel's.
+static void arrays_prepare(CompiledScene *compiled, const CompiledScene *parts, size_t part_count)
+{
+    InstancePlan *plan = compiled->instances;
+    size_t block_count = compiled->arrays[FLAT_TRIANGLE_BLOCKS].count;
+    for (size_t i = 0; i < EXTENDED_COUNT; i++) {
+        size_t count = 0;
+        for (size_t k = 0; k < part_count; k++)
+            count += parts[k].arrays[extended[i]].count;
+        FlatArray *array = &compiled->arrays[extended[i]];
+        const FlatLayout *layout = &parts[0].arrays[extended[i]].layout;
+        plan->hidden_counts[i] = array->count;
+        if (memcmp(&array->layout, layout, sizeof *layout) != 0) // empty, or one node that leads nowhere
+            flat_array_renew_as(compiled, extended[i], array->count, *layout);
+        array_extend(compiled, extended[i], count);
+        if (extended[i] == FLAT_TRIANGLE_BLOCKS) block_count += count;
+    }
+    FlatArray *places = &compiled->arrays[FLAT_BLOCK_PLACES];
+    array_extend(compiled, FLAT_BLOCK_PLACES, (block_count + 3) / 4 - places->count);
+}
+
+void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
+{
+    InstancePlan *plan = compiled->instances;
+    if (!plan) return;
+    CompiledScene *parts = memory_allocate(plan->mesh_count, sizeof *parts);
+    for (size_t i = 0; i < plan->mesh_count; i++)
+        parts[i] =
+            shared_mesh_compile(compiled, scene, &plan->meshes[i], settings, &compiled->primitives_hash);
+    arrays_prepare(compiled, parts, plan->mesh_count);
+    SharedMesh *meshes = compiled->arrays[FLAT_SHARED_MESHES].items;
+    for (size_t i = 0; i < plan->mesh_count; i++) {
+        const uint32_t root = (uint32_t)compiled->arrays[FLAT_NODES].count,
+                       entry = (uint32_t)compiled->arrays[FLAT_OBJECTS].count;
+        meshes[i] = (SharedMesh){scalar4_of(plan->meshes[i].extent, 0), {root, entry, 0, 0}};
+        shared_mesh_shift(compiled, &parts[i]);
+        block_places_append(compiled, &parts[i]);
+        for (size_t k = 0; k < EXTENDED_COUNT; k++)
+            array_append(compiled, extended[k], &parts[i].arrays[extended[k]]);
+        if (parts[i].pending_children_max > compiled->pending_children_max)
+            compiled->pending_children_max = parts[i].pending_children_max;
+        compiled_scene_free(&parts[i]);
+    }
+    free(parts);
+    const FlatArray *ids = &compiled->arrays[FLAT_INSTANCE_IDS];
+    const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
+    for (size_t i = 0; i < ids->count; i++) {
+        uint4 *of_instance = &((InstanceIds *)ids->items)[i].ids;
+        of_instance->w = entries[entry_of_id(compiled, of_instance->x)].kind_index_material.y;
+    }
+}
+
+void shared_meshes_toggle(CompiledScene *compiled)
+{
+    InstancePlan *plan = compiled->instances;
+    for (size_t i = 0; plan && i < EXTENDED_COUNT; i++) {
+        const size_t count = compiled->arrays[extended[i]].count;
+        compiled->arrays[extended[i]].count = plan->hidden_counts[i];
+        plan->hidden_counts[i] = count;
+    }
+}

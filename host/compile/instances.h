@@ -1,0 +1,50 @@
+// Meshes that instances share: which objects share one, and what is compiled of both.
+#pragma once
+
+#include "host/compile/flatten.h"
+#include "host/compile/settings.h"
+
+// A mesh that instances share.
+typedef struct {
+    uint32_t mesh;     // of the scene
+    uint32_t material; // 1 + the material of its texture coordinates, if that replaces the mesh's; else 0
+    uint32_t next;     // 1 + another one of the same mesh, or 0
+    uint32_t object_material; // of triangles without another one
+    bool is_opaque_somewhere, is_transparent_somewhere;
+    Vector3 center, extent; // of its box; half of it
+    double scale;           // of its space, a power of two
+} SharedMeshPlan;
+
+enum { EXTENDED_COUNT = 6 }; // arrays that end with those of shared meshes
+
+typedef struct InstancePlan {
+    uint32_t *of_objects; // 1 + each object's shared mesh, or 0 if it shares none
+    SharedMeshPlan *meshes;
+    size_t mesh_count, instance_count;
+    size_t triangle_count;                // of the instances
+    double condition;                     // the largest of the instances'
+    size_t hidden_counts[EXTENDED_COUNT]; // see shared_meshes_toggle
+} InstancePlan;
+
+// Returns NULL if no mesh is shared.
+InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings);
+void instance_plan_free(InstancePlan *plan);
+
+// Returns 1 + the shared mesh of the scene's object, or 0.
+uint32_t instance_mesh(const CompiledScene *compiled, size_t object);
+
+// Appends an instance that shares a mesh, or replaces the one that is moved (host/compile/flatten.h).
+void instance_flatten(Flattening *flattening, const Object *object, uint32_t shared_mesh);
+
+// Returns how far mapping a ray to an instance moves its hits, relative to their distance; 0 without
+// instances.
+double instance_slack(const CompiledScene *compiled, const CompileSettings *settings);
+
+// Returns the index of an id's ObjectEntry: of an instance's, if the id is in one.
+uint32_t entry_of_id(const CompiledScene *compiled, uint32_t id);
+
+// Appends the shared meshes' triangles, entries and BVHs to the scene's, and sets FLAT_SHARED_MESHES and the
+// instances' places.
+void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);
+// Hides what shared_meshes_append added to the counts of arrays, or shows it again.
+void shared_meshes_toggle(CompiledScene *compiled);

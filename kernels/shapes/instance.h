@@ -1,0 +1,89 @@
+// Instances: maps between the space of a shared mesh and that of the eye. docs/numerics.md has the bounds.
+#ifndef INSTANCE_H
+#define INSTANCE_H
+
+#include "scene.h"
+#include "shapes/triangle.h"
+
+static inline real instance_row(scalar4 row, Vector v)
+{
+    return real_fma((real)(row.x), v.x, real_fma((real)(row.y), v.y, (real)(row.z) * v.z));
+}
+
+// Maps a vector to the mesh's space.
+static inline Vector instance_inward(const Instance *instance, Vector v)
+{
+    return (Vector){instance_row(instance->inverses[0], v), instance_row(instance->inverses[1], v),
+                    instance_row(instance->inverses[2], v)};
+}
+
+// Returns the ray in the mesh's space, with the same t.
+static inline Ray instance_ray(const Instance *instance, const Ray *ray)
+{
+    const Vector center = {(real)(instance->rows[0].w), (real)(instance->rows[1].w),
+                           (real)(instance->rows[2].w)};
+    return ray_make(instance_inward(instance, vector_subtract(ray->origin, center)),
+                    instance_inward(instance, ray->direction), ray->tmin, ray->tmax, ray->active);
+}
+
+static inline real instance_coordinate(scalar4 row, Vector p)
+{
+    return real_fma((real)(row.x), p.x,
+                    real_fma((real)(row.y), p.y, real_fma((real)(row.z), p.z, (real)(row.w))));
+}
+
+static inline Vector instance_point(const Instance *instance, Vector p)
+{
+    return (Vector){instance_coordinate(instance->rows[0], p), instance_coordinate(instance->rows[1], p),
+                    instance_coordinate(instance->rows[2], p)};
+}
+
+// Maps a normal of the mesh by the transposed inverse, which changes its length.
+static inline Vector instance_normal(const Instance *instance, Vector n)
+{
+    const Vector x = vector_of(instance->inverses[0]), y = vector_of(instance->inverses[1]),
+                 z = vector_of(instance->inverses[2]);
+    return (Vector){real_fma(x.x, n.x, real_fma(y.x, n.y, z.x * n.z)),
+                    real_fma(x.y, n.x, real_fma(y.y, n.y, z.y * n.z)),
+                    real_fma(x.z, n.x, real_fma(y.z, n.y, z.z * n.z))};
+}
+
+// Maps the unit normals of a triangle's corners; those that are 0 stay 0.
+static inline Corners instance_normals(const Instance *instance, Corners normals)
+{
+    return (Corners){vector_normalize(instance_normal(instance, normals.a)),
+                     vector_normalize(instance_normal(instance, normals.b)),
+                     vector_normalize(instance_normal(instance, normals.c))};
+}
+
+// Returns by how much lengths in a triangle's plane grow, as the root of what its area does.
+static inline real instance_stretch(const Instance *instance, Vector normal)
+{
+    const real mapped = vector_norm(instance_normal(instance, vector_normalize(normal)));
+    return (real)(instance->inverses[0].w) * real_sqrt(mapped);
+}
+
+// A bound on what mapping adds to the error of a point and of the next ray's test, in units of 16 u of the
+// condition times the corners' largest coordinate from the instance's center.
+#define INSTANCE_POINT_ERROR ((real)(1.5f))
+
+// Returns the point of a triangle in the mesh's space, mapped to the eye's. The normal may have any length.
+static inline SurfacePoint instance_surface_point(const Instance *instance, Corners corners, Vector normal,
+                                                  TriangleWeights weights)
+{
+    const Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners),
+                 p = triangle_blend(weights, corners), mapped = instance_normal(instance, unit);
+    const real norm = vector_norm(mapped);
+    const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
+    const real rounding_scale =
+        real_fma((real)(0.25f), vector_norm1(p), vector_norm1_along(unit, max_abs)) * inverse;
+    const Vector reach = {instance_row(fabs(instance->rows[0]), max_abs),
+                          instance_row(fabs(instance->rows[1]), max_abs),
+                          instance_row(fabs(instance->rows[2]), max_abs)};
+    const real largest = real_max(real_max(reach.x, reach.y), reach.z);
+    return surface_point_make(
+        instance_point(instance, p), vector_scale(mapped, inverse),
+        real_fma(INSTANCE_POINT_ERROR * (real)(instance->extent.w), largest, rounding_scale));
+}
+
+#endif

@@ -1,0 +1,496 @@
+// Tests that instances which share a mesh look as copies of it do, wherever and however they lie.
+//
+// run_tests: sanitize-long-only
+#include "host/base/array.h"
+#include "host/compile/compile.h"
+#include "host/compile/instances.h"
+#include "tests/files.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include "tests/random_ray.h"
+#include "tests/scene_reading.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+enum { WIDTH = 83, HEIGHT = 47, SIDE = 24, TRIANGLES = 2 * SIDE * SIDE };
+
+// With compiled kernels in the run's cache, and so not in a scratch folder.
+static char folder[] = "/tmp/glint-test-XXXXXX";
+
+// Writes a bumpy ball with texture coordinates, and normals if it is smooth.
+static void ball_write(const char *name, bool is_smooth)
+{
+    Text text = {0};
+    for (int i = 0; i <= SIDE; i++)
+        for (int k = 0; k <= SIDE; k++) {
+            const double across = M_PI * (0.02 + 0.96 * i / SIDE), around = 2 * M_PI * k / SIDE;
+            const double radius = 1 + 0.1 * sin(7 * across) * cos(5 * around);
+            const double x = sin(across) * cos(around), y = cos(across), z = sin(across) * sin(around);
+            text_appendf(&text, "v %.9g %.9g %.9g\nvt %.9g %.9g\nvn %.9g %.9g %.9g\n", 0.3 + radius * x,
+                         radius * y - 0.2, radius * z, (double)k / SIDE, (double)i / SIDE, x, y, z);
+        }
+    for (int i = 0; i < SIDE; i++)
+        for (int k = 0; k < SIDE; k++) {
+            const int a = i * (SIDE + 1) + k + 1, b = a + 1, c = b + SIDE + 1, d = c - 1;
+            const char *format = is_smooth ? "f %d/%d/%d %d/%d/%d %d/%d/%d\n" : "f %d/%d %d/%d %d/%d\n";
+            if (is_smooth) {
+                text_appendf(&text, format, a, a, a, b, b, b, c, c, c);
+                text_appendf(&text, format, a, a, a, c, c, c, d, d, d);
+            } else {
+                text_appendf(&text, format, a, a, b, b, c, c);
+                text_appendf(&text, format, a, a, c, c, d, d);
+            }
+        }
+    char path[256];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    file_write(path, text_c(&text));
+    text_free(&text);
+}
+
+static int instances_open(void **state)
+{
+    assert_non_null(mkdtemp(folder));
+    ball_write("smooth.obj", true);
+    ball_write("flat.obj", false);
+    return probe_open(state);
+}
+
+static int instances_close(void **state)
+{
+    static const char *const names[] = {"smooth.obj", "flat.obj", ""};
+    for (int i = 0; i < 3; i++) {
+        char path[256];
+        snprintf(path, sizeof path, "%s/%s", folder, names[i]);
+        remove(path);
+    }
+    return probe_close(state);
+}
+
+// A scene of balls in a group that is scaled by `size` and moved to `place`, with the camera and the lights.
+static Scene scene_with(double size, Vector3 place, const char *objects)
+{
+    Text text = {0};
+    const Vector3 points[] = {{0.5, 2.2, -7}, {0, 0.2, 0}, {4, 7, -5}};
+    Vector3 at[3];
+    for (int i = 0; i < 3; i++)
+        at[i] = vector_add(place, vector_scale(points[i], size));
+    text_appendf(&text,
+                 "camera: {position: [%.17g, %.17g, %.17g], look_at: [%.17g, %.17g, %.17g], fov: 42}\n",
+                 at[0].x, at[0].y, at[0].z, at[1].x, at[1].y, at[1].z);
+    text_appendf(&text,
+                 "background: [0.1, 0.2, 0.4]\nambient: [0.3, 0.3, 0.3]\n"
+                 "lights: [{point: {position: [%.17g, %.17g, %.17g]}}, {directional: {direction: [1, -2, 1], "
+                 "color: [0.3, 0.3, 0.4]}}]\n",
+                 at[2].x, at[2].y, at[2].z);
+    text_appendf(&text, "materials:\n"
+                        "  matte: {color: [0.8, 0.3, 0.2], specular: 0.4}\n"
+                        "  globe: {image: scenes/images/globe.png}\n"
+                        "  mirror: {color: [0.2, 0.3, 0.2], reflection: 0.6}\n"
+                        "  glass: {color: [0.1, 0.1, 0.1], transmission: [0.8, 0.5, 0.7], ior: 1.3}\n");
+    text_appendf(&text,
+                 "define:\n"
+                 "  smooth: {objects: [{mesh: {file: %s/smooth.obj, material: globe}}]}\n"
+                 "  flat: {objects: [{mesh: {file: %s/flat.obj, material: matte}}]}\n"
+                 "  both: {objects: [{instance: {of: flat, transform: {scale: 0.5, translate: [-1, 0, 0]}}},"
+                 " {mesh: {file: %s/smooth.obj, material: mirror, transform: {scale: 0.6}}},"
+                 " {sphere: {center: [1.4, 0, 0], radius: 0.3, material: mirror}}]}\n",
+                 folder, folder, folder);
+    text_appendf(
+        &text,
+        "objects:\n  - group:\n      transform: [{scale: %.17g}, {translate: [%.17g, %.17g, %.17g]}]\n"
+        "      objects:\n        - plane: {point: [0, -1.2, 0], normal: [0, 1, 0]}\n%s\n",
+        size, place.x, place.y, place.z, objects);
+    Scene scene = scene_of_text("a.yaml", text_c(&text));
+    text_free(&text);
+    return scene;
+}
+
+#define INSTANCE(name, transform) "        - instance: {of: " name ", transform: " transform "}\n"
+
+static const char turned[] = INSTANCE("smooth", "{rotate: [20, 130, 50], translate: [-1.5, 0, 0]}")
+    INSTANCE("flat", "{rotate: [70, 10, -30], scale: 0.8, translate: [1.2, 0.1, 0.5]}")
+        INSTANCE("flat", "{scale: [0.5, 0.5, 0.5], translate: [0.2, 1.4, 0]}");
+static const char uneven[] =
+    INSTANCE("smooth", "{scale: [-1, 0.7, 1.2], rotate: [20, 30, 0], translate: [-1.5, 0, 0]}")
+        INSTANCE("flat", "{matrix: [[0.8, 0.4, 0, 1.3], [0, 0.8, 0.2, 0], [0.1, 0, 0.9, 0.5]]}")
+            INSTANCE("smooth", "{matrix: [[0.3, 0.3, 0, 0.2], [0, -0.4, 0, 1.4], [0, 0, 0.4, 0]]}");
+static const char nested[] = INSTANCE("both", "{rotate: [0, 40, 10]}")
+    INSTANCE("both", "{scale: [0.7, 0.7, -0.7], translate: [0.4, 1.5, 1]}");
+static const char clear[] =
+    "        - instance: {of: smooth, material: glass, transform: {rotate: [0, 70, 0], translate: [-1.3, 0, "
+    "0]}}\n"
+    "        - instance: {of: flat, material: glass, transform: {scale: [0.8, -0.8, 0.8], translate: [1, "
+    "-0.2, "
+    "0]}}\n"
+    "        - instance: {of: smooth, material: globe, transform: {scale: 0.4, translate: [0, 1.3, 0.5]}}\n"
+    "        - instance: {of: flat, transform: {scale: 0.5, translate: [0, 0, 2.5]}}\n";
+
+static const struct {
+    const char *name;
+    double size;
+    Vector3 place;
+    const char *objects;
+} cases[] = {
+    {"turned", 1, {0, 0, 0}, turned},
+    {"mirrored, stretched and sheared", 1, {0, 0, 0}, uneven},
+    {"nested", 1, {0, 0, 0}, nested},
+    {"of glass", 1, {0, 0, 0}, clear},
+    {"scaled by a millionth", 1e-6, {0, 0, 0}, uneven},
+    {"at 1e7", 1, {1e7, -2e6, 3e6}, turned},
+    {"of a million", 1e6, {3, 4, 5}, nested},
+};
+
+static Film render(const Scene *scene, RenderSettings *settings, InstanceChoice instances)
+{
+    settings->instances = instances;
+    return film_render(&probe_compute, scene, settings,
+                       AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_PATH);
+}
+
+static double vectors_apart(const double *a, const double *b)
+{
+    return fmax(fabs(a[0] - b[0]), fmax(fabs(a[1] - b[1]), fabs(a[2] - b[2])));
+}
+
+// How far pixels that both films see alike are apart, and the number of others.
+typedef struct {
+    double t, normal, position, color;
+    size_t other_objects, other_shadows, other_paths;
+} Difference;
+
+static Difference difference_of(const Film *film, const Film *other)
+{
+    Difference found = {0};
+    for (size_t i = 0; i < film_pixel_count(film); i++) {
+        if (film->object[i] != other->object[i]) {
+            found.other_objects++;
+            continue;
+        }
+        bool is_lit_alike = true;
+        for (uint32_t light = 0; light < film->light_count; light++)
+            is_lit_alike &=
+                film->shadow[i * film->light_count + light] == other->shadow[i * film->light_count + light];
+        found.other_shadows += !is_lit_alike;
+        found.other_paths += film->path[i] != other->path[i];
+        if (film->object[i] == UINT32_MAX) continue;
+        found.t = fmax(found.t, fabs(film->t[i] - other->t[i]) / other->t[i]);
+        found.normal = fmax(found.normal, vectors_apart(film->normal + 3 * i, other->normal + 3 * i));
+        found.position = fmax(found.position,
+                              vectors_apart(film->position + 3 * i, other->position + 3 * i) / other->t[i]);
+        if (is_lit_alike && film->path[i] == other->path[i])
+            found.color = fmax(found.color, vectors_apart(film->color + 3 * i, other->color + 3 * i));
+    }
+    return found;
+}
+
+// What the numbers of copies and of shared meshes may differ by: t and positions relative to the distance.
+// The normals of copies are those of rounded vertices, which turns them by u times the distance over the size
+// of a triangle. In double the vertices are rounded before the camera's position is subtracted.
+static void difference_check(const Difference *d, Precision precision, Vector3 place, const char *name)
+{
+    const double roundoff = (precision == PRECISION_DOUBLE ? DBL_EPSILON : FLT_EPSILON) / 2,
+                 far = precision == PRECISION_DOUBLE ? 1 + vector_largest(place) : 1;
+    const size_t others = precision == PRECISION_DOUBLE ? 0 : WIDTH * HEIGHT / 1000;
+    if (d->other_objects <= others && d->other_shadows <= others && d->other_paths <= others &&
+        d->t <= 64 * roundoff * far && d->position <= 64 * roundoff * far &&
+        d->normal <= 1024 * roundoff * far && d->color <= 2048 * roundoff * far)
+        return;
+    fail_msg("%s, %s: %zu other objects, %zu other shadows, %zu other paths; t %.3g, position %.3g, normal "
+             "%.3g, color %.3g apart",
+             precision_names[precision], name, d->other_objects, d->other_shadows, d->other_paths, d->t,
+             d->position, d->normal, d->color);
+}
+
+static void shared_meshes_look_as_copies(void **state)
+{
+    (void)state;
+    for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
+        if (!probe_has(precision)) continue;
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+            Scene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
+            RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+            Film copied = render(&scene, &settings, INSTANCES_COPIED);
+            Film shared = render(&scene, &settings, INSTANCES_SHARED);
+            assert_int_equal(film_count_faulty(&shared), 0);
+            const Difference d = difference_of(&shared, &copied);
+            difference_check(&d, precision, cases[i].place, cases[i].name);
+            film_free(&copied);
+            film_free(&shared);
+            scene_free(&scene);
+        }
+    }
+}
+
+static void lanes_agree(void **state)
+{
+    (void)state;
+    for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++)
+        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+            Scene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
+            RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+            settings.lanes = 1;
+            Film expected = render(&scene, &settings, INSTANCES_SHARED);
+            for (const uint32_t *lanes = tested_lanes(probe_compute.device); *++lanes;) {
+                settings.lanes = *lanes;
+                Film film = render(&scene, &settings, INSTANCES_SHARED);
+                film_assert_same(&film, &expected, cases[i].name);
+                film_free(&film);
+            }
+            film_free(&expected);
+            scene_free(&scene);
+        }
+}
+
+// Many instances, some of which overlap.
+static Scene crowd_make(size_t count)
+{
+    Text text = {0};
+    Random random = {7};
+    for (size_t i = 0; i < count; i++) {
+        const Vector3 turn = vector_scale(random_cube_point(&random, 1), 180),
+                      place = random_cube_point(&random, 2.5), scale = random_cube_point(&random, 0.3);
+        text_appendf(&text,
+                     "        - instance: {of: %s, transform: {scale: [%g, %g, %g], rotate: [%g, %g, %g], "
+                     "translate: [%g, %g, %g]}}\n",
+                     i % 2 ? "flat" : "smooth", 0.1 + fabs(scale.x), -0.1 - fabs(scale.y),
+                     0.1 + fabs(scale.z), turn.x, turn.y, turn.z, place.x, 0.5 * place.y, place.z);
+    }
+    Scene scene = scene_with(1, (Vector3){0, 0, 0}, text_c(&text));
+    text_free(&text);
+    return scene;
+}
+
+static void a_crowd_looks_as_copies(void **state)
+{
+    (void)state;
+    Scene scene = crowd_make(80);
+    for (Precision precision = probe_same_bits_from(); precision <= PRECISION_DOUBLE; precision++) {
+        if (!probe_has(precision)) continue;
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+        settings.lanes = 1;
+        Film copied = render(&scene, &settings, INSTANCES_COPIED);
+        Film expected = render(&scene, &settings, INSTANCES_SHARED);
+        const Difference d = difference_of(&expected, &copied);
+        difference_check(&d, precision, (Vector3){0, 0, 0}, "a crowd");
+        film_free(&copied);
+        for (const uint32_t *lanes = tested_lanes(probe_compute.device); *++lanes;) {
+            settings.lanes = *lanes;
+            Film film = render(&scene, &settings, INSTANCES_SHARED);
+            film_assert_same(&film, &expected, "lanes");
+            film_free(&film);
+            settings.bvh = BVH_OFF;
+            film = render(&scene, &settings, INSTANCES_SHARED);
+            film_assert_same(&film, &expected, "without a BVH around the instances");
+            film_free(&film);
+            settings.bvh = BVH_AUTO;
+        }
+        film_free(&expected);
+    }
+    scene_free(&scene);
+}
+
+static void the_feature_alone_and_all_together_agree(void **state)
+{
+    (void)state;
+    Scene scene = crowd_make(30);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
+    settings.instances = INSTANCES_SHARED;
+    settings.extra_features = 0;
+    Film alone = film_render(&probe_compute, &scene, &settings, 0);
+    settings.extra_features = FEATURE_ALL;
+    Film all = film_render(&probe_compute, &scene, &settings, 0);
+    film_assert_same(&alone, &all, "features");
+    film_free(&alone);
+    film_free(&all);
+    scene_free(&scene);
+}
+
+static void a_moved_camera_sees_what_a_new_one_sees(void **state)
+{
+    (void)state;
+    for (int few = 0; few < 2; few++) {
+        Scene scene = crowd_make(few ? 3 : 30);
+        RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
+        settings.instances = INSTANCES_SHARED;
+        settings.moves = true;
+        MessageList messages = {0};
+        Renderer *renderer = renderer_open(&probe_compute, &scene, &settings, &messages);
+        assert_non_null(renderer);
+        static const Vector3 places[] = {{3, 2, -5}, {-4, 1, 3}, {0, 6, 0.1}};
+        for (size_t i = 0; i < 3; i++) {
+            scene.camera.position = places[i];
+            assert_true(renderer_move(renderer, &scene, &settings, &messages));
+            Film moved, fresh = film_render(&probe_compute, &scene, &settings, AOV_OBJECT);
+            assert_true(renderer_render_film(renderer, AOV_OBJECT, &moved));
+            film_assert_same(&moved, &fresh, "moved");
+            film_free(&moved);
+            film_free(&fresh);
+        }
+        renderer_close(renderer);
+        assert_int_equal(messages.count, 0);
+        scene_free(&scene);
+    }
+}
+
+static const CompileSettings plain_settings = {.width = 1,
+                                               .height = 1,
+                                               .sample_count = 1,
+                                               .precision = PRECISION_SINGLE,
+                                               .lanes = 16,
+                                               .shift_to_eye = true};
+
+static CompiledScene compiled_make(const Scene *scene, const CompileSettings *settings)
+{
+    CompiledScene compiled;
+    MessageList messages = {0};
+    assert_true(scene_compile(&compiled, scene, settings, &messages));
+    assert_int_equal(messages.count, 0);
+    return compiled;
+}
+
+static size_t instance_count(const Scene *scene, const CompileSettings *settings)
+{
+    CompiledScene compiled = compiled_make(scene, settings);
+    const size_t count = compiled.arrays[FLAT_FIRST_SHAPE + KIND_INSTANCES].count;
+    compiled_scene_free(&compiled);
+    return count;
+}
+
+// Copies of more than 2^18 triangles are not made.
+static void meshes_are_shared_where_copies_are_large(void **state)
+{
+    (void)state;
+    enum { MOST = (1 << 18) / TRIANGLES };
+    Scene scenes[2] = {crowd_make(MOST), crowd_make(MOST + 1)};
+    CompileSettings settings = plain_settings;
+    assert_int_equal(instance_count(&scenes[0], &settings), 0);
+    assert_int_equal(instance_count(&scenes[1], &settings), MOST + 1);
+    settings.certifies = true;
+    assert_int_equal(instance_count(&scenes[1], &settings), 0);
+    scene_free(&scenes[0]);
+    scene_free(&scenes[1]);
+}
+
+static void an_uneven_transform_makes_a_copy(void **state)
+{
+    (void)state;
+    // across a diagonal, and along the mesh's axes, where no digit is lost
+    Scene scene =
+        scene_with(1, (Vector3){0, 0, 0},
+                   INSTANCE("flat", "[{rotate: [0, 0, 45]}, {scale: [1, 0.01, 1]}]")
+                       INSTANCE("flat", "{scale: [1, 0.01, 1]}") INSTANCE("flat", "{rotate: [0, 0, 45]}"));
+    CompileSettings settings = plain_settings;
+    settings.instances = INSTANCES_SHARED;
+    CompiledScene compiled = compiled_make(&scene, &settings);
+    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + KIND_INSTANCES].count, 2);
+    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES].count, 2 * TRIANGLES);
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
+}
+
+// A material with an image makes separate texture coordinates, other materials do not.
+static void materials_share_geometry(void **state)
+{
+    (void)state;
+    Scene scene =
+        scene_with(1, (Vector3){0, 0, 0},
+                   INSTANCE("flat", "{scale: 1}")
+                       INSTANCE("flat", "{scale: 2}") "        - instance: {of: smooth, material: matte}\n"
+                                                      "        - instance: {of: smooth, material: globe}\n"
+                                                      "        - instance: {of: smooth, material: globe}\n");
+    CompileSettings settings = plain_settings;
+    settings.instances = INSTANCES_SHARED;
+    CompiledScene compiled = compiled_make(&scene, &settings);
+    assert_int_equal(compiled.arrays[FLAT_SHARED_MESHES].count, 3);
+    compiled_scene_free(&compiled);
+    scene_free(&scene);
+}
+
+static void check_message(const Scene *scene, const CompileSettings *settings, const char *expected)
+{
+    CompiledScene compiled;
+    MessageList messages = {0};
+    assert_false(scene_compile(&compiled, scene, settings, &messages));
+    Text text = {0};
+    message_describe(&text, &messages.items[0]);
+    assert_string_equal(text_c(&text), expected);
+    text_free(&text);
+    message_list_free(&messages);
+}
+
+// Repeats the scene's last object, which costs no memory but its own.
+static void object_repeat(Scene *scene, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const Object object = scene->objects.items[scene->objects.count - 1];
+        array_push(scene->objects, object);
+    }
+}
+
+static void too_many_are_refused(void **state)
+{
+    (void)state;
+    Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
+    object_repeat(&scene, (1 << 24) / TRIANGLES);
+    CompileSettings settings = plain_settings;
+    settings.certifies = true;
+    check_message(
+        &scene, &settings,
+        "error: copies of meshes for instances have 16777728 triangles, more than 16777216: precision "
+        "certified copies all, other precisions those that a transform stretches unevenly\n");
+    object_repeat(&scene, (INT32_MAX - 1) / TRIANGLES - scene.objects.count + 2);
+    settings.certifies = false;
+    check_message(&scene, &settings,
+                  "error: the scene has 2147484673 objects and triangles with IDs, more than 2147483646\n");
+    scene_free(&scene);
+}
+
+// The arrays of 10,000 instances of 20,000 triangles: those of one mesh and of the instances.
+static void instances_take_little_memory(void **state)
+{
+    (void)state;
+    Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
+    const Mesh small = scene.meshes.items[scene.objects.items[1].as.mesh.index];
+    Mesh *mesh = &scene.meshes.items[scene.objects.items[1].as.mesh.index];
+    enum { TIMES = 20000 / TRIANGLES + 1 };
+    mesh->triangles = memory_allocate(TIMES * small.triangle_count, sizeof *mesh->triangles);
+    for (size_t i = 0; i < TIMES * small.triangle_count; i++)
+        memcpy(mesh->triangles[i], small.triangles[i % small.triangle_count], sizeof *mesh->triangles);
+    mesh->triangle_count = TIMES * small.triangle_count;
+    free(small.triangles);
+    object_repeat(&scene, 9999);
+    for (uint32_t lanes = 1; lanes <= 16; lanes *= 16) {
+        CompileSettings settings = plain_settings;
+        settings.lanes = lanes;
+        CompiledScene compiled = compiled_make(&scene, &settings);
+        size_t device = 0, host = 0;
+        for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
+            device += flat_array_size(&compiled.arrays[kind], false);
+            host += compiled.arrays[kind].count * compiled.arrays[kind].layout.size;
+        }
+        assert_in_range(device, 1, 10 << 20);
+        assert_in_range(host, 1, 16 << 20);
+        compiled_scene_free(&compiled);
+    }
+    scene_free(&scene);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(shared_meshes_look_as_copies),
+        cmocka_unit_test(lanes_agree),
+        cmocka_unit_test(a_crowd_looks_as_copies),
+        cmocka_unit_test(the_feature_alone_and_all_together_agree),
+        cmocka_unit_test(a_moved_camera_sees_what_a_new_one_sees),
+        cmocka_unit_test(meshes_are_shared_where_copies_are_large),
+        cmocka_unit_test(an_uneven_transform_makes_a_copy),
+        cmocka_unit_test(materials_share_geometry),
+        cmocka_unit_test(too_many_are_refused),
+        cmocka_unit_test(instances_take_little_memory),
+    };
+    return cmocka_run_group_tests(tests, instances_open, instances_close);
+}
