@@ -28,6 +28,7 @@ VerifyCheck verify_within_triangle;   // M4
 VerifyCheck verify_facing_triangle;   // M4
 VerifyCheck verify_degenerate_meshes; // M5
 VerifyCheck verify_bvh;               // M6
+VerifyCheck verify_instances;         // M8
 VerifyCheck verify_critical_angle;    // R4
 VerifyCheck verify_camera_frames;     // R8
 

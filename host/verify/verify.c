@@ -57,6 +57,7 @@ static const struct {
     {"M5", "degenerate triangles", {verify_degenerate_meshes}},
     {"M6", "BVH against every object; any hit against the closest", {verify_bvh}},
     {"M7", "triangles up to 2^60 times as large as their distance", {verify_sizes}},
+    {"M8", "instances at 1e7, mirrored and sheared, scaled by a millionth", {verify_instances}},
     {"R1", "shadow of a sphere, up to where it stands", {verify_contact_shadow}},
     {"R2", "a sphere in a thin coat of glass", {verify_nested_spheres}},
     {"R3", "glass of index 1", {verify_matched_glass}},
@@ -180,6 +181,7 @@ static RenderSettings scene_settings(const VerifyRun *run, bool bvh, uint32_t wi
     settings.width = settings.region_width = image ? width : 1;
     settings.height = settings.region_height = image ? height : 1;
     settings.bvh = bvh ? BVH_ON : BVH_OFF;
+    settings.instances = INSTANCES_SHARED;
     if (!image) settings.bounce_count = 0;
     settings.shift_to_eye = image;
     settings.extra_features = run->settings->lean ? lean_features : FEATURE_ALL;
