@@ -290,7 +290,10 @@ static int decided_check(const CertifyErrors *certified)
 // Returns what the scene has that the exact reference does not compute, or NULL.
 static const char *reference_lacks(const Scene *scene)
 {
+    enum { OBJECTS_MAX = 1 << 26 }; // of 168 bytes each
     const FeatureSet features = features_of(scene);
+    if (scene_primitive_count(scene) > OBJECTS_MAX)
+        return "room for more than 67,108,864 objects and triangles";
     if (features & FEATURE_AREA_LIGHTS) return "lights with an area";
     if (features & FEATURE_LENS) return "a lens ('aperture')";
     return features & FEATURE_ORTHOGRAPHIC ? "parallel rays ('height')" : NULL;
