@@ -382,7 +382,7 @@ typedef struct {
     scalar4 contact_low, contact_high;
     // x: width of a sample's share of a pixel, at distance 1. y: the first rival of every hit at `certified`:
     // the largest scalar, or its negative if no bound holds and so every hit is uncertain. z: with
-    // HAS_ORTHOGRAPHIC, that width at any distance, or 0.
+    // HAS_ORTHOGRAPHIC, that width at any distance, or 0. w: the least weight of a ray that is traced.
     scalar4 sample;
     uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: largest depth

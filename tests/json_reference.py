@@ -309,6 +309,7 @@ MEANINGS = {
     # accuracy
     "scenes[]": "object; in order",
     "bounces": "count; limit per ray",
+    "min_contribution": "number; rays of lower weight are not traced",
     "scenes[].reference": "object",
     "scenes[].reference.kind": "text; `render` or `file`",
     "scenes[].reference.device": "text; as `devices[].name`",

@@ -146,7 +146,7 @@ static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Tri
 {
     double largest = 0;
     for (uint64_t seed = 1; seed <= BLURRED_COUNT; seed++) {
-        const ReferencePath path = {trial->bounce_count, BLUR * u, seed};
+        const ReferencePath path = {.bounce_count = trial->bounce_count, .blur = BLUR * u, .seed = seed};
         largest = fmax(largest, largest_difference(reference_path_color(scene, ray, &path), color));
     }
     return largest;

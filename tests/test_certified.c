@@ -329,7 +329,7 @@ static void check_family(Family family)
         Scene scene = scene_attacking(family, seed);
         CertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, WIDTH, HEIGHT, WIDTH * HEIGHT,
-                                        bounce_counts[family], NULL));
+                                        (ReferencePath){.bounce_count = bounce_counts[family]}, NULL));
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
         settings.extra_features = tests_are_long() ? family_features[family] : FEATURE_ALL; // one program
         settings.bounce_count = bounce_counts[family];
@@ -397,7 +397,7 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
     Pictures *pictures = context;
     CertifySample reference;
     assert_true(certify_sample_open(&reference, scene, settings->width, settings->height, 400,
-                                    settings->bounce_count, NULL));
+                                    (ReferencePath){.bounce_count = settings->bounce_count}, NULL));
     RenderSettings certified = *settings;
     certified.precision = PRECISION_CERTIFIED;
     const Answer found = answer(scene, &reference, &certified);
@@ -441,7 +441,7 @@ static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what,
 {
     CertifySample reference;
     assert_true(certify_sample_open(&reference, scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
-                                    bounce_count, NULL));
+                                    (ReferencePath){.bounce_count = bounce_count}, NULL));
     RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);
     settings.bounce_count = bounce_count;
     settings.extra_features = FEATURE_ALL; // one program for all

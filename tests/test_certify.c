@@ -20,7 +20,7 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
     const RenderSettings settings = film_settings(WIDTH * scale, HEIGHT * scale, precision);
     CertifySample reference;
     assert_true(certify_sample_open(&reference, scene, settings.width, settings.height, count,
-                                    settings.bounce_count, NULL));
+                                    (ReferencePath){.bounce_count = settings.bounce_count}, NULL));
     Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT);
     const CertifyErrors errors = certify_compare(&reference, &film);
     size_t undecided = 0;
@@ -28,7 +28,9 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
         undecided += reference_is_undecided(&reference.pixels[i]);
     assert_int_equal(errors.compared, reference.count - undecided);
     assert_true(undecided < reference.count / 10);
-    if (doubts) *doubts = certify_doubts(scene, &film, count / 10 + 1, settings.bounce_count, NULL);
+    if (doubts)
+        *doubts = certify_doubts(scene, &film, count / 10 + 1,
+                                 (ReferencePath){.bounce_count = settings.bounce_count}, NULL);
     film_free(&film);
     certify_sample_close(&reference);
     return errors;

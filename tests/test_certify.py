@@ -135,6 +135,23 @@ class Certify(TestCase):
                 self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 
+    def test_min_contribution(self):
+        """Rays below it end the same paths in the reference. Above all weights only camera rays are left."""
+        write("scene.yaml", FILTERS)
+        images = []
+        for options in "", "--min-contribution 0", "--bounces 0", "--min-contribution 0.95", "--min-contribution 0.4":
+            self.glint(f"render scene.yaml {SMALL.split(' --pixels')[0]} --quiet {options} -o a.npy")
+            images.append(npy_read("a.npy")[2])
+        self.assertEqual(images[0], images[1])
+        self.assertEqual(images[2], images[3])
+        self.assertNotIn(images[4], (images[0], images[2]))
+        options = "--min-contribution 0.4 --bounces 9 --precision single,strict" + ",double,certified" * HAS_DOUBLE
+        for name, row in self.certify("scene.yaml", options).items():
+            wrong = row["wrong_decided"] if name == "certified" else row["wrong"]["path"] + row["wrong"]["color"]
+            self.assertEqual(wrong, 0, name)
+        for wrong in "2", "-1", "some", "nan":
+            self.refuses(f"render scene.yaml --min-contribution={wrong}", "expected a number from 0 to 1")
+
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_parallel_mirrors(self):
         """Bounds grow by addition from one flat mirror to the next, so that 64 bounces are decided."""

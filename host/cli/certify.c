@@ -17,13 +17,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES };
+enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES, OPTION_MIN_CONTRIBUTION };
 enum { PIXELS_DEFAULT = 2000, PIXELS_MOST = 1 << 24 };
 
 static const struct option long_options[] = {
     {"size", required_argument, NULL, OPTION_SIZE},
     {"pixels", required_argument, NULL, OPTION_PIXELS},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
     FORMAT_LONG_OPTIONS,
     COMMON_LONG_OPTIONS,
     SET_LONG_OPTION,
@@ -42,7 +43,7 @@ static const char help_text[] =
     "      --size WxH        image size (default: as glint render)\n"
     "      --pixels N        compare about N pixels (default: 2000)\n"
     "      --precision LIST  of single, strict, double, certified (default: all that fit)\n" //
-    HELP_BOUNCES HELP_SET HELP_DEVICE HELP_REFERENCE HELP_LANES                              //
+    HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_SET HELP_DEVICE HELP_REFERENCE HELP_LANES        //
     "      --bvh B           auto, on or off; does not change the image (default: auto)\n"   //
     HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_FORMAT HELP_HELP;
 
@@ -72,6 +73,7 @@ typedef struct {
     const char *scene;
     uint32_t width, height; // 0 if not given
     uint32_t pixels, bounce_count;
+    double min_contribution;
     unsigned precisions; // a set, empty if not given
     ReportOptions report;
 } CertifyOptions;
@@ -87,6 +89,8 @@ static bool option_take(CertifyOptions *options, int option, const char *value)
         return option_count("pixels", value, 1, PIXELS_MOST, &options->pixels);
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
+    case OPTION_MIN_CONTRIBUTION:
+        return option_fraction("min-contribution", value, &options->min_contribution);
     case OPTION_PRECISION:
         return option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
     default:
@@ -205,6 +209,12 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_end(json);
 }
 
+static ReferencePath path_of(const CertifyOptions *options)
+{
+    return (ReferencePath){.bounce_count = options->bounce_count,
+                           .min_contribution = options->min_contribution};
+}
+
 static Json *certify_json(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
@@ -219,6 +229,7 @@ static Json *certify_json(const Certification *certification)
     json_text(json, "scene", certification->options->scene);
     size_json(json, sample->width, sample->height);
     json_int64(json, "bounces", certification->options->bounce_count);
+    json_number(json, "min_contribution", certification->options->min_contribution);
     json_int64(json, "pixels", (int64_t)sample->count);
     json_int64(json, "reference_bits", QUAD_BITS);
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
@@ -264,7 +275,7 @@ static int precision_compare(Certification *certification, RenderSettings settin
         if (precision == PRECISION_CERTIFIED)
             certification->rows[precision].doubts =
                 certify_doubts(certification->scene, &film, certification->options->pixels / 10 + 1,
-                               settings.bounce_count, progress_interrupted);
+                               path_of(certification->options), progress_interrupted);
         film_free(&film);
     }
     renderer_close(renderer);
@@ -315,12 +326,13 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     uint32_t width = options->width, height = options->height;
     scene_choose_image_size(scene, &width, &height);
     const double start = clock_seconds();
-    if (!certify_sample_open(&certification.sample, scene, width, height, options->pixels,
-                             options->bounce_count, progress_interrupted))
+    if (!certify_sample_open(&certification.sample, scene, width, height, options->pixels, path_of(options),
+                             progress_interrupted))
         return EXIT_INTERRUPTED;
     certification.reference_seconds = clock_seconds() - start;
     RenderSettings settings = settings_whole(&options->common, width, height);
     settings.bounce_count = options->bounce_count;
+    settings.min_contribution = options->min_contribution;
     settings.shift_to_eye = true;
     settings.stop = progress_stops;
     int status = EXIT_DONE;

@@ -49,6 +49,7 @@ void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Re
                  settings->region_height);
     text_appendf(key, "samples: %u\n", settings->sample_count);
     text_appendf(key, "bounces: %u\n", settings->bounce_count);
+    text_appendf(key, "least contribution: %.17g\n", settings->min_contribution);
     text_appendf(key, "AOVs:");
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (aovs >> layer & 1) text_appendf(key, " %s", layer_names[layer]);

@@ -194,6 +194,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     NOTE_EACH("Lanes", "%u", report->lanes);
     NOTE("Samples", "%u", settings->sample_count);
     NOTE("Bounces", "%u", settings->bounce_count);
+    if (settings->min_contribution > 0) NOTE("MinContribution", "%.17g", settings->min_contribution);
     NOTE("Size", "%ux%u", settings->width, settings->height);
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);

@@ -63,6 +63,15 @@ bool option_size(const char *option, const char *value, uint32_t *width, uint32_
     return sides_read(option, "1280x720", value, width, height);
 }
 
+bool option_fraction(const char *option, const char *value, double *fraction)
+{
+    char *end;
+    *fraction = strtod(value, &end);
+    if (end != value && *end == '\0' && *fraction >= 0 && *fraction <= 1) return true;
+    fprintf(stderr, "glint: --%s: expected a number from 0 to 1, not \"%s\"\n", option, value);
+    return false;
+}
+
 bool option_error_budget(const char *option, const char *value, ErrorBudget *budget)
 {
     char *end;

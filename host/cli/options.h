@@ -91,6 +91,10 @@ enum {
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)\n"
 #define HELP_BOUNCES                                                                                         \
     "      --bounces N       reflections and refractions of a ray: at most N, up to 255 (default: 5)\n"
+#define HELP_MIN_CONTRIBUTION                                                                                \
+    "      --min-contribution W\n"                                                                           \
+    "                        trace no reflected or refracted ray whose weight in its pixel is below W,\n"    \
+    "                        from 0 to 1 (default: 0, trace all)\n"
 #define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
 #define HELP_LENIENT  "      --lenient         skip unknown elements of .rt files with a warning\n"
 #define HELP_SET                                                                                             \
@@ -133,6 +137,8 @@ enum { OPTIONS_READ = -1 };
 // The functions below read one value. On a mistake they print what `option` expects and return false.
 bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
                   uint32_t *result);
+// Reads a number from 0 to 1.
+bool option_fraction(const char *option, const char *value, double *fraction);
 bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // reads WxH
 bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
                    unsigned *result);

@@ -21,6 +21,7 @@ enum {
     OPTION_TONE,
     OPTION_DITHER,
     OPTION_BOUNCES,
+    OPTION_MIN_CONTRIBUTION,
     OPTION_CHECKPOINT,
     OPTION_FRAMES,
     OPTION_SKIP_EXISTING,
@@ -41,6 +42,7 @@ static const struct option long_options[] = {
     {"tone", required_argument, NULL, OPTION_TONE},
     {"dither", no_argument, NULL, OPTION_DITHER},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"frames", required_argument, NULL, OPTION_FRAMES},
     {"skip-existing", no_argument, NULL, OPTION_SKIP_EXISTING},
@@ -86,7 +88,8 @@ static const char help_text[] =
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
                     "      --quiet           no progress\n" //
-    HELP_BOUNCES HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
+    HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER
+        HELP_PERTURB HELP_HELP;
 
 static bool region_read(const char *value, uint32_t region[4])
 {
@@ -214,6 +217,8 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         return true;
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
+    case OPTION_MIN_CONTRIBUTION:
+        return option_fraction("min-contribution", value, &options->min_contribution);
     case OPTION_CHECKPOINT:
         options->checkpoint = value;
         return true;
@@ -313,6 +318,7 @@ bool render_settings_make(RenderSettings *settings, RenderOptions *options, cons
     settings->region_height = region[3];
     settings->sample_count = options->sample_count;
     settings->bounce_count = options->bounce_count;
+    settings->min_contribution = options->min_contribution;
     settings->shift_to_eye = true;
     settings->stop = progress_stops;
     settings->hashes_scene = options->checkpoint != NULL;

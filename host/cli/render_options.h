@@ -14,6 +14,7 @@ typedef struct {
     ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
     uint32_t width, height;    // 0 if not given
     uint32_t sample_count, bounce_count;
+    double min_contribution;
     uint32_t region[4];                // x, y, width, height
     uint32_t first_frame, frame_count; // of an animation; a count of 0 if not given
     bool has_region, has_transfer, quiet, skips_existing;

@@ -10,7 +10,13 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { OPTION_SIZE = OPTION_OWN, OPTION_SAMPLES, OPTION_BOUNCES, OPTION_WRITE_CAMERA };
+enum {
+    OPTION_SIZE = OPTION_OWN,
+    OPTION_SAMPLES,
+    OPTION_BOUNCES,
+    OPTION_MIN_CONTRIBUTION,
+    OPTION_WRITE_CAMERA
+};
 
 enum { SAMPLES_DEFAULT = 16 };
 
@@ -18,6 +24,7 @@ static const struct option long_options[] = {
     {"size", required_argument, NULL, OPTION_SIZE},
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
     {"write-camera", no_argument, NULL, OPTION_WRITE_CAMERA},
     COMMON_LONG_OPTIONS,
     SET_LONG_OPTION,
@@ -28,8 +35,9 @@ static const struct option long_options[] = {
 static const char help_text[] =
     "usage: glint view SCENE [OPTIONS]\n\n"
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
-    "      --samples N       per pixel, once the camera rests (default: 16)\n"                      //
-    HELP_BOUNCES "      --write-camera    C writes the camera into the scene file, which is YAML\n" //
+    "      --samples N       per pixel, once the camera rests (default: 16)\n" //
+    HELP_BOUNCES HELP_MIN_CONTRIBUTION
+    "      --write-camera    C writes the camera into the scene file, which is YAML\n" //
     HELP_SET HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
 
 typedef struct {
@@ -37,6 +45,7 @@ typedef struct {
     const char *scene;
     uint32_t width, height; // 0 if not given
     uint32_t sample_count, bounce_count;
+    double min_contribution;
     bool writes_camera;
 } ViewOptions;
 
@@ -51,6 +60,8 @@ static bool option_take(ViewOptions *options, int option, const char *value)
         return option_count("samples", value, 1, SAMPLES_MAX, &options->sample_count);
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
+    case OPTION_MIN_CONTRIBUTION:
+        return option_fraction("min-contribution", value, &options->min_contribution);
     case OPTION_WRITE_CAMERA:
         return options->writes_camera = true;
     default:
@@ -119,6 +130,7 @@ static int scene_view(ViewOptions *options, const Device *device)
     };
     window.frames.settings.sample_count = options->sample_count;
     window.frames.settings.bounce_count = options->bounce_count;
+    window.frames.settings.min_contribution = options->min_contribution;
     window.frames.settings.shift_to_eye = true;
     window.frames.settings.moves = true;
     Progress progress;

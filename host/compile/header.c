@@ -58,7 +58,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .contact_low = scalar4_within_floats(compiled->contact.min),
         .contact_high = scalar4_within_floats(compiled->contact.max),
         .sample = {sample_width, first_rival(compiled, settings),
-                   scene->camera.orthographic ? sample_width : 0, 0},
+                   scene->camera.orthographic ? sample_width : 0, settings->min_contribution},
         .image = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,

@@ -28,9 +28,10 @@ typedef enum {
 } InstanceChoice;
 
 typedef struct {
-    uint32_t width, height; // of the whole image
-    uint32_t sample_count;  // per pixel, >= 1
-    uint32_t bounce_count;  // of a ray, at most
+    uint32_t width, height;  // of the whole image
+    uint32_t sample_count;   // per pixel, >= 1
+    uint32_t bounce_count;   // of a ray, at most
+    double min_contribution; // the least weight of a secondary ray
     Precision precision;
     bool certifies; // at `certified`, and at `double` what that repeats: culls are wider
     uint32_t lanes; // of the kernel: 1, 4, 8, 16

@@ -192,6 +192,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, SceneVar
         .height = settings->height,
         .sample_count = settings->sample_count,
         .bounce_count = settings->bounce_count,
+        .min_contribution = settings->min_contribution,
         .precision = settings->precision,
         .certifies = settings->precision == PRECISION_CERTIFIED || variant.pass == PASS_IN_DOUBT,
         .lanes = variant.lanes,

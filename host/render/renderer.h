@@ -20,6 +20,9 @@ typedef struct {
     uint32_t cell;
     uint32_t sample_count; // per pixel, at least 1
     uint32_t bounce_count; // the limit per camera ray, 0..BOUNCES_MAX
+    // Reflected and refracted rays whose weight in a pixel is below this in all channels are not traced; 0
+    // traces all.
+    double min_contribution;
     Precision precision;
     uint32_t lanes; // rays per work-item: 1, 4, 8 or 16, or 0 for device_lanes
     BvhChoice bvh;

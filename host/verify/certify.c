@@ -43,7 +43,7 @@ static void pixels_compute(void *context, size_t begin, size_t end)
 }
 
 bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
-                         size_t count, unsigned bounce_count, bool (*stop)(void))
+                         size_t count, ReferencePath path, bool (*stop)(void))
 {
     const double side = sqrt((double)width * height / (double)count);
     const uint32_t columns = (uint32_t)fmin(width, fmax(1, round(width / side)));
@@ -58,7 +58,7 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
     for (size_t i = 0; i < sample->count; i++)
         place_choose(sample, columns, rows, i, sample->places[i]);
     ReferenceScene reference = reference_scene_open(scene);
-    Computation computation = {sample, &reference, {.bounce_count = bounce_count}, stop};
+    Computation computation = {sample, &reference, path, stop};
     parallel_run(sample->count, 1, pixels_compute, &computation);
     reference_scene_close(&reference);
     const bool stopped = stop && stop();
@@ -156,7 +156,7 @@ typedef struct {
     const ReferenceScene *scene;
     const Film *film;
     const size_t *pixels;
-    unsigned bounce_count;
+    ReferencePath path;
     bool (*stop)(void);
     Doubt *doubts;
 } Examination;
@@ -181,7 +181,7 @@ static void doubts_examine(void *context, size_t begin, size_t end)
         const ReferenceRay ray =
             reference_camera_ray(&scene->camera, film->width, film->height, (unsigned)(pixel % film->width),
                                  (unsigned)(pixel / film->width));
-        ReferencePath path = {.bounce_count = examination->bounce_count};
+        ReferencePath path = examination->path;
         const ReferencePixel exact = reference_pixel(examination->scene, &ray, &path, shadows);
         examination->doubts[i] = exact.margin < 0x1p-49 ? CLOSE : LOOSE;
         path.blur = 0x1p-50;
@@ -195,7 +195,7 @@ static void doubts_examine(void *context, size_t begin, size_t end)
     free(shadows);
 }
 
-CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, unsigned bounce_count,
+CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, ReferencePath path,
                              bool (*stop)(void))
 {
     CertifyDoubts found = {0};
@@ -207,7 +207,7 @@ CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, 
         if (film->doubt[i] == DOUBT_UNDECIDED && seen++ % step == 0) pixels[chosen++] = i;
     Doubt *doubts = memory_allocate(chosen + 1, sizeof *doubts);
     ReferenceScene reference = reference_scene_open(scene);
-    Examination examination = {&reference, film, pixels, bounce_count, stop, doubts};
+    Examination examination = {&reference, film, pixels, path, stop, doubts};
     parallel_run(chosen, 1, doubts_examine, &examination);
     reference_scene_close(&reference);
     found.examined = stop && stop() ? 0 : chosen;

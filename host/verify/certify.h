@@ -17,7 +17,7 @@ typedef struct {
 // One pixel of each of about `count` equal parts of the image, at a place that a hash chooses; all of it if
 // it has no more. Computes on all processors. False if `stop` returned true; there is nothing to close then.
 bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
-                         size_t count, unsigned bounce_count, bool (*stop)(void));
+                         size_t count, ReferencePath path, bool (*stop)(void));
 void certify_sample_close(CertifySample *sample);
 
 // What `certified` claims of a pixel that AOV_DOUBT does not list as undecided: the object, which lights
@@ -60,5 +60,5 @@ typedef struct {
 
 // Examines at most about `most`, evenly over the image, on all processors. Nothing is examined if `stop`
 // returned true.
-CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, unsigned bounce_count,
+CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, ReferencePath path,
                              bool (*stop)(void));

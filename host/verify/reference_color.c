@@ -253,6 +253,7 @@ static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray
 // What the rays of a tree have in common.
 typedef struct {
     const ReferenceScene *world;
+    double min_contribution;
     double blur;
     Random random;
     Color sum;
@@ -314,6 +315,16 @@ static Color weight_left(Color weight, Color density, double length)
     const Color left = {channel_left(density.x, length), channel_left(density.y, length),
                         channel_left(density.z, length)};
     return vector_multiply(weight, left);
+}
+
+// Returns whether a ray of this weight counts.
+static bool contributes(Tree *tree, Color weight)
+{
+    const double largest = vector_largest(weight), least = tree->min_contribution;
+    if (largest <= 0 || least <= 0) return largest > 0;
+    // weights are computed in double
+    if (fabs(largest - least) <= 0x1p-40 * least) tree->margin = 0;
+    return largest >= least;
 }
 
 static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color weight, Medium medium,
@@ -386,22 +397,21 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
                             conductor_reflectance(cosine, n.z, k.z)};
         reflected_weight = vector_multiply(reflected_weight, part);
     }
+    reflected_weight = vector_multiply(weight, reflected_weight);
+    const Color refracted_weight =
+        vector_scale(vector_multiply(weight, tint_factors(material->transmission_tint)), transmission);
+    const bool reflects = reflection > 0 && contributes(tree, reflected_weight),
+               refracts = transmission > 0 && contributes(tree, refracted_weight);
     signature_add(tree, hit.object,
-                  (reflection > 0 ? PATH_REFLECTED : 0u) | (transmission > 0 ? PATH_REFRACTED : 0u) |
-                      (is_total ? PATH_TOTAL_REFLECTION : 0u));
+                  (reflects ? PATH_REFLECTED : 0u) | (refracts ? PATH_REFRACTED : 0u) |
+                      (reflects && is_total ? PATH_TOTAL_REFLECTION : 0u));
     reflected.direction = reflect(direction, surface.normal);
-    if (reflection > 0 && is_smooth && !is_on_side(reflected.direction, surface.geometric, 1, &tree->margin))
+    if (reflects && is_smooth && !is_on_side(reflected.direction, surface.geometric, 1, &tree->margin))
         reflected.direction = reflect(direction, surface.geometric);
     const Medium behind =
         surface.entering ? (Medium){material->absorption, medium.density} : (Medium){.density = medium.outer};
-    if (reflection > 0)
-        add_path(tree, &reflected, hit.object, vector_multiply(weight, reflected_weight), medium,
-                 bounces_left - 1);
-    if (transmission > 0)
-        add_path(
-            tree, &refracted, hit.object,
-            vector_scale(vector_multiply(weight, tint_factors(material->transmission_tint)), transmission),
-            behind, bounces_left - 1);
+    if (reflects) add_path(tree, &reflected, hit.object, reflected_weight, medium, bounces_left - 1);
+    if (refracts) add_path(tree, &refracted, hit.object, refracted_weight, behind, bounces_left - 1);
 }
 
 bool reference_is_undecided(const ReferencePixel *pixel)
@@ -413,6 +423,7 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
                                const ReferencePath *path, bool *shadows)
 {
     Tree tree = {.world = scene,
+                 .min_contribution = path->min_contribution,
                  .blur = path->blur,
                  .random = {path->seed},
                  .object = UINT32_MAX,

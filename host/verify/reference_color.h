@@ -26,6 +26,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
 // come to along the path.
 typedef struct {
     unsigned bounce_count;
+    double min_contribution; // rays whose weight is below it in all channels do not count
     double blur;
     uint64_t seed;
 } ReferencePath;

@@ -10,6 +10,7 @@ typedef struct {
     const char *scene_path;
     ImageSize size;
     uint32_t bounce_count;
+    double min_contribution;
 } PixelView;
 
 // Traces the ray through the center of a pixel and its tree of reflected and refracted rays. A line per ray:

@@ -343,6 +343,20 @@ static inline real weight_largest(Color3 weight)
     return HAS_TINTS ? real_max(real_max(weight.x, weight.y), weight.z) : weight.x;
 }
 
+// The relative rounding error of a weight, each of up to 255 bounces having 4 roundings.
+#define WEIGHT_ROUNDING ((real)(1024 * UNIT_ROUNDOFF))
+
+// Returns the weight, or none if all its channels are below `least`, and so is their part of the pixel. At
+// `certified` adds the lanes where rounding may decide.
+static inline Color3 weight_cut(Color3 weight, real least, mask *doubt)
+{
+    const Color3 none = {(real)(0), (real)(0), (real)(0)};
+    real largest = weight_largest(weight);
+    if (IS_CERTIFIED)
+        *doubt = *doubt | ((largest > (real)(0)) & (fabs(largest - least) <= WEIGHT_ROUNDING * least));
+    return vector_select(largest < least, none, weight);
+}
+
 // Computes the reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of
 // total internal reflection, whose reflected ray carries the transmission in addition, as it carries a part
 // of it by Fresnel's equations, in both cases without its tint. Unless `all`, a ray that no lane carries is

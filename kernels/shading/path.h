@@ -175,6 +175,11 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         if (lanes_any(found) && depth < scene->header->bounces.x) {
             total = surface_bounce(&shaded->surface, vector_renormalize(rays[0].direction), weight, false,
                                    &reflected, &refracted);
+            if (scene->header->sample.w > 0) {
+                const real least = (real)(scene->header->sample.w);
+                reflected.weight = weight_cut(reflected.weight, least, doubt);
+                refracted.weight = weight_cut(refracted.weight, least, doubt);
+            }
             if (IS_CERTIFIED)
                 bounces_set_errors(&shaded->surface, rays, total, &reflected, &refracted, doubt);
             if (HAS_ABSORPTION) {
