@@ -139,6 +139,22 @@ static void test_tints(void **state)
     scene_free(&scene);
 }
 
+static void test_energy(void **state)
+{
+    (void)state;
+    assert_messages("a.yaml",
+                    "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
+                    "materials:\n"
+                    "  a: {reflection: 0.1, transmission: 0.9}\n"
+                    "  b: {transmission: 0.9, reflection: [0.2, 0, 0]}\n"
+                    "  c: {transmission: 1, reflection: 0.04, fresnel: true}\n",
+                    "4:38: warning: reflection 0.2 and transmission 0.9 exceed 1 together: the surface adds "
+                    "light\n"
+                    "5:36: warning: reflection 0.04 and transmission 1 exceed 1 together: the surface adds "
+                    "light; by 'fresnel' it reflects a part of its transmission\n"
+                    "warning: a.yaml: no objects\nwarning: a.yaml: no lights\n");
+}
+
 static void test_round_shapes(void **state)
 {
     (void)state;
@@ -492,6 +508,7 @@ int main(void)
         cmocka_unit_test(test_lights),
         cmocka_unit_test(test_materials),
         cmocka_unit_test(test_tints),
+        cmocka_unit_test(test_energy),
         cmocka_unit_test(test_round_shapes),
         cmocka_unit_test(test_cylinders),
         cmocka_unit_test(test_cones),

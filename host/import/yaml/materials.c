@@ -199,6 +199,20 @@ static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *
     return true;
 }
 
+// Warns of a surface that sends on more light than arrives, which each bounce multiplies. Diffuse light is
+// not counted, since what reflects by the angle, as plastic does, leaves most of it. Sums of decimals round.
+static void energy_check(YamlReader *reader, const Material *material, const YamlNode *node)
+{
+    const double reflection = material->reflection, transmission = material->transmission;
+    const bool is_fraction_of_transmission = material->fresnel && transmission > 0;
+    if (reflection + transmission <= 1 + 1e-9) return;
+    report_warning(&reader->report, field_node(reader, node, "reflection")->offset,
+                   "reflection %g and transmission %g exceed 1 together: the surface adds light%s",
+                   reflection, transmission,
+                   is_fraction_of_transmission ? "; by 'fresnel' it reflects a part of its transmission"
+                                               : "");
+}
+
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
@@ -226,10 +240,13 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         material.ambient = 0;
         material.diffuse = vector_all(0);
     }
-    if (node) fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
+    const bool is_read =
+        node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
     if (conductor != node && (material.fresnel || material.transmission > 0))
         report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
                      material.fresnel ? "fresnel" : "transmission");
+    else if (is_read)
+        energy_check(reader, &material, node);
     scene_add_material(reader->scene, &material, name);
 }
 
