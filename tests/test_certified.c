@@ -600,7 +600,7 @@ static void thin_walls_are_decided(void **state)
                    ((Object){.kind = SHAPE_SPHERE, .material = 1, .as.sphere = {center, 1 - wall}}));
         CertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
-                                        6, NULL));
+                                        (ReferencePath){.bounce_count = 6}, NULL));
         const Precision last = tests_are_long() ? PRECISION_STRICT : PRECISION_SINGLE;
         for (Precision precision = PRECISION_SINGLE; precision <= last; precision++) {
             RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, precision);
