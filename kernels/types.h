@@ -241,11 +241,11 @@ typedef struct {
     uint4 place;    // x: its BVH's root, y: the ObjectEntry of its first triangle
 } SharedMesh;
 
-// The ids of an instance. There is one for each instance, in the order of ids; the ids between them are those
-// of other objects, which have an ObjectEntry each, as has every instance.
+// The ids of an instance. There is one for each instance, in the order of ids. The ids between them are those
+// of other objects, which have an ObjectEntry each, as has every instance; behind an instance an id exceeds
+// the index of its entry by ids.z.
 typedef struct {
-    uint4
-        ids; // x: the first, y: the one behind the last, z: what an id behind is above its entry, w: instance
+    uint4 ids; // x: the first, y: the one behind the last, w: the instance
 } InstanceIds;
 
 // The shape and the material that an object's id refers to. Ids are indices unless there are instances.
