@@ -25,7 +25,7 @@ typedef struct {
 // a double times the condition, which floats do not resolve.
 static InstanceMap instance_map(const Affine *transform, double scale, bool is_exact)
 {
-    InstanceMap map;
+    InstanceMap map = {0};
     Vector3 rows[3];
     for (int i = 0; i < 3; i++) {
         const double *row = transform->rows[i];

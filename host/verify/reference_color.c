@@ -2,6 +2,7 @@
 
 #include "host/compile/camera_basis.h"
 #include "host/compile/random_shape.h"
+#include <float.h>
 #include <math.h>
 
 // How far a point of a surface may be off it, in parts of the numbers that it was computed from: far over the
@@ -307,14 +308,25 @@ typedef struct {
 
 static double channel_left(double density, double length)
 {
-    return density > 0 ? exp(-density * length) : 1;
+    return density > 0 ? fmax(exp(-density * length), DBL_MIN) : 1;
+}
+
+static double part_of_weight(double weight, double part)
+{
+    return weight > 0 && part > 0 ? fmax(weight * part, DBL_MIN) : 0;
+}
+
+// Returns the product of two weights, whose channels no underflow makes 0: paths do not end by it.
+static Color weights_multiply(Color a, Color b)
+{
+    return (Color){part_of_weight(a.x, b.x), part_of_weight(a.y, b.y), part_of_weight(a.z, b.z)};
 }
 
 static Color weight_left(Color weight, Color density, double length)
 {
     const Color left = {channel_left(density.x, length), channel_left(density.y, length),
                         channel_left(density.z, length)};
-    return vector_multiply(weight, left);
+    return weights_multiply(weight, left);
 }
 
 // Returns whether a ray of this weight counts.
@@ -397,9 +409,9 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
                             conductor_reflectance(cosine, n.z, k.z)};
         reflected_weight = vector_multiply(reflected_weight, part);
     }
-    reflected_weight = vector_multiply(weight, reflected_weight);
+    reflected_weight = weights_multiply(weight, reflected_weight);
     const Color refracted_weight =
-        vector_scale(vector_multiply(weight, tint_factors(material->transmission_tint)), transmission);
+        weights_multiply(weight, vector_scale(tint_factors(material->transmission_tint), transmission));
     const bool reflects = reflection > 0 && contributes(tree, reflected_weight),
                refracts = transmission > 0 && contributes(tree, refracted_weight);
     signature_add(tree, hit.object,

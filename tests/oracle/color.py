@@ -311,7 +311,7 @@ def passing(scene, hit, way, end, turn, rounding):
             is_open = True
         else:
             parts = [part * passed for part, passed in zip(parts, thing.material.filter)]
-            if not any(parts):
+            if all(part == 0 for part in parts):
                 return parts
     return None if is_open else parts
 
@@ -366,7 +366,7 @@ def lit(scene, light, hit, base, rounding, total):
     parts = passing(scene, hit, way, inf if infinite else 1.0, turn, rounding)
     if parts is None:
         return None
-    if not any(parts):
+    if all(part == 0 for part in parts):
         return True
     shine, shine_error = highlight(hit, to_light, facing, facing_error, turn, rounding)
     color, errors = [], []
