@@ -182,15 +182,15 @@ class Certify(TestCase):
         for arguments, pattern in ((f"{ROOT}/scenes/demo.yaml --pixels 0", "--pixels"), ("", "no scene"), ("none.yaml", "none.yaml")):
             self.refuses(f"certify {arguments}", pattern)
         # a definition of 17,424 instances of bunny.obj's 3,872 triangles
-        write("crowd.yaml", f"""\
+        write("large.yaml", f"""\
 camera: {{position: [0, 0, -5], look_at: [0, 0, 0]}}
 define:
   bunny: {{objects: [{{mesh: {{file: {ROOT}/scenes/meshes/bunny.obj}}}}]}}
   row: {{objects: [{", ".join(["{instance: {of: bunny}}"] * 132)}]}}
 objects: [{", ".join(["{instance: {of: row}}"] * 132)}]
 """)
-        self.refuses("certify crowd.yaml", "no room for more than 67,108,864 objects and triangles")
-        self.refuses("render crowd.yaml --precision certified --size 8x8 -o x.png", "precision certified copies all")
+        self.refuses("certify large.yaml", "no room for more than 67,108,864 objects and triangles")
+        self.refuses("render large.yaml --precision certified --size 8x8 -o x.png", "precision certified copies all")
 
 
 if __name__ == "__main__":

@@ -257,7 +257,7 @@ static void lanes_agree(void **state)
 }
 
 // Many instances, some of which overlap.
-static Scene crowd_make(size_t count)
+static Scene many_make(size_t count)
 {
     Text text = {0};
     Random random = {7};
@@ -275,10 +275,10 @@ static Scene crowd_make(size_t count)
     return scene;
 }
 
-static void a_crowd_looks_as_copies(void **state)
+static void many_instances_look_as_copies(void **state)
 {
     (void)state;
-    Scene scene = crowd_make(80);
+    Scene scene = many_make(80);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_DOUBLE; precision++) {
         if (!is_tested(precision)) continue;
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
@@ -286,7 +286,7 @@ static void a_crowd_looks_as_copies(void **state)
         Film copied = render(&scene, &settings, INSTANCES_COPIED);
         Film expected = render(&scene, &settings, INSTANCES_SHARED);
         const Difference d = difference_of(&expected, &copied);
-        difference_check(&d, precision, (Vector3){0, 0, 0}, "a crowd");
+        difference_check(&d, precision, (Vector3){0, 0, 0}, "many");
         film_free(&copied);
         for (const uint32_t *lanes = tested_lanes(probe_compute.device); *++lanes;) {
             settings.lanes = *lanes;
@@ -307,7 +307,7 @@ static void a_crowd_looks_as_copies(void **state)
 static void the_feature_alone_and_all_together_agree(void **state)
 {
     (void)state;
-    Scene scene = crowd_make(30);
+    Scene scene = many_make(30);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     settings.instances = INSTANCES_SHARED;
     settings.extra_features = 0;
@@ -324,7 +324,7 @@ static void a_moved_camera_sees_what_a_new_one_sees(void **state)
 {
     (void)state;
     for (int few = 0; few < 2; few++) {
-        Scene scene = crowd_make(few ? 3 : 30);
+        Scene scene = many_make(few ? 3 : 30);
         RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
         settings.instances = INSTANCES_SHARED;
         settings.moves = true;
@@ -376,7 +376,7 @@ static void meshes_are_shared_where_copies_are_large(void **state)
 {
     (void)state;
     enum { MOST = (1 << 18) / TRIANGLES };
-    Scene scenes[2] = {crowd_make(MOST), crowd_make(MOST + 1)};
+    Scene scenes[2] = {many_make(MOST), many_make(MOST + 1)};
     CompileSettings settings = plain_settings;
     assert_int_equal(instance_count(&scenes[0], &settings), 0);
     assert_int_equal(instance_count(&scenes[1], &settings), MOST + 1);
@@ -495,7 +495,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(shared_meshes_look_as_copies),
         cmocka_unit_test(lanes_agree),
-        cmocka_unit_test(a_crowd_looks_as_copies),
+        cmocka_unit_test(many_instances_look_as_copies),
         cmocka_unit_test(the_feature_alone_and_all_together_agree),
         cmocka_unit_test(a_moved_camera_sees_what_a_new_one_sees),
         cmocka_unit_test(meshes_are_shared_where_copies_are_large),
