@@ -1,6 +1,6 @@
 // Points of areas, such as those of lights: for each of a pixel's samples a point of a low-discrepancy
-// sequence, which is scrambled by the pixel, the area and the path. They are computed in integers, so that
-// every device and precision has the same points.
+// sequence, which is scrambled by the pixel, the area and the path. Those of the square are computed in
+// integers, so that every device and precision has the same ones.
 #ifndef SAMPLING_H
 #define SAMPLING_H
 

@@ -47,7 +47,7 @@ static InstanceMap instance_map(const Affine *transform, double scale, bool is_e
     return map;
 }
 
-// The largest sum of a row of |map| |inverse|; NAN or infinite if there is no inverse.
+// The largest sum of a row of |map| |inverse|; NAN or infinite if the map has no inverse.
 static double map_condition(const InstanceMap *map)
 {
     double condition = 0;

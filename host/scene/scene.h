@@ -207,8 +207,8 @@ typedef struct {
     struct {
         Vector3 up;
         Color zenith, nadir;
-        // As in a Material: an image of all directions in place of these colors, times `intensity`. Its
-        // center lies along `forward`, across `up`.
+        // An image of all directions replaces these colors; the number is that of a Material's texture. Its
+        // colors are multiplied by `intensity`, and its center lies along `forward`, across `up`.
         uint32_t texture;
         Vector3 forward;
         double intensity;

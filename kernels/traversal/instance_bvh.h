@@ -7,7 +7,7 @@
 #include "traversal/single.h"
 
 #if LANES == 1
-// As traverse_bvh, from a mesh's root.
+// Traverses the BVH of a mesh, as traverse_bvh does that of the scene.
 static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const Ray *ray,
                                  const BoxRays *box_ray, uint lanes, uint root)
 {
@@ -30,7 +30,7 @@ static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const
     }
 }
 #else
-// As traverse_group, from a mesh's root.
+// Traverses it with a group, as traverse_group does that of the scene.
 static inline void mesh_traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray,
                                        RayGroup *group, uint root)
 {
@@ -44,7 +44,7 @@ static inline void mesh_traverse_group(Traversal *traversal, const Scene *scene,
     }
 }
 
-// As traverse_bvh, from a mesh's root.
+// Traverses the BVH of a mesh, as traverse_bvh does that of the scene.
 static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const Ray *ray,
                                  const BoxRays *box_rays, uint lanes, uint root)
 {
