@@ -98,10 +98,16 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
     const unsigned filled =
         AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & (AOVS_OF_PATH | AOV_DOUBT));
     size_t end = (size_t)padded_size(2 * film_layer_size(film, LAYER_COLOR)); // with its compensation
-    if (buffers) buffers->layers = filled;
+    if (buffers) {
+        buffers->layers = filled;
+        buffers->layer_sizes[LAYER_COLOR] = film_layer_size(film, LAYER_COLOR);
+    }
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (layer == LAYER_COLOR || !layer_in(filled, layer)) continue;
-        if (buffers) buffers->layer_begins[layer] = end;
+        if (buffers) {
+            buffers->layer_begins[layer] = end;
+            buffers->layer_sizes[layer] = film_layer_size(film, layer);
+        }
         if (layer != LAYER_SHADOW || aovs & AOV_SHADOW)
             end += (size_t)padded_size(film_layer_size(film, layer));
     }
@@ -130,6 +136,12 @@ void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
     buffer_spare(renderer, buffers->center_doubts);
     buffer_spare(renderer, buffers->pixels);
     *buffers = (BandBuffers){0};
+}
+
+void *band_map(Renderer *renderer, const BandBuffers *buffers, Layer layer, cl_map_flags access)
+{
+    return renderer_map(renderer, buffers->film, buffers->layer_begins[layer], buffers->layer_sizes[layer],
+                        access);
 }
 
 Place band_place(const Renderer *renderer, BandRows rows)

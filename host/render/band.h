@@ -8,6 +8,7 @@ typedef struct {
     cl_mem film;                      // one layer after another
     unsigned layers;                  // the set of the film's layers
     size_t layer_begins[LAYER_COUNT]; // offsets in the film, in bytes
+    size_t layer_sizes[LAYER_COUNT];  // in bytes, for all rows
     cl_mem ray_counts;
     // At `certified`, the pixels of each tile whose colors are uncertain, one bit per pixel. In a list, the
     // number of uncertain samples per pixel.
@@ -18,12 +19,16 @@ typedef struct {
 } BandBuffers;
 
 // Returns the size of the buffer for a film's color and the layers that the kernels of these AOVs fill.
-// Unless `buffers` is NULL, its `layers` and `layer_begins` are set.
+// Unless `buffers` is NULL, its `layers`, `layer_begins` and `layer_sizes` are set.
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 
 // Provides the buffers for as many pixels as the film has. band_buffers_close keeps them for later bands.
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film);
 void band_buffers_close(BandBuffers *buffers, Renderer *renderer);
+
+// Maps a layer of the film, as renderer_map does: always all of its rows, however many the band has, because
+// NVIDIA's driver takes 1 to 2 ms to map a range whose size differs from the last one's.
+void *band_map(Renderer *renderer, const BandBuffers *buffers, Layer layer, cl_map_flags access);
 
 // The size of a work-item's or a work-group's tile in pixels.
 typedef struct {

@@ -57,8 +57,7 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         size_t size = film_layer_size(&band, layer);
         if (!layer_in(layers, layer) || size == 0) continue;
-        band.layers[layer] = mapped[layer] =
-            renderer_map(renderer, buffers->film, buffers->layer_begins[layer], size, CL_MAP_READ);
+        band.layers[layer] = mapped[layer] = band_map(renderer, buffers, layer, CL_MAP_READ);
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
             band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
     }

@@ -46,16 +46,16 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
 
 // Copies a layer of the list's pixels, in double, to the band's layer, in float.
 static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_list,
-                        const BandBuffers *of_band, const PixelList *list, const Film *film, const Film *band)
+                        const BandBuffers *of_band, const PixelList *list, const Film *band)
 {
     Renderer *repeat = renderer->repeat; // perhaps on another device
     const size_t components = film_components(band, layer);
     const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
-    void *values = renderer_map(renderer, of_band->film, of_band->layer_begins[layer],
-                                film_layer_size(band, layer), CL_MAP_READ | CL_MAP_WRITE);
-    const void *repeated = renderer_map(repeat, of_list->film, of_list->layer_begins[layer],
-                                        film_layer_size(film, layer), CL_MAP_READ);
-    for (size_t i = 0; i < list->index.count && values && repeated; i++)
+    void *values = band_map(renderer, of_band, layer, CL_MAP_READ | CL_MAP_WRITE);
+    void *repeated = memory_allocate(of_list->layer_sizes[layer], 1);
+    const bool is_read = buffer_read_part(repeat->compute, of_list->film, of_list->layer_begins[layer],
+                                          of_list->layer_sizes[layer], repeated);
+    for (size_t i = 0; i < list->index.count && values && is_read; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->index.items[i] * components + k;
             if (layer_types[layer] == LAYER_TYPE_INTEGER)
@@ -64,7 +64,7 @@ static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_l
                 ((float *)values)[to] =
                     (float)(((const double *)repeated)[from] / (is_length ? renderer->compiled.unit : 1));
         }
-    renderer_unmap(repeat, of_list->film, repeated);
+    free(repeated);
     renderer_unmap(renderer, of_band->film, values);
 }
 
@@ -94,8 +94,7 @@ void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows 
     if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
     const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
     const size_t size = film_layer_size(&band, LAYER_DOUBT);
-    void *values =
-        renderer_map(renderer, buffers->film, buffers->layer_begins[LAYER_DOUBT], size, CL_MAP_WRITE);
+    void *values = band_map(renderer, buffers, LAYER_DOUBT, CL_MAP_READ | CL_MAP_WRITE);
     if (values) memset(values, 0, size);
     renderer_unmap(renderer, buffers->film, values);
 }
@@ -105,8 +104,7 @@ static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const Pix
 {
     const BandBuffers *buffers = band->buffers;
     if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
-    uint32_t *values = renderer_map(renderer, buffers->film, buffers->layer_begins[LAYER_DOUBT],
-                                    film_layer_size(&band->film, LAYER_DOUBT), CL_MAP_READ | CL_MAP_WRITE);
+    uint32_t *values = band_map(renderer, buffers, LAYER_DOUBT, CL_MAP_READ | CL_MAP_WRITE);
     for (size_t i = 0; values && i < list->index.count; i++) {
         uint32_t *value = &values[list->index.items[i]];
         if (*value < doubt) *value = doubt;
@@ -148,7 +146,7 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
     for (Layer layer = 0; layer < LAYER_COUNT && whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
             film_layer_size(&band->film, layer) > 0)
-            layer_merge(renderer, layer, &repeated, band->buffers, list, &film, &band->film);
+            layer_merge(renderer, layer, &repeated, band->buffers, list, &band->film);
     if (undecided && whole)
         buffer_read(repeat->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
                     list->index.count * sizeof *undecided, undecided);
@@ -182,11 +180,11 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
     const RepeatedBand band = {kind, layers, aovs, buffers,
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
     const size_t tile_count = film_tile_count(renderer, &band.film);
-    uint32_t *values = renderer_map(renderer, doubts, 0, tile_count * sizeof *values, CL_MAP_READ);
-    if (!values) return false;
-    PixelList list = doubts_list(renderer, rows, values, tile_count);
-    renderer_unmap(renderer, doubts, values);
-    bool is_whole = true;
+    uint32_t *flags = memory_allocate(tile_count, sizeof *flags);
+    bool is_whole = buffer_read(renderer->compute, doubts, tile_count * sizeof *flags, flags);
+    PixelList list = {0};
+    if (is_whole) list = doubts_list(renderer, rows, flags, tile_count);
+    free(flags);
     if (list.index.count > 0) {
         RepeatCounts *counts = &buffers->repeats;
         uint32_t *undecided = memory_allocate(list.index.count, sizeof *undecided);
