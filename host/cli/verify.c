@@ -18,13 +18,14 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { OPTION_LEAN = OPTION_OWN };
+enum { OPTION_LEAN = OPTION_OWN, OPTION_QUICK };
 
 static const struct option long_options[] = {
     {"device", required_argument, NULL, OPTION_DEVICE},
     {"precision", required_argument, NULL, OPTION_PRECISION},
     {"lanes", required_argument, NULL, OPTION_LANES},
     {"no-cache", no_argument, NULL, OPTION_NO_CACHE},
+    {"quick", no_argument, NULL, OPTION_QUICK},
     {"lean", no_argument, NULL, OPTION_LEAN},
     FORMAT_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
@@ -38,6 +39,7 @@ static const char help_text[] =
     "Runs the hard cases, or those named, on a device and checks each against its bound; exit status 3 if "
     "any fails.\n\n"
     "      --precision P     single, strict or double (default: all that the device has)\n"
+    "      --quick           a sixteenth of the random rays and of the largest images\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
     HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_FORMAT HELP_HELP;
@@ -71,7 +73,7 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     bool every_precision;
-    bool lean;          // builds separate kernels for each scene
+    bool quick, lean;   // as of VerifySettings
     VerifyChoice cases; // all if none is named
 } VerifyOptions;
 
@@ -240,6 +242,7 @@ static void precision_verify(Verification *verification, Compute *compute)
 {
     const VerifyOptions *options = verification->options;
     const VerifySettings settings = {.render = precision_settings(options, verification->precision),
+                                     .quick = options->quick,
                                      .lean = options->lean};
     const VerifyTier tier = verify_tier(&settings.render);
     PrecisionRecord *record = verification->record;
@@ -297,7 +300,7 @@ static void precision_add_json(Json *json, const PrecisionRecord *record, Precis
 }
 
 // Adds the program, the device and the options that the results belong to.
-static void origin_add_json(Json *json, const Device *device, const CommonOptions *common)
+static void origin_add_json(Json *json, const Device *device, const VerifyOptions *options)
 {
     json_int64(json, "schema", 3);
     json_text(json, "glint", glint_version());
@@ -305,14 +308,15 @@ static void origin_add_json(Json *json, const Device *device, const CommonOption
     json_begin_object(json, "device");
     device_json(json, device);
     json_end(json);
-    perturb_json(json, common->perturb_seed, common->perturb_scale);
+    json_bool(json, "quick", options->quick);
+    perturb_json(json, options->common.perturb_seed, options->common.perturb_scale);
 }
 
 static Json *journal_json(const Verification *verification)
 {
     const VerifyOptions *options = verification->options;
     Json *json = json_open();
-    origin_add_json(json, verification->compute->device, &options->common);
+    origin_add_json(json, verification->compute->device, options);
     json_begin_array(json, "precisions");
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         const PrecisionRecord *record = &verification->journal->precisions[precision];
@@ -411,7 +415,9 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
         if (option == OPTION_PRECISION) options->every_precision = false;
         if (option_report(&options->report, option, optarg, &valid)) {
             if (!valid) return EXIT_USER;
-        } else if (option == OPTION_LEAN)
+        } else if (option == OPTION_QUICK)
+            options->quick = true;
+        else if (option == OPTION_LEAN)
             options->lean = true;
         else if (option_common(&options->common, option, optarg, &valid) && !valid)
             return EXIT_USER;

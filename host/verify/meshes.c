@@ -17,7 +17,7 @@ void verify_far_mesh(VerifyRun *run)
     Scene scene = scene_empty();
     scene_far_sphere(&scene);
     Renderer *opened = verify_open(run, &scene, true);
-    for (uint64_t batch = 0; batch < BATCHES; batch++) {
+    for (uint64_t batch = 0; batch < verify_part(run, BATCHES); batch++) {
         for (uint64_t i = 0; i < COUNT; i++) {
             uint64_t index = batch * COUNT + i;
             Vector3 origin = vector_add(far_sphere_center, random_in_cube(65, index, 0));
@@ -246,7 +246,7 @@ void verify_bvh(VerifyRun *run)
     Renderer *tree = verify_open(run, &scene, true);
     Renderer *list = verify_open(run, &scene, false);
     const double parts[] = {INFINITY, 1 - 2 * verify_roundoff(run), 1 + 2 * verify_roundoff(run)};
-    for (uint64_t batch = 0; batch < M6_BATCHES; batch++) {
+    for (uint64_t batch = 0; batch < verify_part(run, M6_BATCHES); batch++) {
         m6_rays(run, &scene, batch * M6_RAYS, NULL, rays);
         verify_trace_opened(run, tree, rays, M6_RAYS, hits);
         m6_rays(run, &scene, batch * M6_RAYS, hits, rays);

@@ -102,8 +102,9 @@ static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene
     TraceRay *rays = memory_allocate(BATCH, sizeof *rays);
     TraceHit *hits = memory_allocate(BATCH, sizeof *hits);
     Renderer *opened = verify_open(run, scene, set->scene_make != NULL);
-    for (size_t first = 0; first < set->ray_count; first += BATCH) {
-        size_t count = set->ray_count - first < BATCH ? set->ray_count - first : BATCH;
+    const size_t ray_count = verify_part(run, set->ray_count);
+    for (size_t first = 0; first < ray_count; first += BATCH) {
+        size_t count = ray_count - first < BATCH ? ray_count - first : BATCH;
         for (size_t i = 0; i < count; i++) {
             rays[i] = set->family(first + i);
             verify_round_ray(run, &rays[i]);

@@ -56,6 +56,9 @@ static inline bool verify_is_double(const VerifyRun *run)
     return run->tier == TIER_D;
 }
 
+// Returns how many of `count` random rays or pixels the run takes: a sixteenth if it is quick.
+size_t verify_part(const VerifyRun *run, size_t count);
+
 double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1
 double verify_ulp(const VerifyRun *run, double value);
 double verify_rounded(const VerifyRun *run, double value); // to the precision at work

@@ -112,7 +112,7 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, s
 
 void verify_leaving_spheres(VerifyRun *run)
 {
-    for (unsigned group = 0; group < GROUPS; group++) {
+    for (unsigned group = 0; group < verify_part(run, GROUPS); group++) {
         TraceRay rays[SPHERES];
         TraceHit hits[SPHERES];
         Scene scene = spheres_of_all_sizes(run, group);

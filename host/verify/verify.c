@@ -77,6 +77,11 @@ bool verify_holds(const VerifyResult *result)
            0;
 }
 
+size_t verify_part(const VerifyRun *run, size_t count)
+{
+    return run->settings->quick ? (count + 15) / 16 : count;
+}
+
 double verify_roundoff(const VerifyRun *run)
 {
     return verify_is_double(run) ? 0x1p-53 : 0x1p-24;
