@@ -533,7 +533,7 @@ static void stage_check(Stage *stage, const char *expected)
 static void test_stage(void **state)
 {
     (void)state;
-    Stage *stage = stage_open();
+    Stage *stage = stage_open(true);
     stage_check(stage, "");
     stage_begin(stage, "reading", "folder/a.obj", 200);
     stage_check(stage, "reading a.obj 0%");
@@ -546,6 +546,11 @@ static void test_stage(void **state)
     stage_check(stage, "building 75%");
     stage_add(stage, 9); // more than there are
     stage_check(stage, "building 100%");
+    size_t count;
+    const StageSpan *spans = stage_spans(stage, &count);
+    assert_int_equal(count, 1);
+    assert_string_equal(spans[0].name, "reading a.obj");
+    assert_true(spans[0].start_seconds <= spans[0].end_seconds);
     stage_begin(stage, "uploading", NULL, 0);
     stage_set(stage, 1);
     stage_check(stage, "uploading");

@@ -107,7 +107,7 @@ class Frames(TestCase):
             "--frames 0-1000000": "--frames: expected A or A-B",
             "--frames 0-3 still.yaml": "--frames takes one scene",
             "--frames 0-3 --checkpoint c": "--checkpoint takes one frame; --skip-existing",
-            "--frames 0-3 --timing=json": "--timing=json takes one frame",
+            "--frames 0-3 --timing=json": "--timing=json and =trace take one frame",
         }.items():
             self.refuses(f"render moving.yaml {RENDER} {options}", message)
         self.refuses("render - --frames 0-1", "standard input only once")

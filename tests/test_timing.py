@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
 """Event times are used where they can be true. Where a runtime reports zeros or counts (rusticl, Mesa 22.3) the host's clock
-is used instead, and the report says so."""
+is used instead, and the report says so. The trace has all commands and stages on one axis."""
 import re
 import unittest
 
@@ -41,6 +41,38 @@ class Timing(TestCase):
         if any(launch["event_ms"] is None for launch in launches):
             self.assertIn("the host's", text)
             self.assertGreater(float(re.search(r"(?m)^ *launches *([0-9.]+) ms", text)[1]), 0)
+
+    def test_trace(self):
+        """Stages follow each other, commands lie within bands, and each is called, queued, submitted and run in turn."""
+        write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        write("mesh.yaml", PLANE.replace("objects: [", "objects: [{mesh: {file: mesh.obj}}, "))
+        for _ in range(2):
+            trace = self.json("render mesh.yaml --size 320x180 --quiet --timing=trace -o trace.png --aov t")
+        self.assertEqual(trace["otherData"], {"kernels_from_cache": True})
+        events, names = {}, {}
+        for event in trace["traceEvents"]:
+            self.assertEqual(event["pid"], 1)
+            if event["ph"] == "M":
+                names[event["tid"]] = event["args"]["name"]
+            else:
+                self.assertEqual(event["ph"], "X")
+                events.setdefault(names[event["tid"]], []).append(event)
+        host, bands, commands = events.values()
+        self.assertEqual(list(events)[1], f"bands of {list(events)[2]}")
+        stages = [event["name"] for event in host]
+        wanted = ["reading mesh.yaml", "reading mesh.obj", "opening the devices", "flattening the scene", "uploading the scene",
+                  "building the kernel", "writing"]
+        self.assertEqual(sorted(wanted, key=stages.index), wanted)
+        self.assertEqual(stages[-2], "rendering")
+        self.assertTrue(all(abs(a["ts"] + a["dur"] - b["ts"]) < 1 for a, b in zip(host, host[1:])))
+        self.assertTrue(all(a["ts"] + a["dur"] <= b["ts"] + 1 for a, b in zip(bands, bands[1:])))
+        self.assertEqual({event["name"] for event in commands}, {"render", "aov", "read-back"})
+        for event in commands:
+            times, end = event["args"], event["ts"] + event["dur"]
+            if times["clock"] == "event":
+                order = [times["called_us"], times["queued_us"], times["submitted_us"], event["ts"], end]
+                self.assertEqual([round(time) for time in sorted(order)], [round(time) for time in order])
+            self.assertTrue(any(band["ts"] - 1 <= event["ts"] and end <= band["ts"] + band["dur"] + 1 for band in bands), event)
 
 
 if __name__ == "__main__":

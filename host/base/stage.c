@@ -1,5 +1,6 @@
 #include "host/base/stage.h"
 
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include <pthread.h>
@@ -13,11 +14,18 @@ struct Stage {
     Text name;             // empty: no operation
     size_t total;
     double start_seconds; // of the operation
+    bool keeps_spans;
+    double stage_start_seconds;
+    struct {
+        StageSpan *items;
+        size_t count, capacity;
+    } spans;
 };
 
-Stage *stage_open(void)
+Stage *stage_open(bool keeps_spans)
 {
     Stage *stage = memory_allocate_zeroed(1, sizeof *stage);
+    stage->keeps_spans = keeps_spans;
     pthread_mutex_init(&stage->mutex, NULL);
     return stage;
 }
@@ -27,7 +35,26 @@ void stage_close(Stage *stage)
     if (!stage) return;
     pthread_mutex_destroy(&stage->mutex);
     text_free(&stage->name);
+    for (size_t i = 0; i < stage->spans.count; i++)
+        free(stage->spans.items[i].name);
+    free(stage->spans.items);
     free(stage);
+}
+
+const StageSpan *stage_spans(const Stage *stage, size_t *count)
+{
+    *count = stage->spans.count;
+    return stage->spans.items;
+}
+
+// The caller holds the mutex.
+static void span_end(Stage *stage, double now)
+{
+    if (stage->keeps_spans && stage->name.count > 0)
+        array_push(stage->spans, ((StageSpan){.name = memory_copy_text(text_c(&stage->name)),
+                                              .start_seconds = stage->stage_start_seconds,
+                                              .end_seconds = now}));
+    stage->stage_start_seconds = now;
 }
 
 void stage_begin(Stage *stage, const char *what, const char *path, size_t total)
@@ -35,7 +62,9 @@ void stage_begin(Stage *stage, const char *what, const char *path, size_t total)
     if (!stage) return;
     const char *slash = path ? strrchr(path, '/') : NULL, *name = slash ? slash + 1 : path;
     pthread_mutex_lock(&stage->mutex);
-    if (stage->name.count == 0) stage->start_seconds = clock_seconds();
+    const double now = clock_seconds();
+    if (stage->name.count == 0) stage->start_seconds = now;
+    span_end(stage, now);
     text_free(&stage->name);
     text_appendf(&stage->name, name ? "%s %s" : "%s", what, name);
     stage->total = total;
@@ -47,6 +76,7 @@ void stage_end(Stage *stage)
 {
     if (!stage) return;
     pthread_mutex_lock(&stage->mutex);
+    span_end(stage, clock_seconds());
     text_free(&stage->name);
     pthread_mutex_unlock(&stage->mutex);
 }

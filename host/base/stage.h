@@ -7,8 +7,17 @@
 
 typedef struct Stage Stage;
 
-Stage *stage_open(void);
+// A stage that has ended, by clock_seconds.
+typedef struct {
+    char *name;
+    double start_seconds, end_seconds;
+} StageSpan;
+
+// With `keeps_spans`, stages that have ended are kept until stage_close.
+Stage *stage_open(bool keeps_spans);
 void stage_close(Stage *stage);
+// Returns the `*count` stages that have ended, in the order in which they began.
+const StageSpan *stage_spans(const Stage *stage, size_t *count);
 
 // Sets the stage to `what`, such as "reading", of the file at `path`, which may be NULL, with nothing of
 // `total` done. A `total` of 0 is not counted. The first stage starts the operation.

@@ -278,7 +278,8 @@ SceneOptions scene_options_of(const CommonOptions *common)
     return (SceneOptions){.lenient = common->lenient,
                           .overrides = common->overrides,
                           .override_count = common->override_count,
-                          .frame = common->frame};
+                          .frame = common->frame,
+                          .stage = common->stage};
 }
 
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
@@ -306,6 +307,7 @@ RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint3
     settings.no_cache = common->no_cache;
     settings.perturb_seed = common->perturb_seed;
     settings.perturb_scale = common->perturb_scale;
+    settings.stage = common->stage;
     return settings;
 }
 

@@ -26,6 +26,7 @@ typedef struct {
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
     double frame; // of an animated scene
+    Stage *stage; // records what takes time; may be NULL
 } CommonOptions;
 
 // getopt_long values of long options. A command's other options start at OPTION_OWN.

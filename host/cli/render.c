@@ -108,16 +108,19 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
                            .context = &context,
                            .checkpoint = checkpoint,
                            .remote = ranks ? &remote : NULL};
+    stage_begin(times->stage, "rendering", NULL, 0);
     double start = clock_seconds();
     bool whole = render_job_run(&job);
     times->render_seconds = clock_seconds() - start;
     times->repeats = image_output_repeats(output);
     progress_close(&progress);
+    stage_begin(times->stage, "writing", NULL, 0);
     if (whole)
         whole = image_output_commit(output, messages, &times->encode_seconds);
     else
         image_output_abandon(output);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
+    stage_end(times->stage);
     if (whole && times->repeats.undecided > 0)
         message_warning(messages, "%llu sample%s undecided, as at precision double",
                         (unsigned long long)times->repeats.undecided,
@@ -205,17 +208,20 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     if (ranks && (options.common.work_group[0] > 0 || options.common.build_options))
         return option_usage_fault("render",
                                   "--work-group and --build-options need glint render, a single process");
+    if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
-        HostTimes times = {.parse_seconds = clock_seconds() - start};
+        HostTimes times = {.parse_seconds = clock_seconds() - start, .stage = options.common.stage};
         if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)
             fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options.scene);
         open->has_warned_of_frames = true;
         open->reference_selector = options.common.reference_device;
+        stage_begin(times.stage, "opening the devices", NULL, 0);
         if (render_devices_open(open, &options.common))
             status = scene_render(&options, &scene, open, ranks, &times);
     }
     scene_free(&scene);
+    stage_close(options.common.stage);
     return status;
 }
 

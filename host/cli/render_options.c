@@ -72,7 +72,8 @@ static const char help_text[] =
                     "                        choose the fastest precision that keeps this error in linear "
                     "light; the metric is\n"
                     "                        rmse, max or flip (default: rmse)\n"
-                    "      --timing[=json]   report the time of every stage and launch\n"
+                    "      --timing[=STYLE]  report the time of every stage and launch, as text, json or "
+                    "trace (for Perfetto)\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and "
                     ".dat)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
@@ -253,9 +254,10 @@ static bool several_fit(const RenderOptions *options)
         option_usage_fault(
             "render", has_scenes ? "--checkpoint takes one scene, but several are given"
                                  : "--checkpoint takes one frame; --skip-existing continues with the rest");
-    else if (options->timing == TIMING_JSON)
-        option_usage_fault("render", has_scenes ? "--timing=json takes one scene, but several are given"
-                                                : "--timing=json takes one frame, but several are given");
+    else if (options->timing >= TIMING_JSON)
+        option_usage_fault("render", has_scenes
+                                         ? "--timing=json and =trace take one scene, but several are given"
+                                         : "--timing=json and =trace take one frame, but several are given");
     else if (has_scenes && path && !output_is_folder(path))
         option_usage_fault("render", "--output of several scenes must be a folder");
     else if (!has_scenes && strcmp(options->scenes[0], "-") == 0)
@@ -290,8 +292,9 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
                                   "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
     if (!display_fits(&options->output)) return EXIT_USER;
-    if (options->skips_existing && options->timing == TIMING_JSON)
-        return option_usage_fault("render", "--skip-existing may leave --timing=json nothing to report");
+    if (options->skips_existing && options->timing >= TIMING_JSON)
+        return option_usage_fault("render",
+                                  "--skip-existing may leave --timing=json or =trace nothing to report");
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
     const bool is_one = options->scene_count == 1 && options->frame_count <= 1;

@@ -4,14 +4,15 @@
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
+#include "host/cli/timing_trace.h"
 #include <stdio.h>
 
 bool timing_style_read(const char *value, TimingStyle *style)
 {
-    static const char *const names[] = {"text", "json"};
+    static const char *const names[] = {"text", "json", "trace"};
     unsigned choice = 0;
-    if (value && !option_choice("timing", value, names, 2, &choice)) return false;
-    *style = choice == 0 ? TIMING_TEXT : TIMING_JSON;
+    if (value && !option_choice("timing", value, names, 3, &choice)) return false;
+    *style = TIMING_TEXT + choice;
     return true;
 }
 
@@ -289,6 +290,8 @@ void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, c
 {
     if (style == TIMING_JSON)
         json_report(renderers, count, ranks, settings, host);
+    else if (style == TIMING_TRACE)
+        timing_trace_print(renderers, count, host->stage);
     else
         text_print(renderers, count, ranks, settings, host);
 }

@@ -1,10 +1,10 @@
-// Reports the time of every stage and launch of a render, as text or JSON.
+// Reports the time of every stage and launch of a render, as text, JSON or a trace.
 #pragma once
 
 #include "host/cli/ranks.h"
 #include "host/measure/pilot.h"
 
-typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON } TimingStyle;
+typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON, TIMING_TRACE } TimingStyle;
 
 bool timing_style_read(const char *value, TimingStyle *style); // a value of NULL means text
 
@@ -13,9 +13,10 @@ typedef struct {
     const Pilot *pilot;    // chose the precision, or NULL
     double render_seconds; // from the first band to the last, builds included
     RepeatCounts repeats;  // only at `certified`
+    Stage *stage;          // keeps its spans; NULL unless they are wanted
 } HostTimes;
 
 // Prints the times of all renderers of the image. `ranks`, which rendered parts of it, may be NULL. Text goes
-// to stderr, JSON to stdout.
+// to stderr, JSON and the trace to stdout.
 void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,
                   const RenderSettings *settings, const HostTimes *host);

@@ -173,6 +173,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     fault_note_kernel(slot->request.kernel);
     program_build(renderer->compute, &slot->request, &slot->program);
     fault_note_kernel(NULL);
+    stage_begin(renderer->settings.stage, "rendering", NULL, 0);
     if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
     renderer->report.build_from_cache &= slot->program.from_cache;

@@ -49,7 +49,7 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     loop->options = *options;
     loop->reloads = true;
     loop->settings = options->settings;
-    loop->stage = stage_open();
+    loop->stage = stage_open(false);
     loop->settings.stop = render_stops;
     loop->settings.stop_context = loop;
     loop->settings.stage = loop->stage;

@@ -30,7 +30,7 @@ _glint() {
     --device) words="cpu gpu all" ;;
     --reference-device) words="cpu gpu" ;;
     --aov) words=$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p') ;;
-    --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words=json ;;
+    --timing) [ "${COMP_WORDS[COMP_CWORD - 1]}" = = ] && words="json trace" ;;
     esac
     [ -n "$words" ] || case $word in -*) words=$(_glint_options "$subcommand") ;; esac
     if [ -n "$words" ]; then

@@ -22,7 +22,7 @@ _glint() {
     --tone) compadd none filmic ;;
     --device) compadd cpu gpu all ;;
     --reference-device) compadd cpu gpu ;;
-    --timing) [[ -n $IPREFIX ]] && compadd json || _files ;;
+    --timing) [[ -n $IPREFIX ]] && compadd json trace || _files ;;
     --aov) _sequence compadd - ${(f)"$(glint render --help | sed -n 's/^ \{26\}\([a-z]*\): .*/\1/p')"} ;;
     *)
         if [[ $PREFIX == -* ]]; then

@@ -1,0 +1,154 @@
+// The format is that of "Trace Event Format" (Google, 2016): complete events, with times in microseconds.
+#include "host/cli/timing_trace.h"
+
+#include "host/base/json.h"
+#include <math.h>
+
+static void event_begin(Json *json, const char *phase, const char *name, size_t thread)
+{
+    json_begin_object(json, NULL);
+    json_text(json, "ph", phase);
+    json_text(json, "name", name);
+    json_int64(json, "pid", 1);
+    json_int64(json, "tid", (int64_t)thread);
+}
+
+static void thread_name(Json *json, size_t thread, const char *name)
+{
+    event_begin(json, "M", "thread_name", thread);
+    json_begin_object(json, "args");
+    json_text(json, "name", name);
+    json_end(json);
+    json_end(json);
+}
+
+// The caller adds the event's "args" and ends it.
+static void span_begin(Json *json, const char *name, size_t thread, double start_seconds, double seconds)
+{
+    event_begin(json, "X", name, thread);
+    json_number(json, "ts", 1e6 * start_seconds);
+    json_number(json, "dur", 1e6 * seconds);
+}
+
+static double host_end(const LaunchTime *time)
+{
+    return time->host_start_seconds + time->host_seconds;
+}
+
+// The commands of a device, by both of its reports' lists.
+typedef struct {
+    const NamedLaunch *lists[2];
+    size_t counts[2];
+    const Device *device;
+    // What to add to the device's clock to get the host's: the host learns of a command's end no earlier than
+    // it ends, so that the least difference is the best.
+    double device_to_host;
+} Commands;
+
+static Commands commands_of(const RenderReport *report, const Device *device)
+{
+    Commands commands = {.lists = {report->launches.items, report->reads.items},
+                         .counts = {report->launches.count, report->reads.count},
+                         .device = device,
+                         .device_to_host = INFINITY};
+    for (size_t list = 0; list < 2; list++)
+        for (size_t i = 0; i < commands.counts[list]; i++) {
+            const LaunchTime *time = &commands.lists[list][i].time;
+            if (time->device == device && time->trusted)
+                commands.device_to_host = fmin(commands.device_to_host, host_end(time) - time->end_seconds);
+        }
+    return commands;
+}
+
+// Adds a command: by the device's clock where that is trusted, else from the call to the end of the wait.
+static void command_add(Json *json, const Commands *commands, const NamedLaunch *command, size_t thread,
+                        double origin)
+{
+    const LaunchTime *time = &command->time;
+    const double start =
+        time->trusted ? time->start_seconds + commands->device_to_host : time->host_start_seconds;
+    span_begin(json, command->name, thread, start - origin,
+               time->trusted ? time->event_seconds : time->host_seconds);
+    json_begin_object(json, "args");
+    json_text(json, "clock", time->trusted ? "event" : "host");
+    json_number(json, "called_us", 1e6 * (time->host_start_seconds - origin));
+    if (time->trusted) {
+        const double to_origin = commands->device_to_host - origin;
+        json_number(json, "queued_us", 1e6 * (time->queued_seconds + to_origin));
+        json_number(json, "submitted_us", 1e6 * (time->submitted_seconds + to_origin));
+    }
+    if (time->dimensions > 0) {
+        json_begin_array(json, "work_items");
+        for (cl_uint i = 0; i < time->dimensions; i++)
+            json_int64(json, NULL, (int64_t)time->global[i]);
+        json_end(json);
+    }
+    json_end(json);
+    json_end(json);
+}
+
+// Adds the bands: each lasts from its first launch to the end of its last read-back, by the host's clock.
+static void bands_add(Json *json, const Commands *commands, size_t thread, double origin)
+{
+    const NamedLaunch *launches = commands->lists[0], *reads = commands->lists[1];
+    size_t launch = 0, read = 0;
+    while (launch < commands->counts[0] && read < commands->counts[1]) {
+        const double start = launches[launch].time.host_start_seconds;
+        double end = start;
+        while (launch < commands->counts[0] &&
+               launches[launch].time.host_start_seconds < reads[read].time.host_start_seconds)
+            launch++;
+        const double next =
+            launch < commands->counts[0] ? launches[launch].time.host_start_seconds : INFINITY;
+        for (; read < commands->counts[1] && reads[read].time.host_start_seconds < next; read++)
+            end = host_end(&reads[read].time);
+        span_begin(json, "band", thread, start - origin, end - start);
+        json_end(json);
+    }
+}
+
+static void device_add(Json *json, const RenderReport *report, size_t thread, double origin)
+{
+    const Device *devices[] = {report->device, report->reference_device};
+    Text name = {0};
+    text_appendf(&name, "bands of %s", report->device->name);
+    thread_name(json, thread, text_c(&name));
+    text_free(&name);
+    const Commands all = commands_of(report, report->device);
+    bands_add(json, &all, thread, origin);
+    for (size_t k = 0; k < 2 && devices[k]; k++) {
+        const Commands commands = commands_of(report, devices[k]);
+        thread_name(json, thread + 1 + k, devices[k]->name);
+        for (size_t list = 0; list < 2; list++)
+            for (size_t i = 0; i < commands.counts[list]; i++)
+                if (commands.lists[list][i].time.device == devices[k])
+                    command_add(json, &commands, &commands.lists[list][i], thread + 1 + k, origin);
+    }
+}
+
+void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *stage)
+{
+    enum { THREADS_OF_DEVICE = 3 };
+    size_t span_count;
+    const StageSpan *spans = stage_spans(stage, &span_count);
+    const double origin = span_count > 0 ? spans[0].start_seconds : 0;
+    bool is_from_cache = true;
+    for (size_t i = 0; i < count; i++)
+        is_from_cache &= renderer_report(renderers[i])->build_from_cache;
+    Json *json = json_open();
+    json_text(json, "displayTimeUnit", "ms");
+    json_begin_object(json, "otherData");
+    json_bool(json, "kernels_from_cache", is_from_cache);
+    json_end(json);
+    json_begin_array(json, "traceEvents");
+    thread_name(json, 0, "host");
+    for (size_t i = 0; i < span_count; i++) {
+        span_begin(json, spans[i].name, 0, spans[i].start_seconds - origin,
+                   spans[i].end_seconds - spans[i].start_seconds);
+        json_end(json);
+    }
+    for (size_t i = 0; i < count; i++)
+        device_add(json, renderer_report(renderers[i]), 1 + THREADS_OF_DEVICE * i, origin);
+    json_end(json);
+    json_print(json, stdout);
+}
