@@ -53,7 +53,7 @@ appear where the device's clock is not trusted, and state the reason.
 TAIL = """\
 .SH SEE ALSO
 .BR glint (1),
-docs/accuracy.md for the figures of glint accuracy, render \\-\\-max\\-error and certify, docs/verify.md for the cases, docs/numerics.md for passports
+docs/glint.schema.json for the same as JSON Schema (2020-12), docs/accuracy.md for the figures of glint accuracy, render \\-\\-max\\-error and certify, docs/verify.md for the cases, docs/numerics.md for passports
 """
 NOTES = {
     "glint render --timing=json": "glint-mpi render adds `by_rank[]`, with the members `host`, `name`, `driver`, `lanes`, `share`, `bands`, "
@@ -404,6 +404,62 @@ def meaning_of(path):
             if way in PATTERNS:
                 return PATTERNS[way]
     return None
+
+
+class Shape:
+    """What reports hold at one place: how often which types, and what is within."""
+    def __init__(self):
+        self.types, self.members, self.elements = {}, {}, None
+
+    def add(self, value, path=""):
+        """Adds the value at the path."""
+        if isinstance(value, dict) and value.get("status") == "unavailable" and len(value) == 2:
+            self.types["unavailable"] = {"$ref": "#/$defs/unavailable"}
+        elif isinstance(value, dict):
+            self.types["object"] = {"type": "object"}
+            for name in self.members:  # absent here
+                self.members[name][1] &= name in value
+            for name, member in value.items():
+                is_first = "seen" not in self.types
+                shape, _ = self.members.setdefault(name, [Shape(), is_first])
+                shape.add(member, f"{path}.{name}" if path else name)
+            self.types["seen"] = None
+        elif isinstance(value, list):
+            self.types["array"] = {"type": "array"}
+            holds_objects = any(isinstance(element, dict) for element in value)
+            for element in value:
+                self.elements = self.elements or Shape()
+                self.elements.add(element, path + "[]" if holds_objects else path)
+        else:
+            for kind in meaning_of(path)[1].split(" or "):
+                if kind != "object":  # as objects seen there are
+                    self.types[kind] = SCALARS[kind]
+
+    def schema(self):
+        ways = [dict(way) for name, way in self.types.items() if name != "seen" and way]
+        for way in ways:
+            if way.get("type") == "object":
+                way["properties"] = {name: shape.schema() for name, (shape, _) in self.members.items()}
+                way["required"] = [name for name, (_, is_always) in self.members.items() if is_always]
+            if way.get("type") == "array" and self.elements:
+                way["items"] = self.elements.schema()
+        return ways[0] if len(ways) == 1 else {"anyOf": ways}
+
+
+UNAVAILABLE = {"type": "object", "properties": {"status": {"const": "unavailable"}, "reason": {"type": "string"}},
+               "required": ["status", "reason"]}
+SCALARS = {"null": {"type": "null"}, "boolean": {"type": "boolean"}, "text": {"type": "string"}, "number": {"type": "number"},
+           "hash": {"type": "string", "pattern": "^[0-9a-f]{16}$"}, "count": {"type": "integer", "minimum": 0},
+           "integer": {"type": "integer"}}
+SCALARS["figure"] = {"anyOf": [SCALARS["number"], {"$ref": "#/$defs/unavailable"}]}
+
+
+def schema_of(reports):
+    """The JSON Schema of reports of one command, which are together of every kind that it prints."""
+    shape = Shape()
+    for report in reports:
+        shape.add(report)
+    return shape.schema()
 
 
 def braced(words):

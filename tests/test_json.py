@@ -1,9 +1,12 @@
 #!/usr/bin/env -S python3 -B
-"""docs/glint-json.5 is what tests/json_reference.py makes of each command's JSON, whose members are of the types that it states.
+"""docs/glint-json.5 and docs/glint.schema.json are what tests/json_reference.py makes of each command's JSON, whose members are of
+the types that it states.
 
---write writes the page.
+--write writes both.
 
 run_tests: sanitize-long-only"""
+import copy
+import importlib.util
 import json
 import re
 import sys
@@ -30,6 +33,9 @@ QUICK = "--seconds 0.1"
 
 PAGE = ROOT / "docs/glint-json.5"
 SECTIONS = {}
+SCHEMA_FILE = ROOT / "docs/glint.schema.json"
+SCHEMAS = {}
+HAS_SCHEMAS = importlib.util.find_spec("jsonschema") is not None
 
 
 def is_absent_figure(value):
@@ -93,8 +99,11 @@ class Json(TestCase):
             self.assertIsNotNone(meaning, f"{path} has no meaning")
             self.assertTrue(is_of_type(value, meaning[1]), f"{path} is {value!r}, not {meaning[1]}")
         SECTIONS[heading] = json_reference.section(heading, schema, in_order(paths))
+        SCHEMAS[heading] = json_reference.schema_of(reports)
         if not WRITES:
             self.assertIn(SECTIONS[heading], read(PAGE))
+            for report in reports if HAS_SCHEMAS else ():
+                validator_of(heading).validate(report)
 
     def test_render(self):
         fp64 = need_device()["fp64"]
@@ -169,6 +178,26 @@ class Json(TestCase):
         self.check_members("glint verify", self.json("verify S5 P4 P6 --precision single --json"),
                            self.json("verify P4 --precision single --json --perturb 7"))
 
+    @unittest.skipUnless(HAS_SCHEMAS, "python3-jsonschema is not installed")
+    def test_schema_finds_faults(self):
+        report = self.json("verify P4 --precision single --json")
+        heading = "glint verify"
+        case = "precisions", 0, "cases", 0
+        for place, value in [(("glint",), None), (("reference_bits",), "113"), (("device",), []), (("precisions",), {}),
+                             ((*case, "passed"), 1), ((*case, "rays"), -1), ((*case, "rays"), 1.5), ((*case, "hash"), "12"),
+                             ((*case, "unheard_of"), 1), ((*case, "name"), ...)]:
+            with self.subTest(place=place, value=value):
+                changed = copy.deepcopy(report)
+                parent = changed
+                for step in place[:-1]:
+                    parent = parent[step]
+                if value is ...:
+                    del parent[place[-1]]
+                else:
+                    parent[place[-1]] = value
+                self.assertFalse(validator_of(heading).is_valid(changed))
+        self.assertTrue(validator_of(heading).is_valid(report))
+
     @unittest.skipUnless(need_device()["fp64"], "the device has no 64-bit floating point for a reference")
     def test_accuracy(self):
         write("planet.yaml", PLANET)
@@ -182,8 +211,20 @@ class Json(TestCase):
             self.json(f"accuracy {BALLS} {common} --precision single --perturb 1:1000 --reference saved/1-mirror-balls-reference.color.npy"))
 
 
+def validator_of(heading):
+    """A validator by the schema, which here allows no members beyond its own and rare ones."""
+    import jsonschema
+    only = {"patternProperties": {f"^({'|'.join(RARE)})$": {"type": "string"}}, "additionalProperties": False}
+    schema = json.loads(read(SCHEMA_FILE), object_hook=lambda part: {**part, **only} if "required" in part else part)
+    return jsonschema.Draft202012Validator({**schema, "$ref": f"#/$defs/{heading.replace(' ', '%20')}"})
+
+
 def write_page():
     PAGE.write_text("".join([json_reference.INTRODUCTION, *(SECTIONS[heading] for heading in json_reference.NOTES), json_reference.TAIL]))
+    definitions = {"unavailable": json_reference.UNAVAILABLE, **{heading: SCHEMAS[heading] for heading in json_reference.NOTES}}
+    lines = ",\n".join(f"{json.dumps(name)}: {json.dumps(schema)}" for name, schema in definitions.items())
+    SCHEMA_FILE.write_text('{"$schema": "https://json-schema.org/draft/2020-12/schema",\n'
+                           f'"title": "The JSON that glint prints, by command",\n"$defs": {{\n{lines}}}}}\n')
 
 
 if __name__ == "__main__":
