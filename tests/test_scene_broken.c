@@ -1,5 +1,5 @@
-// Every scene in tests/broken gets exactly the messages in the file next to it, and every message has such a
-// scene. The lines of NAME.set, if there is one, are its overrides.
+// Every scene of the tables in tests/broken, whose README has their format, gets exactly the messages next to
+// it, and every message has such a scene.
 #include "host/base/array.h"
 #include "host/import/load.h"
 #include "tests/scene_reading.h"
@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-enum { BROKEN_SCENES_MIN = 30 };
+enum { BROKEN_SCENES_MIN = 30, SETS_MAX = 40 };
 
 static Text all_expected;
 
@@ -27,75 +27,121 @@ static Text file_text(const char *path)
     return text;
 }
 
-static bool name_ends_with(const char *name, const char *ending)
+// A section of a table (tests/broken).
+typedef struct {
+    char name[80]; // with the table's ending
+    struct {
+        char *items[SETS_MAX];
+        size_t count;
+    } sets;
+    bool is_escaped;
+    Text text, expected;
+} BrokenScene;
+
+static bool starts_with(const char *line, const char *start)
 {
-    size_t length = strlen(name), ending_length = strlen(ending);
-    return length > ending_length && !strcmp(name + length - ending_length, ending);
+    return strncmp(line, start, strlen(start)) == 0;
 }
 
-enum { SETS_MAX = 40 };
-
-// Reads the scene with the lines of `path` as overrides.
-static bool scene_read_lines(Scene *scene, const char *name, const Text *text, const char *path,
-                             MessageList *messages)
+// Appends the line with each %d replaced by a number.
+static void counted_line_append(Text *text, const char *line, long number)
 {
-    Text lines = file_text(path);
-    const char *overrides[SETS_MAX];
-    size_t count = 0;
-    for (char *line = lines.items, *rest; (line = strtok_r(line, "\n", &rest)); line = NULL) {
-        assert_true(count < SETS_MAX);
-        overrides[count++] = line;
+    for (const char *at = line; *at; at++)
+        if (starts_with(at, "%d")) {
+            text_appendf(text, "%ld", number);
+            at++;
+        } else {
+            text_append(text, at, 1);
+        }
+    text_append(text, "\n", 1);
+}
+
+// Replaces each \xNN by its byte.
+static void text_unescape(Text *text)
+{
+    size_t length = 0;
+    for (size_t i = 0; i < text->count; i++) {
+        char digits[3] = "";
+        if (starts_with(text->items + i, "\\x")) {
+            memcpy(digits, text->items + i + 2, 2);
+            i += 3;
+        }
+        text->items[length++] = digits[0] ? (char)strtol(digits, NULL, 16) : text->items[i];
     }
-    const bool read = scene_read_set(scene, name, text, overrides, count, messages);
-    text_free(&lines);
-    return read;
+    text->items[text->count = length] = '\0';
 }
 
-static void check_scene(const char *folder, const char *name)
+// Reads the section that begins at `line`. Returns the line behind it, or NULL at the end.
+static char *section_read(char *line, const char *ending, BrokenScene *broken)
 {
-    Text path = {0}, expected_path = {0}, set_path = {0}, got = {0};
-    text_appendf(&path, "%s/%s", folder, name);
-    text_append(&expected_path, path.items, (size_t)(strrchr(path.items, '.') - path.items));
-    text_append(&set_path, expected_path.items, expected_path.count);
-    text_appendf(&expected_path, ".expected");
-    text_appendf(&set_path, ".set");
-    Text text = file_text(text_c(&path)), expected = file_text(text_c(&expected_path));
-    text_append(&all_expected, text_c(&expected), expected.count);
+    *broken = (BrokenScene){0};
+    char *next = line;
+    bool is_expected = false;
+    for (size_t i = 0; next && *next; i++, line = next) {
+        if (i > 0 && starts_with(line, "#### scene ")) return line;
+        char *end = strchr(line, '\n');
+        next = end ? end + 1 : NULL;
+        if (end) *end = '\0';
+        char *value;
+        if (starts_with(line, "#### scene ")) {
+            snprintf(broken->name, sizeof broken->name, "%s.%s", line + strlen("#### scene "), ending);
+        } else if (starts_with(line, "#### set ")) {
+            assert_true(broken->sets.count < SETS_MAX);
+            broken->sets.items[broken->sets.count++] = line + strlen("#### set ");
+        } else if (starts_with(line, "#### escaped")) {
+            broken->is_escaped = true;
+        } else if (starts_with(line, "#### repeat ")) {
+            const long first = strtol(line + strlen("#### repeat "), &value, 10),
+                       last = strtol(value, &value, 10);
+            for (long number = first; number <= last; number++)
+                counted_line_append(&broken->text, value + 1, number);
+        } else if (starts_with(line, "#### expected")) {
+            is_expected = true;
+            if (strstr(line, "without the last newline")) broken->text.items[--broken->text.count] = '\0';
+        } else {
+            text_appendf(is_expected ? &broken->expected : &broken->text, "%s\n", line);
+        }
+    }
+    return NULL;
+}
 
+static void check_scene(BrokenScene *broken)
+{
+    if (broken->is_escaped) text_unescape(&broken->text);
+    text_append(&all_expected, text_c(&broken->expected), broken->expected.count);
     MessageList messages = {0};
+    Text got = {0};
     Scene scene;
-    bool read = access(text_c(&set_path), F_OK) == 0
-                    ? scene_read_lines(&scene, name, &text, text_c(&set_path), &messages)
-                    : scene_read_text(&scene, name, &text, false, &messages);
+    const bool read =
+        broken->sets.count > 0
+            ? scene_read_set(&scene, broken->name, &broken->text, (const char *const *)broken->sets.items,
+                             broken->sets.count, &messages)
+            : scene_read_text(&scene, broken->name, &broken->text, false, &messages);
     for (size_t i = 0; i < messages.count; i++)
         message_describe(&got, &messages.items[i]);
-    if (read || strcmp(text_c(&got), text_c(&expected)) != 0)
-        fail_msg("%s:\n%sexpected:\n%s", text_c(&path), text_c(&got), text_c(&expected));
+    if (read || strcmp(text_c(&got), text_c(&broken->expected)) != 0)
+        fail_msg("%s:\n%sexpected:\n%s", broken->name, text_c(&got), text_c(&broken->expected));
     assert_null(scene.objects.items);
     message_list_free(&messages);
-    text_free(&path);
-    text_free(&expected_path);
-    text_free(&set_path);
     text_free(&got);
-    text_free(&text);
-    text_free(&expected);
+    text_free(&broken->text);
+    text_free(&broken->expected);
 }
 
-static void check_folder(void **state)
+static void check_table(void **state)
 {
-    char folder[32], ending[8];
-    snprintf(folder, sizeof folder, "tests/broken/%s", (const char *)*state);
-    snprintf(ending, sizeof ending, ".%s", (const char *)*state);
-    DIR *entries = opendir(folder);
-    assert_non_null(entries);
+    const char *ending = *state;
+    char path[32];
+    snprintf(path, sizeof path, "tests/broken/%s.txt", ending);
+    Text table = file_text(path);
     size_t count = 0;
-    for (const struct dirent *entry; (entry = readdir(entries));) {
-        if (!name_ends_with(entry->d_name, ending)) continue;
-        check_scene(folder, entry->d_name);
-        count++;
+    for (char *line = strstr(table.items, "#### scene "); line; count++) {
+        BrokenScene broken;
+        line = section_read(line, ending, &broken);
+        check_scene(&broken);
     }
-    closedir(entries);
     assert_true(count >= BROKEN_SCENES_MIN);
+    text_free(&table);
 }
 
 // The longest literal part of a format, which identifies the message.
@@ -140,7 +186,8 @@ static size_t check_sources(const char *folder)
     assert_non_null(entries);
     size_t count = 0;
     for (const struct dirent *entry; (entry = readdir(entries));) {
-        if (!name_ends_with(entry->d_name, ".c")) continue;
+        const char *ending = strrchr(entry->d_name, '.');
+        if (!ending || strcmp(ending, ".c") != 0) continue;
         Text path = {0};
         text_appendf(&path, "%s/%s", folder, entry->d_name);
         count += check_source(text_c(&path));
@@ -182,11 +229,11 @@ static void test_names(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        {"test_yaml", check_folder, NULL, NULL, "yaml"},
-        {"test_rt", check_folder, NULL, NULL, "rt"},
-        {"test_cfg", check_folder, NULL, NULL, "cfg"},
-        {"test_nff", check_folder, NULL, NULL, "nff"},
-        {"test_dat", check_folder, NULL, NULL, "dat"},
+        {"test_yaml", check_table, NULL, NULL, "yaml"},
+        {"test_rt", check_table, NULL, NULL, "rt"},
+        {"test_cfg", check_table, NULL, NULL, "cfg"},
+        {"test_nff", check_table, NULL, NULL, "nff"},
+        {"test_dat", check_table, NULL, NULL, "dat"},
         cmocka_unit_test(test_every_message_has_a_scene),
         cmocka_unit_test(test_names),
     };

@@ -1,0 +1,31 @@
+#!/usr/bin/env -S python3 -B
+"""Writes the scenes of tests/broken/FORMAT.txt as files: tests/broken_scenes.py FORMAT FOLDER. The inputs of fuzzers."""
+import re
+import sys
+from pathlib import Path
+
+
+def scenes(ending):
+    """The name and the bytes of each scene."""
+    table = Path(__file__).with_name("broken") / f"{ending}.txt"
+    for section in re.split(r"(?m)^#### scene ", table.read_text(encoding="utf-8"))[1:]:
+        name, body = section.split("\n", 1)
+        text, end, _ = re.split(r"(?m)^#### expected(.*)\n", body)
+        text = re.sub(r"(?m)^#### repeat (\d+) (\d+) (.*\n)",
+                      lambda run: "".join(run[3].replace("%d", str(i)) for i in range(int(run[1]), int(run[2]) + 1)), text)
+        content = re.sub("(?m)^#### set .*\n", "", text).encode()
+        if content.startswith(b"#### escaped\n"):
+            content = re.sub(rb"\\x(..)", lambda byte: bytes.fromhex(byte[1].decode()), content.split(b"\n", 1)[1])
+        yield f"{name}.{ending}", content[:-1] if end else content
+
+
+def write(ending, folder):
+    """The files written."""
+    paths = [Path(folder, name) for name, _ in scenes(ending)]
+    for path, (_, content) in zip(paths, scenes(ending)):
+        path.write_bytes(content)
+    return paths
+
+
+if __name__ == "__main__":
+    write(*sys.argv[1:])
