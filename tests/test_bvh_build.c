@@ -107,7 +107,7 @@ static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds
 static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves)
 {
     Bvh bvh;
-    Stage *stage = stage_open();
+    Stage *stage = stage_open(false);
     stage_begin(stage, "building", NULL, count + 1);
     stage_set(stage, 1);
     bvh_build(&bvh, boxes, kinds, count, leaves, stage);

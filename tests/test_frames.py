@@ -2,6 +2,7 @@
 """Frames of an animation: each is the image of the scene with that frame's values."""
 import math
 import os
+from pathlib import Path
 
 import glint
 from glint import SPHERE, TestCase, main, need_device, npy_read, png_read, read, write
@@ -92,6 +93,35 @@ class Frames(TestCase):
         process = self.glint("render moving.yaml --size 32x18 --lanes 1 --skip-existing --aov t")
         self.assertEqual(process.stderr, "glint: wrote moving.png, moving.t.npy\n")
         self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
+
+    def test_standard_streams(self):
+        """A scene of standard input; images on standard output, one after the other, with the bytes of files."""
+        moving = SCENE.format(**KEYS)
+        write("moving.yaml", moving)
+        for ending in "png", "ppm", "npy":
+            self.glint(f"render moving.yaml --frames 0-2 {RENDER} -o f%d.{ending}")
+            files = b"".join(Path(f"f{frame}.{ending}").read_bytes() for frame in range(3))
+            for scene, text in ("moving.yaml", None), ("-", moving.encode()):
+                frames = range(3) if scene == "-" else ["0-2"]  # standard input is read once
+                outputs = [glint.run(f"render {scene} --frames {frame} {RENDER} -o - --format {ending}", text=False,
+                                     **({"input": text} if text else {})) for frame in frames]
+                self.assertEqual([output.returncode for output in outputs], [0] * len(outputs), outputs)
+                written = b"".join(output.stdout for output in outputs)
+                if ending == "png" and text:  # a PNG names its scene
+                    written = b"".join(written.split(b"Scene\0-"))
+                    self.assertEqual(written.count(b"IHDR"), 3)
+                else:
+                    self.assertEqual(written, files)
+        self.glint(f"render - {RENDER}", input=moving)
+        self.assertTrue(os.path.exists("image.png"))
+        self.refuses("render -", r"-:1:1: error: unknown", input="ball: {}")
+        for options, reason in {"-o -": "needs --format", "--format png": "is for --output -", "-o - --format exr": "expected png",
+                                "-o - --format png --aov t": "more files", "-o - --format png --timing=json": "--output - takes",
+                                "-o - --format npy --dither": "linear values"}.items():
+            self.refuses(f"render moving.yaml {options}", reason)
+        with open("/dev/full", "w") as device:
+            full = glint.run("render moving.yaml --size 512x512 -o - --format ppm", stdout=device)
+        self.assertEqual((full.returncode, "standard output" in full.stderr), (1, True), full.stderr)
 
     def test_refused(self):
         write("moving.yaml", SCENE.format(**KEYS))

@@ -546,7 +546,7 @@ static void test_progress(void **state)
     file_write("a.obj", "mtllib missing.mtl\nusemtl red\n" CORNERS "f 1 2 3\nf 1 2 3\n");
     const char text[] = SCENE_OF("") "  - sphere: {center: [0, 0, 0], radius: 1}\n";
     const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
-    Progress progress = {.stage = stage_open()};
+    Progress progress = {.stage = stage_open(false)};
     const SceneOptions options = {.file_named = progress_note, .context = &progress, .stage = progress.stage};
     MessageList messages = {0};
     Scene scene;

@@ -280,7 +280,8 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
 
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages)
 {
-    if (size == 0 || fwrite(bytes, 1, size, output->file) == size || output->file == stdout) return true;
+    if (size == 0 || fwrite(bytes, 1, size, output->file) == size) return true;
+    if (output->file == stdout) clearerr(stdout); // reported here, not by main
     return message_error(messages, "cannot write '%s': %s", output->target, strerror(errno));
 }
 

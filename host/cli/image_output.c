@@ -56,7 +56,7 @@ struct ImageOutput {
 char *image_output_default_path(const char *scene_path)
 {
     const char *slash = strrchr(scene_path, '/');
-    const char *name = slash ? slash + 1 : scene_path;
+    const char *name = strcmp(scene_path, "-") == 0 ? "image" : slash ? slash + 1 : scene_path;
     const char *dot = strrchr(name, '.');
     Text path = {0};
     text_append(&path, name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
@@ -64,11 +64,13 @@ char *image_output_default_path(const char *scene_path)
     return path.items;
 }
 
-bool image_output_path_known(const char *path)
+bool image_output_format_choose(ImageOutputOptions *options)
 {
-    if (image_format_of(path) != IMAGE_UNKNOWN) return true;
-    fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
-    return false;
+    if (strcmp(options->path, "-") == 0) return true;
+    options->format = image_format_of(options->path);
+    if (options->format == IMAGE_UNKNOWN)
+        fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", options->path);
+    return options->format != IMAGE_UNKNOWN;
 }
 
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
@@ -131,12 +133,11 @@ static void certified_describe(Text *text, const ImageOutput *output)
 
 static bool is_exr(const ImageOutput *output)
 {
-    return image_format_of(output->options->path) == IMAGE_EXR;
+    return output->options->format == IMAGE_EXR;
 }
 
-bool image_output_holds_floats(const char *path)
+bool image_output_holds_floats(ImageFormat format)
 {
-    const ImageFormat format = image_format_of(path);
     return format == IMAGE_EXR || format == IMAGE_NPY;
 }
 
@@ -199,7 +200,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
     const bool is_display =
-        output->options->transfer == TRANSFER_SRGB && !image_output_holds_floats(output->options->path);
+        output->options->transfer == TRANSFER_SRGB && !image_output_holds_floats(output->options->format);
     NOTE("Transfer", "%s", is_display ? "srgb" : "none");
     if (output->options->exposure != 0) NOTE("Exposure", "%g", output->options->exposure);
     if (output->options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[output->options->tone]);
@@ -263,7 +264,8 @@ static bool file_spares_scene(const char *path, void *context)
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path)
 {
-    return !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
+    return strcmp(options->path, "-") != 0 &&
+           !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
 }
 
 static bool file_exists(const char *path, void *unused)
@@ -316,7 +318,7 @@ static bool image_open(ImageOutput *output, const Film *film, const ImageNote *n
 {
     const RenderSettings *settings = output->settings;
     ImageHeader header = layer_header(film, LAYER_COLOR);
-    header.format = image_format_of(output->options->path);
+    header.format = output->options->format;
     header.transfer = output->options->transfer;
     header.bits = output->options->bits;
     header.exposure = output->options->exposure;
@@ -429,7 +431,7 @@ static bool band_write(ImageOutput *output)
 {
     const Film *band = &output->band;
     MessageList *messages = output->messages;
-    const bool is_npy = image_format_of(output->options->path) == IMAGE_NPY;
+    const bool is_npy = output->options->format == IMAGE_NPY;
     const void *arrays[LAYER_COUNT + 2];
     size_t count = 0;
     arrays[count++] = is_npy ? band->layers[LAYER_COLOR] : layer_narrowed(output, band, LAYER_COLOR);

@@ -9,7 +9,8 @@
 #include "host/render/renderer.h"
 
 typedef struct {
-    const char *path;
+    const char *path; // "-": standard output
+    ImageFormat format;
     unsigned aovs; // AOV_COLOR means the linear values
     Transfer transfer;
     unsigned bits;
@@ -25,12 +26,14 @@ extern const char *const tone_names[TONE_COUNT];
 
 typedef struct ImageOutput ImageOutput;
 
-// Returns the scene's name with .png, in the current folder. The caller frees it.
+// Returns the scene's name with .png, of standard input image.png, in the current folder. The caller frees
+// it.
 char *image_output_default_path(const char *scene_path);
-// Returns whether the path's ending is known; if not, prints the known endings.
-bool image_output_path_known(const char *path);
-// Returns whether the path's format holds linear floats, which are not for display.
-bool image_output_holds_floats(const char *path);
+// Sets the format by the path's ending, unless the path is "-". Returns false, having printed the known
+// endings, if it has none of them.
+bool image_output_format_choose(ImageOutputOptions *options);
+// Returns whether the format holds linear floats, which are not for display.
+bool image_output_holds_floats(ImageFormat format);
 // Returns true with a message if one of the files is a file that the scene was read from.
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path);

@@ -179,7 +179,7 @@ static int scene_render(RenderOptions *options, const Scene *scene, RenderDevice
     }
     if (!options->has_transfer)
         options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
-    options->output.prints_names = !options->quiet;
+    options->output.prints_names = !options->quiet && !options->has_format;
     options->output.synchronous = options->timing != TIMING_NONE;
     MessageList messages = {0};
     Checkpoint *checkpoint = NULL;
@@ -209,7 +209,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
         return option_usage_fault("render",
                                   "--work-group and --build-options need glint render, a single process");
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
-    if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
+    if (image_output_format_choose(&options.output) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start, .stage = options.common.stage};
         if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)
@@ -244,7 +244,7 @@ static char *frame_path_make(const RenderOptions *options, uint32_t frame)
 static char *path_make(const RenderOptions *options, const char *scene)
 {
     const char *output = options->output.path;
-    if (output && options->scene_count == 1) return memory_copy_text(output);
+    if (output && (options->scene_count == 1 || options->has_format)) return memory_copy_text(output);
     char *name = image_output_default_path(scene);
     if (!output) return name;
     char *path = text_format("%s/%s", output, name);
@@ -255,6 +255,7 @@ static char *path_make(const RenderOptions *options, const char *scene)
 // False with a message.
 static bool paths_differ(char *const *paths, const RenderOptions *options)
 {
+    if (options->has_format) return true; // all go to standard output
     for (size_t i = 0; i < options->scene_count; i++)
         for (size_t k = 0; k < i; k++) {
             if (strcmp(paths[i], paths[k]) != 0) continue;

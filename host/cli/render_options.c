@@ -25,6 +25,7 @@ enum {
     OPTION_CHECKPOINT,
     OPTION_FRAMES,
     OPTION_SKIP_EXISTING,
+    OPTION_FORMAT,
     OPTION_QUIET
 };
 
@@ -46,6 +47,7 @@ static const struct option long_options[] = {
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"frames", required_argument, NULL, OPTION_FRAMES},
     {"skip-existing", no_argument, NULL, OPTION_SKIP_EXISTING},
+    {"format", required_argument, NULL, OPTION_FORMAT},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
     SET_LONG_OPTION,
@@ -60,9 +62,9 @@ static const struct option long_options[] = {
 
 static const char help_text[] =
     "usage: glint render SCENE... [OPTIONS]\n\n"
-    "  -o, --output FILE     .png, .ppm, .exr or .npy; of several scenes their folder (default: each "
-    "scene's\n"
-    "                        name with .png)\n" HELP_SET
+    "  -o, --output FILE     .png, .ppm, .exr or .npy; a folder for several scenes; - with --format "
+    "(default:\n"
+    "                        the scene's name with .png). A SCENE - is YAML on standard input\n" HELP_SET
     "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
     "      --region X,Y,W,H  render these pixels of the image only\n"
@@ -72,8 +74,7 @@ static const char help_text[] =
                     "                        choose the fastest precision that keeps this error in linear "
                     "light; the metric is\n"
                     "                        rmse, max or flip (default: rmse)\n"
-                    "      --timing[=STYLE]  report the time of every stage and launch, as text, json or "
-                    "trace (for Perfetto)\n"
+                    "      --timing[=STYLE]  report the time of every stage and launch: text, json or trace\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and "
                     ".dat)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
@@ -88,6 +89,7 @@ static const char help_text[] =
                     "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
+                    "      --format F        of --output -, standard output: png, ppm or npy\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER
         HELP_PERTURB HELP_HELP;
@@ -161,11 +163,36 @@ static bool exposure_read(const char *value, double *exposure)
     return false;
 }
 
+static bool is_to_stdout(const ImageOutputOptions *output)
+{
+    return output->path && strcmp(output->path, "-") == 0;
+}
+
+// Rejects options that standard output cannot have, or --format without it. Returns false with a message.
+static bool stdout_fits(const RenderOptions *options)
+{
+    const bool is_stdout = is_to_stdout(&options->output);
+    if (is_stdout && !options->has_format)
+        option_usage_fault("render", "--output - needs --format png, ppm or npy");
+    else if (!is_stdout && options->has_format)
+        option_usage_fault("render", "--format is for --output -; the name of a file has its format");
+    else if (is_stdout && options->output.aovs)
+        option_usage_fault("render", "--aov writes more files than --output - can take");
+    else if (is_stdout && options->timing >= TIMING_JSON)
+        option_usage_fault("render",
+                           "--timing=json and =trace print to standard output, which --output - takes");
+    else
+        return true;
+    return false;
+}
+
 // Rejects options of display values that the image does not have. Returns false with a message.
 static bool display_fits(const ImageOutputOptions *output)
 {
     const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
-    if (is_changed && output->path && image_output_holds_floats(output->path))
+    const ImageFormat format =
+        is_to_stdout(output) || !output->path ? output->format : image_format_of(output->path);
+    if (is_changed && image_output_holds_floats(format))
         option_usage_fault(
             "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
     else if (output->dither && output->bits != 8)
@@ -225,6 +252,12 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         return true;
     case OPTION_FRAMES:
         return frames_read(value, options);
+    case OPTION_FORMAT:
+        if (!option_choice("format", value, (const char *const[]){"png", "ppm", "npy"}, 3, &choice))
+            return false;
+        options->output.format = (const ImageFormat[]){IMAGE_PNG, IMAGE_PPM, IMAGE_NPY}[choice];
+        options->has_format = true;
+        return true;
     case OPTION_SKIP_EXISTING:
         options->skips_existing = true;
         return true;
@@ -245,7 +278,7 @@ bool output_is_folder(const char *path)
 // Rejects options that suit one image alone. Returns false with a message.
 static bool several_fit(const RenderOptions *options)
 {
-    const char *const path = options->output.path;
+    const char *const path = is_to_stdout(&options->output) ? NULL : options->output.path;
     const bool has_scenes = options->scene_count > 1;
     const FramePlace place = path ? frame_place_of(path) : (FramePlace){0};
     if (options->frame_count > 0 && has_scenes)
@@ -291,7 +324,7 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
         return option_usage_fault("render",
                                   "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
-    if (!display_fits(&options->output)) return EXIT_USER;
+    if (!stdout_fits(options) || !display_fits(&options->output)) return EXIT_USER;
     if (options->skips_existing && options->timing >= TIMING_JSON)
         return option_usage_fault("render",
                                   "--skip-existing may leave --timing=json or =trace nothing to report");

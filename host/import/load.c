@@ -27,7 +27,8 @@ static bool ends_with(const char *path, const char *ending)
 
 bool scene_is_yaml(const char *path)
 {
-    return ends_with(path, ".yaml") || ends_with(path, ".yml") || ends_with(path, ".json");
+    return strcmp(path, "-") == 0 || ends_with(path, ".yaml") || ends_with(path, ".yml") ||
+           ends_with(path, ".json");
 }
 
 static bool scene_read(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)

@@ -26,6 +26,7 @@ _glint() {
     --bvh) words="auto on off" ;;
     --bits) words="8 16" ;;
     --transfer) words="srgb none" ;;
+    --format) [ "$subcommand" = render ] && words="png ppm npy" ;;
     --tone) words="none filmic" ;;
     --device) words="cpu gpu all" ;;
     --reference-device) words="cpu gpu" ;;
