@@ -35,7 +35,7 @@ int main(int argument_count, char **arguments)
     GlintDevice *device;
     GlintScene *scene;
     check(glint_device_open(NULL, &device, &messages), &messages);
-    check(glint_scene_load(arguments[1], &scene, &messages), &messages);
+    check(glint_scene_load(arguments[1], NULL, &scene, &messages), &messages);
 
     const uint32_t width = 320, height = 180;
     double *color = calloc(3 * (size_t)width * height, sizeof *color);

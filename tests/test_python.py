@@ -4,6 +4,7 @@
 run_tests: sanitize-long-only"""
 import copy
 import ctypes
+import json
 import os
 import pickle
 import subprocess
@@ -67,6 +68,32 @@ class Images(unittest.TestCase):
             subprocess.run([BUILD / "glint", "render", ROOT / "scenes/article.yaml", "--size", "64x36", "--samples", "2", "--bounces", "3",
                             "--precision", "strict", "-o", f"{folder}/image.npy", "--quiet"], check=True)
             np.testing.assert_array_equal(image, np.load(f"{folder}/image.npy"))
+
+    def test_overrides_and_frames(self):
+        """A replaced value and a frame's value are as if the scene had them."""
+        def image(scene):
+            return scene.render(32, 18, precision="strict")
+        moving = {**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": {"keys": {0: 1, 4: 2}}}}]}
+        small, large = (image(glint.Scene({**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": radius}}]})) for radius in (1, 1.5))
+        self.assertFalse(np.array_equal(small, large))
+        np.testing.assert_array_equal(image(glint.Scene(moving)), small)
+        np.testing.assert_array_equal(image(glint.Scene(moving, frame=2)), large)
+        np.testing.assert_array_equal(image(glint.Scene(moving, frame=2, overrides={"objects[0].sphere.radius": 1})), small)
+        np.testing.assert_array_equal(image(glint.Scene(SPHERE, overrides={"objects[0].sphere": {"center": [0, 0, 0], "radius": np.float64(1.5)}})), large)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "scene.json")
+            path.write_text(json.dumps(moving))
+            np.testing.assert_array_equal(image(glint.load(path, frame=2)), large)
+            np.testing.assert_array_equal(image(glint.load(path, {"objects[0].sphere.radius": 1.5})), large)
+        for overrides, reason in ({"camera.zoom.x": 1}, "has no 'zoom'"), ({"camera.fov": "wide"}, "--set:1:12: error: .*fov"):
+            with self.assertRaisesRegex(glint.SceneError, reason):
+                glint.Scene(SPHERE, overrides=overrides)
+        with self.assertRaisesRegex(glint.SceneError, "frame is not finite"):
+            glint.Scene(SPHERE, frame=float("nan"))
+        with self.assertRaisesRegex(glint.SceneError, "min_contribution is not between 0 and 1"):
+            glint.Scene(SPHERE).render(8, 6, min_contribution=2)
+        mirrors = glint.Scene({**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": 1, "material": {"reflection": 0.01}}}]})
+        self.assertFalse(np.array_equal(mirrors.render(32, 18), mirrors.render(32, 18, min_contribution=0.1)))
 
     def test_sizes_and_meshes(self):
         self.assertEqual(glint.load_mesh(CUBE_VERTICES, CUBE_FACES).render(16, 9).shape, (9, 16, 3))

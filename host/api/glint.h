@@ -78,13 +78,22 @@ void glint_device_info(const GlintDevice *device, GlintDeviceInfo *info);
 
 // Scenes
 
-// Reads a scene, mesh or glTF file. Sets *scene to NULL on failure. Formats that assimp reads, such as FBX,
-// need the program glint in PATH.
-GlintStatus glint_scene_load(const char *path, GlintScene **scene, char **messages);
+// How a scene is read. Only YAML scenes have values to replace and frames.
+typedef struct {
+    size_t size;
+    const char *const *overrides; // values to replace, each as of glint render --set: "camera.fov=60"
+    size_t override_count;
+    double frame; // of an animated scene
+} GlintSceneOptions;
+
+// Reads a scene, mesh or glTF file. `options` may be NULL. Sets *scene to NULL on failure. Formats that
+// assimp reads, such as FBX, need the program glint in PATH.
+GlintStatus glint_scene_load(const char *path, const GlintSceneOptions *options, GlintScene **scene,
+                             char **messages);
 // Reads a scene in glint's YAML format from memory. Messages begin with `name`, which must not be NULL, and
 // files that the scene names are relative to its folder.
-GlintStatus glint_scene_parse(const char *text, size_t length, const char *name, GlintScene **scene,
-                              char **messages);
+GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
+                              const GlintSceneOptions *options, GlintScene **scene, char **messages);
 
 // Triangles in memory. A triangle's index is its object in hits and images.
 typedef struct {
@@ -120,9 +129,10 @@ typedef struct {
     uint32_t samples;       // per pixel; 0 means 1
     uint32_t bounces;       // at most this many per ray
     GlintPrecision precision;
-    uint32_t lanes;         // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
-    GlintProgress progress; // or NULL
-    void *context;          // passed to progress
+    uint32_t lanes;          // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
+    GlintProgress progress;  // or NULL
+    void *context;           // passed to progress
+    double min_contribution; // 0 to 1: rays whose weight in the pixel is below it are left out
 } GlintRenderSettings;
 
 // Arrays of height x width pixels from the top left, which the caller owns, or NULL for layers that are not

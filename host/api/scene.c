@@ -7,8 +7,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const SceneOptions options = {.mesh_program = "glint"};
-
 static GlintStatus scene_give(GlintScene **scene, Scene *read, bool is_read, MessageList *list,
                               char **messages)
 {
@@ -20,21 +18,38 @@ static GlintStatus scene_give(GlintScene **scene, Scene *read, bool is_read, Mes
     return call_end(list, NULL, is_read ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
 }
 
-GlintStatus glint_scene_load(const char *path, GlintScene **scene, char **messages)
+static bool options_read(SceneOptions *options, const GlintSceneOptions *given, MessageList *messages)
+{
+    GlintSceneOptions own = {0};
+    *options = (SceneOptions){.mesh_program = "glint"};
+    if (given && !struct_read(&own, sizeof own, given, messages)) return false;
+    if (own.override_count > 0 && !own.overrides)
+        return message_error(messages, "override_count is not 0, but overrides is NULL");
+    if (!isfinite(own.frame)) return message_error(messages, "the frame is not finite");
+    options->overrides = own.overrides;
+    options->override_count = own.override_count;
+    options->frame = own.frame;
+    return true;
+}
+
+GlintStatus glint_scene_load(const char *path, const GlintSceneOptions *options, GlintScene **scene,
+                             char **messages)
 {
     MessageList list = {0};
     Scene read = {0};
-    const bool is_read = scene_load(&read, path, &options, &list);
+    SceneOptions own;
+    const bool is_read = options_read(&own, options, &list) && scene_load(&read, path, &own, &list);
     return scene_give(scene, &read, is_read, &list, messages);
 }
 
-GlintStatus glint_scene_parse(const char *text, size_t length, const char *name, GlintScene **scene,
-                              char **messages)
+GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
+                              const GlintSceneOptions *options, GlintScene **scene, char **messages)
 {
     MessageList list = {0};
     Scene read = {0};
+    SceneOptions own;
     const Source source = {.file = name, .bytes = text, .length = length};
-    const bool is_read = scene_read_yaml(&read, &source, &options, &list);
+    const bool is_read = options_read(&own, options, &list) && scene_read_yaml(&read, &source, &own, &list);
     return scene_give(scene, &read, is_read, &list, messages);
 }
 

@@ -182,13 +182,27 @@ def _precision(name: str) -> int:
     return PRECISIONS[name]
 
 
+def _yaml(value: Any) -> str:
+    """Returns a value as JSON, which is YAML."""
+    return json.dumps(value, default=lambda array: array.tolist())
+
+
+def _options(overrides: Optional[Mapping[str, Any]], frame: float) -> Any:
+    texts = [f"{path}={value if isinstance(value, str) else _yaml(value)}".encode() for path, value in (overrides or {}).items()]
+    return _c.SceneOptions(ctypes.sizeof(_c.SceneOptions), (ctypes.c_char_p * len(texts))(*texts), len(texts), frame)
+
+
 class Scene:
     """A scene, from a dict or text in glint's YAML format; glint.load and glint.load_mesh make others."""
 
-    def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml"):
-        text = description if isinstance(description, str) else json.dumps(description, default=lambda array: array.tolist())
+    def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
+                 frame: float = 0):
+        """overrides: values to replace, such as {"camera.fov": 60}. frame: of an animated scene. name: of its messages."""
+        text = description if isinstance(description, str) else _yaml(description)
         encoded = text.encode()
-        self._take(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), scene, messages))
+        options = _options(overrides, frame)
+        self._take(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), ctypes.byref(options),
+                                                                        scene, messages))
 
     def _take(self, make: Callable[[Any, Any], int]) -> None:
         self._tracers: dict[tuple[Optional[str], str, int], ctypes.c_void_p] = {}
@@ -211,18 +225,21 @@ class Scene:
         return _c.library.glint_scene_light_count(self._handle)
 
     def render(self, width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5, precision: str = "single",
-               device: Union[None, int, str] = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None) -> np.ndarray:
+               device: Union[None, int, str] = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None,
+               min_contribution: float = 0) -> np.ndarray:
         """Returns the image, (height, width, 3), in linear light. The arguments are those of render_layers."""
-        return self.render_layers(("color",), width, height, samples, bounces, precision, device, lanes, progress)["color"]
+        return self.render_layers(("color",), width, height, samples, bounces, precision, device, lanes, progress,
+                                  min_contribution)["color"]
 
     def render_layers(self, layers: Sequence[str], width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5,
                       precision: str = "single", device: Union[None, int, str] = None, lanes: int = 0,
-                      progress: Optional[Callable[[float], Any]] = None) -> dict[str, np.ndarray]:
+                      progress: Optional[Callable[[float], Any]] = None, min_contribution: float = 0) -> dict[str, np.ndarray]:
         """Renders the layers named, of glint.LAYERS, and returns their arrays, (height, width[, values]).
 
         width, height: both 0 select the size of the scene's file, else 1280 wide. bounces: at most this many per ray.
         precision: single, strict, double or certified. device: as for `glint render --device`. lanes: rays per
         work-item; 0 lets glint choose. progress: called with the fraction done; if it returns True, Stopped is raised.
+        min_contribution: rays whose weight in the pixel is below it are left out.
         """
         if isinstance(layers, str):
             raise ValueError("layers: expected a sequence of names, not one text")
@@ -230,7 +247,8 @@ class Scene:
         if unknown:
             raise ValueError(f"layers: expected some of {', '.join(LAYERS)}, not {', '.join(sorted(unknown))}")
         counts = (_count(name, value) for name, value in (("width", width), ("height", height), ("samples", samples), ("bounces", bounces)))
-        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), *counts, _precision(precision), _count("lanes", lanes))
+        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), *counts, _precision(precision), _count("lanes", lanes),
+                                     min_contribution=min_contribution)
         if not width and not height:
             sides = ctypes.c_uint32(), ctypes.c_uint32()
             _c.library.glint_scene_image_size(self._handle, *map(ctypes.byref, sides))
@@ -314,10 +332,12 @@ def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) ->
     _c.library.glint_scene_free(handle)
 
 
-def load(path: Union[str, os.PathLike[str]]) -> Scene:
-    """Reads a scene, mesh or glTF file."""
+def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0) -> Scene:
+    """Reads a scene, mesh or glTF file. overrides: values of a YAML scene to replace, such as {"camera.fov": 60}. frame: of an
+    animated scene."""
+    options = _options(overrides, frame)
     scene = Scene.__new__(Scene)
-    scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), taken, messages))
+    scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
     return scene
 
 

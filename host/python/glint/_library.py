@@ -15,10 +15,12 @@ def structure(name, *fields):
 DeviceInfo = structure("DeviceInfo", ("index", c_uint32), ("compute_units", c_uint32), ("memory_bytes", c_uint64), ("is_gpu", c_int),
                        ("is_cpu", c_int), ("has_double", c_int), ("is_usable", c_int), ("name", c_char * 128),
                        ("platform", c_char * 128), ("driver", c_char * 64))
+SceneOptions = structure("SceneOptions", ("overrides", POINTER(c_char_p)), ("override_count", c_size_t), ("frame", c_double))
 Mesh = structure("Mesh", ("real", c_int), ("vertices", c_void_p), ("normals", c_void_p), ("vertex_count", c_size_t),
                  ("triangles", c_void_p), ("triangle_count", c_size_t))
 RenderSettings = structure("RenderSettings", ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32), ("bounces", c_uint32),
-                           ("precision", c_int), ("lanes", c_uint32), ("progress", Progress), ("context", c_void_p))
+                           ("precision", c_int), ("lanes", c_uint32), ("progress", Progress), ("context", c_void_p),
+                           ("min_contribution", c_double))
 Image = structure("Image", *((name, c_void_p) for name in ("color", "t", "normal", "position", "object", "shadow", "doubt")))
 TraceSettings = structure("TraceSettings", ("precision", c_int), ("lanes", c_uint32))
 Rays = structure("Rays", ("count", c_size_t), ("real", c_int), ("origins", c_void_p), ("directions", c_void_p), ("tmin", c_void_p),
@@ -32,8 +34,8 @@ _FUNCTIONS = {
     "glint_devices_list": (c_int, POINTER(DeviceInfo), c_size_t, POINTER(c_size_t), _MESSAGES),
     "glint_device_open": (c_int, c_char_p, POINTER(c_void_p), _MESSAGES),
     "glint_device_close": (None, c_void_p),
-    "glint_scene_load": (c_int, c_char_p, POINTER(c_void_p), _MESSAGES),
-    "glint_scene_parse": (c_int, c_char_p, c_size_t, c_char_p, POINTER(c_void_p), _MESSAGES),
+    "glint_scene_load": (c_int, c_char_p, POINTER(SceneOptions), POINTER(c_void_p), _MESSAGES),
+    "glint_scene_parse": (c_int, c_char_p, c_size_t, c_char_p, POINTER(SceneOptions), POINTER(c_void_p), _MESSAGES),
     "glint_scene_of_mesh": (c_int, POINTER(Mesh), POINTER(c_void_p), _MESSAGES),
     "glint_scene_free": (None, c_void_p),
     "glint_scene_object_count": (c_size_t, c_void_p),
