@@ -540,11 +540,22 @@ class Test(TestCase):
             "extensions.KHR_lights_punctual.lights[3].type: must be directional, point or spot: not used",
             "nodes[5].extensions.KHR_lights_punctual.light: must be an integer from 0 to 3: not used",
             "cameras[1]: only the first camera is used",
-            "the orthographic camera becomes",
             "lights of 33.9 in total around the center",
         )
         self.assertEqual(report["lights"], 3)
-        self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS"})
+        self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS", "ORTHOGRAPHIC"})
+
+    def test_parallel_rays(self):
+        """The square fills as much of the frame from near and from afar: half of its height, a quarter of its width."""
+        for distance in 3, 4000:
+            gltf = Gltf()
+            gltf.square()
+            gltf.place(camera=gltf.add("cameras", type="orthographic", orthographic={"xmag": 2, "ymag": 1, "znear": 0, "zfar": 1}),
+                       translation=[0.5, 0.5, distance])
+            self.glint(f"render {gltf.write('a.gltf')} --size 64x32 --aov object --quiet -o a.npy")
+            _, _, objects = npy_read("a.object.npy")
+            hit = [i for i, number in enumerate(objects) if number != 0xFFFFFFFF]
+            self.assertEqual(hit, [64 * row + column for row in range(8, 24) for column in range(24, 40)])
 
     def test_formats_look_alike(self):
         """A smooth, textured square of four formats: the same image, with the same camera and lights."""

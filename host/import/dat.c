@@ -242,7 +242,7 @@ static void statement_read(DatReader *reader)
 bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {1, 1, 1}};
-    DatReader reader = {.report = report_open(source, messages), .scene = scene, .bounds = bounds_empty()};
+    DatReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report)) {
         Places places = places_open(source);
         if (!dat_is(dat_peek(&reader), "begin_scene"))
@@ -256,7 +256,6 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block 'camera'");
     }
-    dat_camera_finish(&reader);
     free(reader.textures.items);
     free(reader.slots);
     return scene_finish(scene, &reader.report);

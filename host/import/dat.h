@@ -3,7 +3,6 @@
 
 #include "host/import/line.h"
 #include "host/import/load.h"
-#include "host/scene/bounds.h"
 
 typedef struct {
     Word name;
@@ -16,9 +15,7 @@ typedef struct {
     Line line;
     Scene *scene;
     bool has_resolution, has_camera, is_at_end;
-    bool dims_clear;            // opacity dims what a transparent surface shows, as in VMD
-    double orthographic_height; // of the frame; 0: in perspective
-    Bounds bounds;              // of the points of finite objects
+    bool dims_clear; // opacity dims what a transparent surface shows, as in VMD
     struct {
         DatTexture *items;
         size_t count, capacity;
@@ -63,8 +60,7 @@ bool dat_texture(DatReader *reader, uint32_t *material);
 bool dat_texture_definition(DatReader *reader);
 bool dat_texture_alias(DatReader *reader);
 
-// dat_view.c: statements, and what is known only at the end of the source: how bright lights are at the
-// objects, and where an orthographic camera stands.
+// dat_view.c: statements.
 
 bool dat_resolution(DatReader *reader);
 bool dat_camera(DatReader *reader);
@@ -72,7 +68,6 @@ bool dat_background(DatReader *reader);
 bool dat_light(DatReader *reader);
 bool dat_directional_light(DatReader *reader);
 bool dat_spotlight(DatReader *reader);
-void dat_camera_finish(DatReader *reader);
 
 // dat_objects.c: statements.
 

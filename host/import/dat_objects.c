@@ -8,13 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-static bool point_of_object_read(DatReader *reader, const char *keyword, Vector3 *point)
-{
-    if (!dat_vector(reader, keyword, point)) return false;
-    reader->bounds = bounds_join(reader->bounds, (Bounds){*point, *point});
-    return true;
-}
-
 // Reads the number of things that follow.
 static bool count_read(DatReader *reader, const char *name, unsigned *count)
 {
@@ -37,7 +30,7 @@ bool dat_sphere(DatReader *reader)
 {
     const size_t offset = reader->line.start;
     Object object = {.kind = SHAPE_SPHERE};
-    return point_of_object_read(reader, "center", &object.as.sphere.center) &&
+    return dat_vector(reader, "center", &object.as.sphere.center) &&
            dat_number(reader, "rad", &object.as.sphere.radius) &&
            object_end(reader, object, object.as.sphere.radius, offset);
 }
@@ -67,8 +60,7 @@ bool dat_finite_cylinder(DatReader *reader)
     const size_t offset = reader->line.start;
     Object object = {.kind = SHAPE_CYLINDER, .as.cylinder.finite = true};
     Vector3 apex;
-    if (!point_of_object_read(reader, "base", &object.as.cylinder.from) ||
-        !point_of_object_read(reader, "apex", &apex) ||
+    if (!dat_vector(reader, "base", &object.as.cylinder.from) || !dat_vector(reader, "apex", &apex) ||
         !dat_number(reader, "rad", &object.as.cylinder.radius))
         return false;
     object.as.cylinder.axis = vector_subtract(apex, object.as.cylinder.from);
@@ -98,7 +90,6 @@ bool dat_polycylinder(DatReader *reader)
     for (size_t i = 0; read && radius > 0 && i < points.count; i++) {
         const Vector3 point = points.items[i];
         const Vector3 axis = i > 0 ? vector_subtract(points.items[i - 1], point) : (Vector3){0, 0, 0};
-        reader->bounds = bounds_join(reader->bounds, (Bounds){point, point});
         const Object sphere = {.kind = SHAPE_SPHERE,
                                .material = material,
                                .as.sphere = {point, radius, false}},
@@ -151,7 +142,7 @@ bool dat_ring(DatReader *reader)
     Object object = {.kind = SHAPE_DISC};
     Vector3 center, normal;
     double inner, outer;
-    if (!point_of_object_read(reader, "center", &center) || !dat_vector(reader, "normal", &normal) ||
+    if (!dat_vector(reader, "center", &center) || !dat_vector(reader, "normal", &normal) ||
         !dat_number(reader, "inner", &inner) || !dat_number(reader, "outer", &outer))
         return false;
     object.as.disc.center = center;
@@ -170,7 +161,7 @@ bool dat_box(DatReader *reader)
     const size_t offset = reader->line.start;
     Object object = {.kind = SHAPE_BOX};
     Vector3 a, b;
-    if (!point_of_object_read(reader, "min", &a) || !point_of_object_read(reader, "max", &b)) return false;
+    if (!dat_vector(reader, "min", &a) || !dat_vector(reader, "max", &b)) return false;
     object.as.box.min = vector_min(a, b);
     object.as.box.max = vector_max(a, b);
     return object_end(reader, object, 1, offset);
@@ -180,7 +171,7 @@ static bool vertices_read(DatReader *reader, Object *object)
 {
     static const char *const names[] = {"v0", "v1", "v2"};
     for (int i = 0; i < 3; i++)
-        if (!point_of_object_read(reader, names[i], &object->as.triangle.vertices[i])) return false;
+        if (!dat_vector(reader, names[i], &object->as.triangle.vertices[i])) return false;
     return true;
 }
 
@@ -335,11 +326,8 @@ static bool array_parts_read(DatReader *reader, VertexArray *array)
     if (!array->mesh.vertices || !dat_expect(reader, "normals")) return false;
     array->mesh.normals = vectors_read(reader, "normals", count, false);
     if (!array->mesh.normals) return false;
-    for (unsigned i = 0; i < count; i++) {
-        const Vector3 vertex = array->mesh.vertices[i];
-        reader->bounds = bounds_join(reader->bounds, (Bounds){vertex, vertex});
+    for (unsigned i = 0; i < count; i++)
         array->mesh.normals[i] = vector_normalize(array->mesh.normals[i]);
-    }
     while (!dat_skip(reader, "end_vertexarray")) {
         if (dat_skip(reader, "colors")) {
             free(array->colors);

@@ -24,9 +24,7 @@ static bool projection_read(DatReader *reader)
     if (!dat_skip(reader, "projection")) return true;
     const Word name = dat_word(reader);
     if (dat_is(name, "orthographic")) {
-        reader->orthographic_height = 1;
-        report_warning(&reader->report, name.offset,
-                       "the orthographic projection becomes one in perspective from afar");
+        reader->scene->camera.orthographic = true;
     } else if (dat_is(name, "perspective_dof")) {
         report_warning(&reader->report, name.offset, "depth of field is not shown: all is in focus");
         return dat_number(reader, "focallength", &unused) && dat_number(reader, "aperture", &unused);
@@ -88,7 +86,6 @@ bool dat_camera(DatReader *reader)
     camera->up = block.up;
     camera->field_axis = FIELD_VERTICAL;
     camera->half_tangent = height / 2;
-    if (reader->orthographic_height > 0) reader->orthographic_height = height;
     return true;
 }
 
@@ -157,27 +154,4 @@ bool dat_spotlight(DatReader *reader)
         return false;
     light.penumbra = light.half_angle - fmin(fmax(start, 0), light.half_angle);
     return fading_read(reader, &light) && light_end(reader, light);
-}
-
-static Vector3 objects_center(const DatReader *reader)
-{
-    const Bounds *bounds = &reader->bounds;
-    return bounds_is_empty(bounds) ? reader->scene->camera.look_at : bounds_center(*bounds);
-}
-
-// Moves an orthographic camera so far back that its lines of sight are nearly parallel at the objects. Its
-// frame has the given size at their center.
-void dat_camera_finish(DatReader *reader)
-{
-    const double frames = 256;
-    const double height = reader->orthographic_height;
-    if (height == 0) return;
-    Camera *camera = &reader->scene->camera;
-    const Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position));
-    const Vector3 from_camera = vector_subtract(objects_center(reader), camera->position);
-    const double depth = vector_dot(from_camera, forward);
-    const double distance = fmin(frames * height, NUMBER_MAX);
-    camera->position = vector_add(camera->position, vector_scale(forward, depth - distance));
-    camera->look_at = vector_add(camera->position, vector_scale(forward, distance));
-    camera->half_tangent = height / 2 / distance;
 }

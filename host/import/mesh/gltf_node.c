@@ -177,7 +177,7 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
     MeshView *view = gltf->draft->import->view;
     const GltfItem perspective = gltf_member(camera, "perspective"),
                    flat = gltf_member(camera, "orthographic");
-    double angle = 0, aspect = 0, half_height = 0;
+    double angle = 0, aspect = 0, half_width = 0, half_height = 0;
     if (view->has_camera) {
         gltf_lose(gltf, GLTF_CAMERAS, camera);
         return;
@@ -185,6 +185,7 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
     gltf->is_optional = true;
     const bool is_sound = gltf_numbers(gltf, &perspective, "yfov", 1, &angle) &&
                           gltf_numbers(gltf, &perspective, "aspectRatio", 1, &aspect) &&
+                          gltf_numbers(gltf, &flat, "xmag", 1, &half_width) &&
                           gltf_numbers(gltf, &flat, "ymag", 1, &half_height);
     if (is_sound && !(angle > 0 && angle < M_PI) && !(half_height > 0))
         gltf_fails(gltf, camera, "needs a 'yfov' between 0 and pi or a positive 'ymag'");
@@ -197,7 +198,11 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
                                 .field_axis = FIELD_VERTICAL,
                                 .half_tangent = tan(angle / 2),
                                 .frame_aspect = fmax(aspect, 0)};
-        view->half_height = flat.json ? half_height : 0;
+        if (flat.json) {
+            view->camera.orthographic = true;
+            view->camera.half_tangent = half_height;
+            view->camera.frame_aspect = fmax(half_width / half_height, 0);
+        }
         view->has_camera = true;
     }
     gltf->is_optional = false;

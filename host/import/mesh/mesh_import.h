@@ -12,7 +12,6 @@ typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 typedef struct {
     Camera camera;
     bool has_camera;
-    double half_height; // of the frame of an orthographic camera; else 0
     struct {
         Light *items;
         size_t count, capacity;

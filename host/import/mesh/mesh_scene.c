@@ -125,20 +125,6 @@ static void lights_add(Scene *scene, const MeshView *view, Report *report)
         scene->lights.items[i].color = vector_scale(scene->lights.items[i].color, 1 / sum);
 }
 
-// Sets the file's camera. An orthographic one becomes one in perspective that has the same frame at the
-// center.
-static void camera_set(Scene *scene, const MeshView *view, Vector3 center, Report *report)
-{
-    Camera *camera = &scene->camera;
-    *camera = view->camera;
-    if (view->half_height == 0) return;
-    const Vector3 forward = vector_subtract(camera->look_at, camera->position);
-    const double distance = vector_dot(vector_subtract(center, camera->position), forward);
-    camera->half_tangent = view->half_height / (distance > 0 ? distance : 1);
-    report_warning(report, MESSAGE_WHOLE_FILE,
-                   "the orthographic camera becomes one in perspective with its frame at the center");
-}
-
 static bool camera_is_sound(const Camera *camera)
 {
     return vector_is_within(camera->position, NUMBER_MAX) && vector_is_within(camera->look_at, NUMBER_MAX) &&
@@ -152,9 +138,8 @@ static void scene_show(Scene *scene, const MeshView *view, const char *path, Rep
 {
     const Mesh *mesh = &scene->meshes.items[0];
     const Vector3 center = mesh_center(mesh);
-    if (view->has_camera) camera_set(scene, view, center, report);
-    if (!view->has_camera || !camera_is_sound(&scene->camera))
-        scene->camera = camera_around(mesh, center, upward(path));
+    const bool has_camera = view->has_camera && camera_is_sound(&view->camera);
+    scene->camera = has_camera ? view->camera : camera_around(mesh, center, upward(path));
     scene->background = vector_all(gray);
     lights_add(scene, view, report);
     if (scene->lights.count == 0) lights_around(scene);
