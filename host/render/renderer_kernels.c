@@ -29,9 +29,11 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
 }
 
 // Returns a capacity of at least `count`. There are few different capacities, so that few kernels are built:
-// most scenes get `usual`, which is doubled for the others.
-static uint32_t capacity_for(uint32_t count, uint32_t usual)
+// most scenes get `usual`, which is doubled for the others. A kernel with every feature built in serves many
+// scenes and gets twice as much from the start.
+static uint32_t capacity_for(const Renderer *renderer, uint32_t count, uint32_t usual)
 {
+    if (renderer->settings.extra_features == FEATURE_ALL) usual *= 2;
     while (usual < count)
         usual *= 2;
     return usual;
@@ -41,7 +43,7 @@ static uint32_t capacity_for(uint32_t count, uint32_t usual)
 static uint32_t pending_max(const Renderer *renderer)
 {
     if (!(renderer->report.features & FEATURE_TRANSMISSION)) return 1;
-    return capacity_for(renderer->settings.bounce_count, 8);
+    return capacity_for(renderer, renderer->settings.bounce_count, 8);
 }
 
 static void variant_close(Renderer *renderer, KernelVariant *variant)
@@ -98,7 +100,7 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
     // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
     text_appendf(text, "#define STACK_CAPACITY %u\n",
-                 capacity_for(renderer->compiled.pending_children_max, 40));
+                 capacity_for(renderer, renderer->compiled.pending_children_max, 40));
     text_appendf(text, "#define IS_COUNTING %d\n", settings->counting);
     text_appendf(text, "#define PERTURB %d\n", settings->perturb_seed != 0);
     text_appendf(text, "#define PERTURB_SEED %uu\n", settings->perturb_seed);
