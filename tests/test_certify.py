@@ -148,7 +148,7 @@ class Certify(TestCase):
         self.assertEqual(images[2], images[3])
         self.assertNotIn(images[4], (images[0], images[2]))
         precisions = "strict" + ",certified" * HAS_DOUBLE + ",single" * IS_LONG + ",double" * (IS_LONG and HAS_DOUBLE)
-        options = f"--min-contribution 0.4 --bounces 9 --precision {precisions}"
+        options = f"--min-contribution 0.4 --bounces 8 --precision {precisions}"
         for name, row in self.certify("scene.yaml", options).items():
             wrong = row["wrong_decided"] if name == "certified" else row["wrong"]["path"] + row["wrong"]["color"]
             self.assertEqual(wrong, 0, name)

@@ -41,12 +41,10 @@ class Soft(TestCase):
         """The part of the light that arrives on a floor behind the edge of a wall that ends at x = 0, a tenth of the way up
         to the light, which is far above, at x from -0.2 to 0.2."""
         camera = "camera: {position: [0, 50, 0], look_at: [0, 0, 0], up: [0, 0, 1], height: 0.025}\nlights:\n"
-        floor = "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
-        # seen from above, x grows to the left
-        wall = "  - box: {min: [-1000, 100, -1000], max: [0, 101, 1000]}\n"
-        size, head = (80, 5), f"{camera}  - {light}\n{floor}"
-        under = head + wall
-        return self.row(under, size, options)[::-1], self.row(head, size, options)[::-1]
+        # seen from above, x grows to the left; the second wall casts no shadow there
+        scene = f"{camera}  - {light}\nobjects:\n  - plane: {{point: [0, 0, 0], normal: [0, 1, 0]}}\n"
+        walls = (f"  - box: {{min: [{left - 1000}, 100, -1000], max: [{left}, 101, 1000]}}\n" for left in (0, -9000))
+        return [self.row(scene + wall, (80, 5), options)[::-1] for wall in walls]
 
     def test_shadows(self):
         """The penumbra of each light: as the part of its area beyond the edge."""
