@@ -17,6 +17,7 @@
     FEATURE(SKY, )                \
     FEATURE(CHECKERS, )           \
     FEATURE(IMAGES, )             \
+    FEATURE(CUTOUTS, )            \
     FEATURE(REFLECTION, )         \
     FEATURE(TRANSMISSION, )       \
     FEATURE(TINTS, )              \

@@ -272,6 +272,9 @@ typedef struct {
     uint4 optical_depth, optical_depth_green, optical_depth_blue;
     // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_… along u and v
     uint4 texture;
+    // x: 1 + the index of the first level of the texture whose alpha decides where rays pass, or 0; y: the
+    // bits of the least alpha that stops them, as a float; z, w: WRAP_… along u and v
+    uint4 cutout;
 } Material;
 
 // How a texture extends beyond its edges.
@@ -283,7 +286,7 @@ typedef struct {
 } TextureLevel;
 
 typedef struct {
-    uint4 color; // xyz: the bits of red, green and blue as floats
+    uint4 color; // the bits of red, green, blue and, in first levels, alpha as floats
 } Texel;
 
 enum { OPAQUE = 0x7fffffff };     // in optical_depth.x: no light passes

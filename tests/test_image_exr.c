@@ -243,7 +243,7 @@ static void test_alpha_is_noticed(void **state)
         Image image;
         assert_true(layer_read(&image, files[i].layer, &messages));
         assert_int_equal(messages.count, 0);
-        if (image.has_alpha != files[i].expected) fail_msg("%s", files[i].names);
+        if (!image.alpha == files[i].expected) fail_msg("%s", files[i].names);
         image_free(&image);
     }
 }

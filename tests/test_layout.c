@@ -96,6 +96,7 @@ typedef struct {
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_green)        \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_blue)         \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, cutout)                       \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \

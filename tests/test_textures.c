@@ -1,5 +1,6 @@
 // Textures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
+#include "host/compile/compile.h"
 #include "host/image/image.h"
 #include "tests/files.h"
 #include "tests/film.h"
@@ -330,13 +331,13 @@ static void mirrors_filter_textures(void **state)
                mean[0], mean[1], mean[2]);
 }
 
-static void every_build_gives_the_same_bits(void **state)
+static void check_builds(const char *path)
 {
-    (void)state;
-    Scene scene = scene_of_file("scenes/globe.yaml");
+    Scene scene = scene_of_file(path);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         RenderSettings settings = film_settings(71, 41, precision);
         settings.lanes = 1;
+        settings.instances = INSTANCES_SHARED;
         Film expected = film_render(&probe_compute, &scene, &settings, 0);
         assert_int_equal(film_count_faulty(&expected), 0);
         const uint32_t *tested = tested_lanes(probe_compute.device);
@@ -348,9 +349,74 @@ static void every_build_gives_the_same_bits(void **state)
             film_assert_same(&film, &expected, precision_names[precision]);
             film_free(&film);
         }
+        settings.bvh = BVH_OFF;
+        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        film_assert_same(&film, &expected, "without a BVH");
+        film_free(&film);
         film_free(&expected);
     }
     scene_free(&scene);
+}
+
+static void every_build_gives_the_same_bits(void **state)
+{
+    (void)state;
+    check_builds("scenes/globe.yaml");
+}
+
+static void every_build_has_the_same_holes(void **state)
+{
+    (void)state;
+    check_builds("tests/scenes/cutouts.yaml");
+}
+
+// Instances that share a mesh have the holes of copies, but for pixels whose ray is at an edge.
+static void instances_have_the_holes_of_copies(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_file("tests/scenes/cutouts.yaml");
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_STRICT);
+    Film films[2];
+    for (size_t i = 0; i < 2; i++) {
+        settings.instances = i == 0 ? INSTANCES_SHARED : INSTANCES_COPIED;
+        films[i] = film_render(&probe_compute, &scene, &settings, AOV_OBJECT | AOV_SHADOW);
+    }
+    const size_t count = (size_t)WIDTH * HEIGHT, first_id = 12; // the first instance's
+    size_t objects = 0, shadows = 0, seen = 0;
+    for (size_t i = 0; i < count; i++) {
+        seen += films[0].object[i] != UINT32_MAX && films[0].object[i] >= first_id;
+        objects += films[0].object[i] != films[1].object[i];
+        for (size_t light = 0; light < 2; light++)
+            shadows += films[0].shadow[2 * i + light] != films[1].shadow[2 * i + light];
+    }
+    if (objects > count / 500 || shadows > count / 100 || seen < count / 60)
+        fail_msg("%zu objects and %zu shadows differ, %zu pixels show instances", objects, shadows, seen);
+    film_free(&films[0]);
+    film_free(&films[1]);
+    scene_free(&scene);
+}
+
+// Kernels have cutouts only if a pixel is transparent.
+static void opaque_images_cut_nothing(void **state)
+{
+    (void)state;
+    static const char *const images[] = {"scenes/images/globe.png", "tests/textures/leaf.png"};
+    for (size_t i = 0; i < 2; i++) {
+        Text text = {0};
+        text_appendf(&text, "camera: {%s}\nobjects: [{%s material: {image: %s, cutout: 0.5}}}]\n",
+                     FROM(0, 0, 5), BALL, images[i]);
+        Scene scene = scene_of_text("s.yaml", text_c(&text));
+        text_free(&text);
+        const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .lanes = 1};
+        CompiledScene compiled;
+        MessageList messages = {0};
+        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+        assert_int_equal((compiled.features & FEATURE_CUTOUTS) != 0, i == 1);
+        assert_int_equal(messages.count, i == 0);
+        message_list_free(&messages);
+        compiled_scene_free(&compiled);
+        scene_free(&scene);
+    }
 }
 
 static void jpeg_is_read(void **state)
@@ -408,6 +474,9 @@ static void scene_faults_are_reported(void **state)
     assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n", "4:6: error: material lacks 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
                     "4:27: error: 'size' must be greater than 0\n");
+    assert_messages("s.yaml", MATERIALS "  a: {image: a.png, cutout: 50}\n",
+                    "4:29: error: 'cutout' must be from 0 to 1\n");
+    assert_messages("s.yaml", MATERIALS "  a: {cutout: 0.5}\n", "4:6: error: material lacks 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: [1, 2]}\n",
                     "4:14: error: 'image' must be the name of a file, not a list of 2\n");
     assert_messages("s.yaml",
@@ -480,6 +549,9 @@ int main(void)
         cmocka_unit_test(between_levels_it_blends),
         cmocka_unit_test(mirrors_filter_textures),
         cmocka_unit_test(every_build_gives_the_same_bits),
+        cmocka_unit_test(every_build_has_the_same_holes),
+        cmocka_unit_test(opaque_images_cut_nothing),
+        cmocka_unit_test(instances_have_the_holes_of_copies),
         cmocka_unit_test(jpeg_is_read),
         cmocka_unit_test(scene_faults_are_reported),
         cmocka_unit_test(texture_faults_are_reported),

@@ -55,7 +55,7 @@ static void scene_has_every_feature(void **state)
     (void)state;
     // test_textures has textures, which a mirror image would have to mirror, test_instances instances
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
-                         FEATURE_INSTANCES | SAMPLED_FEATURES,
+                         FEATURE_CUTOUTS | FEATURE_INSTANCES | SAMPLED_FEATURES,
                      FEATURE_ALL);
     assert_int_equal(features_of(&sampled) & SAMPLED_FEATURES, FEATURE_AREA_LIGHTS | FEATURE_LENS);
 }
@@ -180,6 +180,14 @@ static const struct {
                                                   "  material: {image: scenes/images/globe.png}}}]\n"},
     {FEATURE_TRIANGLES | FEATURE_IMAGES, SCENE_HEAD "objects: [{mesh: {file: tests/textures/quad.obj,\n"
                                                     "  material: {image: scenes/images/globe.png}}}]\n"},
+    {FEATURE_TRIANGLES | FEATURE_IMAGES | FEATURE_CUTOUTS | FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD
+     "lights: [{directional: {direction: [0.2, -0.1, 1]}}]\n"
+     "materials: {leaf: {image: tests/textures/leaf.png, cutout: 0.5}}\n"
+     "objects: [{mesh: {file: tests/textures/quad.obj, material: leaf}},\n"
+     "  {mesh: {file: tests/textures/quad.obj, material: leaf, transform: {translate: [0.5, 0, 1]}}}]\n"},
+    {FEATURE_SPHERES | FEATURE_IMAGES | FEATURE_CUTOUTS,
+     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
+                "  material: {image: tests/textures/leaf.png, cutout: 0.5}}}]\n"},
     // where tests are long
     {FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n"},
     {FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n"},

@@ -23,7 +23,8 @@ static FeatureSet material_features(const Material *material)
 {
     FeatureSet set = 0;
     if (material->checker) set |= FEATURE_CHECKERS;
-    if (material->texture) set |= FEATURE_IMAGES;
+    if (material_any_texture(material)) set |= FEATURE_IMAGES;
+    if (material->cutout > 0) set |= FEATURE_CUTOUTS;
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
     // which includes reflected rays: total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;

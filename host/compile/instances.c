@@ -134,8 +134,8 @@ static uint32_t shared_mesh_find(Planning *planning, const Object *object)
     InstancePlan *plan = planning->plan;
     const Scene *scene = planning->scene;
     const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
-    const bool is_separate =
-        object->as.mesh.has_own_material && mesh->uvs && scene->materials.items[object->material].texture > 0;
+    const bool is_separate = object->as.mesh.has_own_material && mesh->uvs &&
+                             material_any_texture(&scene->materials.items[object->material]) > 0;
     const uint32_t material = is_separate ? 1 + object->material : 0;
     uint32_t *link = &planning->first[object->as.mesh.index];
     while (*link > 0) {

@@ -112,6 +112,15 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
     return true;
 }
 
+bool cutouts_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                 MessageList *messages)
+{
+    if (!settings->certifies || !(features_of(scene) & FEATURE_CUTOUTS) || !textures_cut(compiled, scene))
+        return true;
+    return message_error(messages, "a material has a cutout, which has no error bound: choose a precision "
+                                   "other than certified");
+}
+
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages)
 {

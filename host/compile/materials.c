@@ -2,6 +2,7 @@
 #include "host/scene/portable.h"
 
 #include <float.h>
+#include <string.h>
 
 _Static_assert((int)WRAP_CLAMPED == TEXTURE_CLAMPED && (int)WRAP_MIRRORED == TEXTURE_MIRRORED,
                "the kernels' values are the scene's");
@@ -40,6 +41,17 @@ static scalar4 conductor_imaginary_squared(const Material *material)
     return scalar4_of(vector_multiply(root, root), 0);
 }
 
+static uint4 cutout_of(const CompiledScene *compiled, const Material *material)
+{
+    const CompiledTexture *texture =
+        material->cutout_texture > 0 ? &compiled->textures[material->cutout_texture - 1] : NULL;
+    if (!texture || !texture->has_alpha || material->cutout == 0) return (uint4){0, 0, 0, 0};
+    const float least = (float)material->cutout;
+    uint4 cutout = {1 + texture->first_level, 0, material->texture_wrap[0], material->texture_wrap[1]};
+    memcpy(&cutout.y, &least, sizeof least);
+    return cutout;
+}
+
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
     flat_array_renew(compiled, FLAT_MATERIALS, scene->materials.count);
@@ -72,6 +84,7 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
         if (material->checker) // the remainders are exact, quotients far from the origin are not
             materials[i].grid = (scalar4){fmod(eye.x, 2 * size) / size, fmod(eye.y, 2 * size) / size,
                                           fmod(eye.z, 2 * size) / size, 1 / size};
+        materials[i].cutout = cutout_of(compiled, material);
         if (material->texture == 0) continue;
         const CompiledTexture *texture = &compiled->textures[material->texture - 1];
         materials[i].texture = (uint4){1 + texture->first_level, texture->level_count,

@@ -31,6 +31,13 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
 bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                    MessageList *messages);
 
+// textures.c: whether a texture of a material with holes has pixels that are not opaque.
+bool textures_cut(const CompiledScene *compiled, const Scene *scene);
+
+// limits.c: false with a message if surfaces have holes at `certified`.
+bool cutouts_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
+                 MessageList *messages);
+
 // objects.c, materials.c, lights.c: the arrays of each shape, FLAT_TRIANGLE_NORMALS, FLAT_TRIANGLE_UVS,
 // FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS.
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);

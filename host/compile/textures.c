@@ -17,6 +17,7 @@ enum { SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 typedef struct {
     uint32_t width, height;
     float (*colors)[3];
+    float *alpha; // of each texel in the first level of a texture with transparent ones; else NULL
 } Level;
 
 typedef struct {
@@ -29,13 +30,15 @@ typedef struct {
 
 static Level level_open(uint32_t width, uint32_t height)
 {
-    return (Level){width, height, memory_allocate((size_t)width * height, sizeof(float[3]))};
+    return (Level){width, height, memory_allocate((size_t)width * height, sizeof(float[3])), NULL};
 }
 
 static void levels_free(LevelList *list)
 {
-    for (size_t i = 0; i < list->levels.count; i++)
+    for (size_t i = 0; i < list->levels.count; i++) {
         free(list->levels.items[i].colors);
+        free(list->levels.items[i].alpha);
+    }
     free(list->levels.items);
 }
 
@@ -105,13 +108,15 @@ static bool level_fill(Level *level, const Image *image, bool decodes)
     return true;
 }
 
-// What is wrong with the image, or NULL.
-static const char *levels_add(LevelList *list, const Image *image, bool as_displayed)
+// Moves the image's alpha to the first level. Returns what is wrong with the image, or NULL.
+static const char *levels_add(LevelList *list, Image *image, bool as_displayed)
 {
     if (image->width > SIDE_MAX || image->height > SIDE_MAX) return "a side of more than 65536 texels";
     if ((size_t)image->width * image->height > TEXELS_MAX - list->texel_count)
         return "too many texels in all textures";
     Level level = level_open(image->width, image->height);
+    level.alpha = image->alpha;
+    image->alpha = NULL;
     array_push(list->levels, level);
     if (!level_fill(&level, image, image->display && !as_displayed)) return "a color is not finite";
     list->texel_count += (size_t)level.width * level.height;
@@ -121,6 +126,19 @@ static const char *levels_add(LevelList *list, const Image *image, bool as_displ
         list->texel_count += (size_t)level.width * level.height;
     }
     return list->texel_count > TEXELS_MAX ? "too many texels in all textures" : NULL;
+}
+
+// Sets the alpha of an opaque image to the luminance of its values, as they are stored.
+static void alpha_by_luminance(Image *image)
+{
+    const size_t count = (size_t)image->width * image->height;
+    image->alpha = memory_allocate(count, sizeof *image->alpha);
+    for (size_t i = 0; i < count; i++) {
+        const float *value = image->values + i * image->channels;
+        const float luminance =
+            image->channels < 3 ? value[0] : 0.2126F * value[0] + 0.7152F * value[1] + 0.0722F * value[2];
+        image->alpha[i] = luminance < 1 ? fmaxf(luminance, 0) : 1;
+    }
 }
 
 static bool texture_read(Image *image, const SceneTexture *texture, MessageList *messages)
@@ -159,28 +177,65 @@ static Color sky_mean(const Level *level)
     return mean;
 }
 
+// Sets which textures cut out parts of surfaces.
+static void cutouts_find(CompiledTexture *textures, const Scene *scene)
+{
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *material = &scene->materials.items[i];
+        if (material->cutout > 0 && material->cutout_texture > 0)
+            textures[material->cutout_texture - 1].cuts = true;
+    }
+}
+
+// Returns whether a texel is neither transparent nor opaque.
+static bool level_is_translucent(const Level *level)
+{
+    const size_t count = level->alpha ? (size_t)level->width * level->height : 0;
+    for (size_t i = 0; i < count; i++)
+        if (level->alpha[i] > 0 && level->alpha[i] < 1) return true;
+    return false;
+}
+
+// Warns of alpha that is not shown, and of a cutout by an opaque image.
+static void alpha_check(const Scene *scene, const SceneTexture *texture, const Level *level, bool cuts,
+                        MessageList *messages)
+{
+    const Source source = scene_source(scene);
+    const char *what = NULL;
+    if (cuts && texture->alpha_blends && level_is_translucent(level))
+        what = "does not blend: below 0.5 the surface is cut out, elsewhere it is opaque";
+    if (!texture->ignores_alpha && level->alpha && !cuts)
+        what = "is ignored: its transparent parts are opaque";
+    if (!texture->ignores_alpha && !level->alpha && cuts) what = "is 1 everywhere: nothing is cut out";
+    if (what)
+        message_add_at(messages, MESSAGE_WARNING, &source, texture->offset, "the alpha of '%s' %s",
+                       texture->path, what);
+}
+
 static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
                         const SceneTexture *scene_texture, MessageList *messages)
 {
     const uint32_t first_level = (uint32_t)list->levels.count;
     const Source source = scene_source(scene);
-    Image image;
+    Image image = {0};
     MessageList problems = {0};
     bool done = texture_read(&image, scene_texture, &problems);
     if (done) {
+        if (!image.alpha && scene_texture->alpha_by_luminance) alpha_by_luminance(&image);
         const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
         done = !problem;
-        if (done)
-            *texture = (CompiledTexture){image.width,
-                                         image.height,
-                                         first_level,
-                                         (uint32_t)list->levels.count - first_level,
-                                         largest_texel(&list->levels.items[first_level]),
-                                         sky_mean(&list->levels.items[first_level])};
-        if (done && image.has_alpha && !scene_texture->ignores_alpha)
-            message_add_at(messages, MESSAGE_WARNING, &source, scene_texture->offset,
-                           "the alpha of '%s' is ignored: its transparent parts are opaque",
-                           scene_texture->path);
+        if (done) {
+            const Level *first = &list->levels.items[first_level];
+            *texture = (CompiledTexture){.width = first->width,
+                                         .height = first->height,
+                                         .first_level = first_level,
+                                         .level_count = (uint32_t)list->levels.count - first_level,
+                                         .cuts = texture->cuts,
+                                         .has_alpha = first->alpha != NULL,
+                                         .largest_texel = largest_texel(first),
+                                         .sky_mean = sky_mean(first)};
+            alpha_check(scene, scene_texture, first, texture->cuts, messages);
+        }
         image_free(&image);
         if (problem)
             message_add_at(messages, MESSAGE_ERROR, &source, scene_texture->offset, "cannot use '%s': %s",
@@ -193,14 +248,23 @@ static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *
     return done;
 }
 
+bool textures_cut(const CompiledScene *compiled, const Scene *scene)
+{
+    for (size_t i = 0; i < scene->textures.count; i++)
+        if (compiled->textures[i].cuts && compiled->textures[i].has_alpha) return true;
+    return false;
+}
+
 static void texels_flatten(CompiledScene *compiled, const LevelList *list)
 {
     flat_array_renew(compiled, FLAT_TEXELS, list->texel_count);
     Texel *texel = compiled->arrays[FLAT_TEXELS].items;
     for (size_t i = 0; i < list->levels.count; i++) {
         const Level *level = &list->levels.items[i];
-        for (size_t k = 0; k < (size_t)level->width * level->height; k++)
-            memcpy(&texel++->color, level->colors[k], sizeof level->colors[k]);
+        for (size_t k = 0; k < (size_t)level->width * level->height; k++, texel++) {
+            memcpy(&texel->color, level->colors[k], sizeof level->colors[k]);
+            if (level->alpha) memcpy(&texel->color.w, &level->alpha[k], sizeof level->alpha[k]);
+        }
     }
 }
 
@@ -234,6 +298,7 @@ bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSet
         return true;
     }
     bool done = true;
+    cutouts_find(compiled->textures, scene);
     for (size_t i = 0; i < scene->textures.count && done; i++) {
         stage_begin(settings->stage, "reading", scene->textures.items[i].path, 0);
         done = texture_add(&list, &compiled->textures[i], scene, &scene->textures.items[i], messages);

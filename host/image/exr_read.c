@@ -246,13 +246,26 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
     }
 }
 
-static bool is_transparent(const ExrReader *reader)
+// Sets the alpha of an image with transparent pixels. Those without a value are opaque.
+static void alpha_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
-    const Plane *alpha = &reader->planes[reader->layer.channel_count];
-    const size_t count = reader->layer.has_alpha ? (size_t)alpha->width * alpha->height : 0;
-    for (size_t i = 0; i < count; i++)
-        if (alpha->values[i] < 1) return true;
-    return false;
+    const Plane *plane = &reader->planes[reader->layer.channel_count];
+    const size_t count = reader->layer.has_alpha ? (size_t)width * height : 0;
+    size_t opaque_count = 0;
+    while (opaque_count < count && !(plane->values[opaque_count] < 1))
+        opaque_count++;
+    if (opaque_count == count) return;
+    const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
+    const int64_t top = (int64_t)reader->display.min.y - reader->window.min.y;
+    image->alpha = memory_allocate_zeroed((size_t)image->width * image->height, sizeof *image->alpha);
+    for (uint32_t y = 0; y < image->height; y++) {
+        for (uint32_t x = 0; x < image->width; x++) {
+            if (x + left < 0 || x + left >= width || y + top < 0 || y + top >= height) continue;
+            float *alpha = image->alpha + (size_t)y * image->width + x;
+            plane_sample(plane, (uint32_t)(x + left), (uint32_t)(y + top), alpha);
+            *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1;
+        }
+    }
 }
 
 static void primaries_check(const ExrReader *reader)
@@ -301,7 +314,7 @@ static bool exr_pixels(ExrReader *reader, Image *image)
     if (done) {
         image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
         image_fill(reader, image, store.width, store.height);
-        image->has_alpha = is_transparent(reader);
+        alpha_fill(reader, image, store.width, store.height);
         if (reader->planes[0].is_integer) integers_widen(image);
         if (!image->data) primaries_check(reader);
     }

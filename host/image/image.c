@@ -263,6 +263,7 @@ double image_value(const Image *image, size_t i)
 void image_free(Image *image)
 {
     free(image->values);
+    free(image->alpha);
     free(image->doubles);
     *image = (Image){0};
 }

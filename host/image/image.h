@@ -78,9 +78,9 @@ uint32_t image_quantize(float value, Transfer transfer, unsigned bits);
 typedef struct {
     uint32_t width, height, channels;
     float *values;
+    float *alpha; // PNG, EXR: of each pixel, which its values do not show; NULL: all are opaque
     Transfer transfer;
     bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
-    bool has_alpha;  // PNG, EXR: a pixel is transparent, which its values do not show
     bool data;       // no light: NPY of other than 3 channels, EXR without colors or luminance
     bool integers;   // NPY of <u4 or |u1, such as numbers of objects
     double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL

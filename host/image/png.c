@@ -191,13 +191,17 @@ static void png_values(const PngReader *reader, Image *image)
     const uint8_t *bytes = reader->state.bytes;
     const bool is_wide = png_get_bit_depth(reader->state.png, reader->state.info) == 16;
     const unsigned largest = is_wide ? UINT16_MAX : UINT8_MAX;
+    bool is_transparent = false;
     for (size_t i = 0; i < count; i++) {
         for (size_t channel = 0; channel < channels; channel++)
             image->values[i * channels + channel] =
                 (float)png_sample(bytes, i * samples + channel, is_wide) / (float)largest;
-        image->has_alpha |=
-            samples > channels && png_sample(bytes, i * samples + channels, is_wide) < largest;
+        is_transparent |= samples > channels && png_sample(bytes, i * samples + channels, is_wide) < largest;
     }
+    if (!is_transparent) return;
+    image->alpha = memory_allocate(count, sizeof *image->alpha);
+    for (size_t i = 0; i < count; i++)
+        image->alpha[i] = (float)png_sample(bytes, i * samples + channels, is_wide) / (float)largest;
 }
 
 static bool png_read_all(PngReader *reader, Image *image)

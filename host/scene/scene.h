@@ -89,15 +89,28 @@ typedef struct {
     uint32_t texture;            // in place of color: 1 + index into the scene's textures; 0: none
     double texture_size;         // width of a texture on a plane or disc, > 0, in scene units
     TextureWrap texture_wrap[2]; // along u and v, on a mesh
+    uint32_t cutout_texture;     // the surface is not there where the alpha of this texture is below `cutout`
+    double cutout;               // 0: it is everywhere
 } Material;
+
+// Returns the texture whose place on a surface is that of all textures of its material, or 0.
+static inline uint32_t material_any_texture(const Material *material)
+{
+    return material->texture > 0 ? material->texture : material->cutout_texture;
+}
+
+// The cutout for images by whose alpha other programs blend.
+#define CUTOUT_OF_BLENDED 0.5
 
 // A texture's image; scene_compile decodes it.
 typedef struct {
-    char *path;         // of the image's file; where it has `bytes`, only for messages
-    char *layer;        // of an EXR file; NULL: its default layer, or its only one with colors
-    size_t offset;      // of its name in the scene's text
-    Text bytes;         // of an image within another file; else empty
-    bool ignores_alpha; // its format defines its alpha as ignored, or its reader has reported the loss
+    char *path;              // of the image's file; where it has `bytes`, only for messages
+    char *layer;             // of an EXR file; NULL: its default layer, or its only one with colors
+    size_t offset;           // of its name in the scene's text
+    Text bytes;              // of an image within another file; else empty
+    bool ignores_alpha;      // its format defines its alpha as ignored, or its reader has reported the loss
+    bool alpha_by_luminance; // where all pixels are opaque, the luminance is the alpha
+    bool alpha_blends;       // its format blends by its alpha, which glint uses for a cutout
 } SceneTexture;
 
 // Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),

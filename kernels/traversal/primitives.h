@@ -10,7 +10,7 @@
 #include "shapes/torus.h"
 #include "shapes/triangle.h"
 #include "traversal/cull_sphere.h"
-#include "traversal/query.h"
+#include "traversal/cutout.h"
 
 // Prefetches what shading reads of the closest hit.
 static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
@@ -52,6 +52,20 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
         real t = ray->tmax;                                                                                  \
         mask found = name##_hit(&shape, ray, &t);                                                            \
         if (!lanes_any(found)) return false;                                                                 \
+        if (HAS_CUTOUTS) {                                                                                   \
+            const mask cut = traversal_cut(traversal, scene, ray, shape.id.x, &found, t);                    \
+            if (KIND_##feature == KIND_SPHERES && lanes_any(cut)) { /* the far side may be hit */            \
+                Ray behind = *ray;                                                                           \
+                behind.active = cut;                                                                         \
+                behind.tmin = lanes_select(cut, t, ray->tmin);                                               \
+                real far_t = ray->tmax;                                                                      \
+                mask far_found = name##_hit(&shape, &behind, &far_t);                                        \
+                traversal_cut(traversal, scene, ray, shape.id.x, &far_found, far_t);                         \
+                t = lanes_select(far_found, far_t, t);                                                       \
+                found = found | far_found;                                                                   \
+            }                                                                                                \
+            if (!lanes_any(found)) return false;                                                             \
+        }                                                                                                    \
         traversal_record(traversal, scene, found, t, shape.id.x);                                            \
         if (traversal->query != OCCLUSION) object_prefetch(scene, KIND_##feature, shape.id);                 \
         return true;                                                                                         \

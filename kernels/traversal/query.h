@@ -38,14 +38,20 @@ typedef struct {
 #define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
 
-// Returns the index of an object's material. In an instance ids are those of its mesh, from 0 on.
+// Returns an object's kind_index_material. In an instance ids are those of its mesh, from 0 on.
+static inline uint4 object_entry(const Traversal *traversal, const Scene *scene, uint id)
+{
+    if (!HAS_INSTANCES) return scene->objects[id].kind_index_material;
+    if (traversal->within.is_instance)
+        return range_entry(scene, &traversal->within, traversal->within.first + id);
+    const ObjectRange range = object_range(scene, id);
+    return range_entry(scene, &range, id);
+}
+
+// Returns the index of an object's material.
 static inline uint object_material(const Traversal *traversal, const Scene *scene, uint id)
 {
-    if (!HAS_INSTANCES) return scene->objects[id].kind_index_material.z;
-    if (traversal->within.is_instance)
-        return range_entry(scene, &traversal->within, traversal->within.first + id).z;
-    const ObjectRange range = object_range(scene, id);
-    return range_entry(scene, &range, id).z;
+    return object_entry(traversal, scene, id).z;
 }
 
 static inline integer optical_depth_steps(uint4 steps)

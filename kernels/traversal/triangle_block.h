@@ -29,7 +29,7 @@ typedef struct {
 // Whether shadow rays that certainly miss a triangle's plane, and those that certainly hit it, need no full
 // test.
 #define BLOCKS_TEST_SIDES (!IS_CERTIFIED)
-#define BLOCKS_OCCLUDE    (BLOCKS_TEST_SIDES && !HAS_TRANSMISSION)
+#define BLOCKS_OCCLUDE    (BLOCKS_TEST_SIDES && !HAS_TRANSMISSION && !HAS_CUTOUTS)
 
 // Each component within 2 u of the product of the lengths.
 static inline Vector block_cross(Vector a, Vector b)

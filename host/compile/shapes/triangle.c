@@ -138,7 +138,7 @@ static uint32_t normals_add(Flattening *flattening, Vector3 a, Vector3 b, Vector
 static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const MeshTriangle *triangle,
                         const uint32_t *corners, uint32_t material)
 {
-    uint32_t texture = flattening->scene->materials.items[material].texture;
+    const uint32_t texture = material_any_texture(&flattening->scene->materials.items[material]);
     if (!mesh->uvs || texture == 0) return 0;
     TriangleUvs *uvs = flattening->compiled->arrays[FLAT_TRIANGLE_UVS].items;
     uvs[flattening->uvs_count++] =

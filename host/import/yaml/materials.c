@@ -220,6 +220,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"checker", read_checker, 0, FORM_SECOND, OPTIONAL, NULL},
         {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED, NULL},
         {"size", read_number, offsetof(Material, texture_size), FORM_THIRD, OPTIONAL, &range_positive},
+        {"cutout", read_number, offsetof(Material, cutout), FORM_THIRD, OPTIONAL, &range_unit},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
         {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
         {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
@@ -242,6 +243,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     }
     const bool is_read =
         node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
+    if (material.cutout > 0) material.cutout_texture = material.texture;
     if (conductor != node && (material.fresnel || material.transmission > 0))
         report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
                      material.fresnel ? "fresnel" : "transmission");

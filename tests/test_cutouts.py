@@ -1,0 +1,168 @@
+#!/usr/bin/env -S python3 -B
+"""Cutouts: rays pass where the alpha of an image is low, for camera rays, shadows, mirrors and explicit rays, as if the holes
+were cut into the shape."""
+import math
+import struct
+import zlib
+
+from glint import IS_LONG, TestCase, csv_rows, main, need_device, npy_read, write
+
+HAS_DOUBLE = need_device()["fp64"]
+PRECISIONS = ["single", "strict"] + ["double"] * HAS_DOUBLE
+QUAD = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+HOLE, TEXELS = 0.6, 64  # the hole's radius on the quad, whose side is 2
+
+
+def png(path, alphas, color=6):
+    """An 8-bit image of one color with an alpha for each pixel, or a gray image of these values."""
+    pixel = (lambda a: bytes([200, 100, 50, round(255 * a)])) if color == 6 else (lambda a: bytes([round(255 * a)]))
+    raw = b"".join(b"\0" + b"".join(map(pixel, row)) for row in alphas)
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", len(alphas[0]), len(alphas), 8, color, 0, 0, 0)),
+        (b"IDAT", zlib.compress(raw)),
+        (b"IEND", b""),
+    )
+    with open(path, "wb") as file:
+        file.write(b"\x89PNG\r\n\x1a\n")
+        for kind, body in chunks:
+            file.write(struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)))
+    return path
+
+
+def hole_png(path, color=6):
+    """Between texels alpha is linear, so the edge at 0.5 is the circle within a fraction of a texel."""
+    places = [(i + 0.5) / TEXELS * 2 - 1 for i in range(TEXELS)]
+    return png(path, [[min(max(0.5 + (math.hypot(x, y) - HOLE) * 8, 0), 1) for x in places] for y in places], color)
+
+
+HALF = [[0, 0, 1, 1]]  # the left half is cut out
+
+
+class Cutouts(TestCase):
+    def setUp(self):
+        super().setUp()
+        write("quad.obj", QUAD)
+        hole_png("hole.png")
+        png("half.png", HALF)
+
+    def layers(self, scene, options, *names):
+        self.glint(f"render {scene} -o a.npy --quiet {options} --aov {','.join(names)}")
+        return [npy_read(f"a.{name}.npy")[2] for name in names]
+
+    def hits(self, scene, rays, options=""):
+        """The object and t of each ray (origin, direction), or None."""
+        write("rays.txt", "".join(" ".join(map(str, [*origin, *direction])) + "\n" for origin, direction in rays))
+        head, rows = csv_rows(self.glint(f"trace {scene} --rays rays.txt {options}").stdout)
+        return [None if row[head.index("object")] is None else (row[head.index("object")], row[head.index("t")]) for row in rows]
+
+    def test_a_hole_lets_light_through(self):
+        """Each place on the floor is in shadow if its line to a light crosses the square outside of the hole."""
+        write(
+            "scene.yaml",
+            "camera: {position: [0, 1.7, -5], look_at: [0.2, 0, 0], fov: 40}\n"
+            "lights: [{point: {position: [0.4, 5, 0.3]}}, {directional: {direction: [0.3, -1, 0.2]}},\n"
+            "  {spot: {position: [-1, 4, 0], look_at: [0, 2, 0], angle: 80}}]\n"
+            "objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}},\n"
+            "  {mesh: {file: quad.obj, material: {image: hole.png, cutout: 0.5}, transform: [{rotate: [-90, 0, 0]}, {translate: [0, 2, 0]}]}}]\n",
+        )
+        lanes = [1, 4, 8, 16] if IS_LONG else [1, 16]
+        for options in [f"--precision {p}" for p in PRECISIONS] + [f"--lanes {lane}" for lane in lanes]:
+            objects, positions, shadows = self.layers("scene.yaml", f"--size 96x64 {options}", "object", "position", "shadow")
+            counts = [[0, 0, 0] for _ in range(3)]
+            for seen, (x, y, z), shadow in zip(objects, positions, shadows):
+                if seen != 0:
+                    continue
+                for light, ((lx, ly, lz), is_shadowed) in enumerate(zip([(0.4, 5, 0.3), (x - 0.3e6, 1e6, z - 0.2e6), (-1, 4, 0)], shadow)):
+                    part = (2 - y) / (ly - y)
+                    cx, cz = x + part * (lx - x), z + part * (lz - z)
+                    outside, radius = max(abs(cx), abs(cz)), math.hypot(cx, cz)
+                    if abs(outside - 1) < 0.01 or abs(radius - HOLE) < 1 / TEXELS or (light == 2 and is_shadowed and outside > 1):
+                        continue
+                    place = 0 if outside > 1 else 1 if radius > HOLE else 2
+                    counts[light][place] += 1
+                    self.assertEqual(is_shadowed, int(place == 1), f"{options}: light {light} at {x}, {z}")
+            for light in counts:
+                self.assertGreater(min(light), 50, f"{options}: {counts}")
+
+    def test_layers_next_to_each_other(self):
+        """Behind a hole the very next layer is seen, a millionth behind or in the same place, and behind two holes the third."""
+        layer = "  - mesh: {{file: quad.obj, material: {{image: {}.png, cutout: 0.5}}, transform: {{translate: [0, 0, {}]}}}}\n"
+        png("right.png", [[1, 1, 0, 0]])
+        png("top.png", [[1], [1], [0], [0]])
+        for gap in 1e-6, 0:
+            layers = [layer.format(name, 1 + i * gap) for i, name in enumerate(["half", "top", "right"])]
+            write("scene.yaml", "camera: {position: [0, 0, -1], look_at: [0, 0, 0]}\nobjects:\n" + "".join(layers))
+            for precision in PRECISIONS:
+                places = [(x, y) for x in (-0.7, 0.7) for y in (-0.7, 0.7)]
+                hits = self.hits("scene.yaml", [((x, y, 0), (0, 0, 1)) for x, y in places], f"--precision {precision}")
+                for (x, y), (triangle, t) in zip(places, hits):
+                    expected = 0 if x > 0 else 1 if y > 0 else 2
+                    self.assertEqual(triangle // 2, expected, f"{gap} {precision} {x} {y}")
+                    self.assertLess(abs(t - 1 - expected * gap), 1.2e-7, f"{gap} {precision} {x} {y}")
+            # a light in front reaches all that is seen
+            light = "lights: [{directional: {direction: [0.3, -0.2, 1]}}]\nobjects:\n"
+            write("lit.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 20}\n" + light + "".join(layers))
+            for precision in PRECISIONS:
+                objects, shadows = self.layers("lit.yaml", f"--size 32x32 --precision {precision}", "object", "shadow")
+                self.assertEqual({triangle // 2 for triangle in objects}, {0, 1, 2}, f"{gap} {precision}")
+                self.assertEqual(sum(shadow != 0 for shadow in shadows), 0, f"{gap} {precision}")
+
+    def test_each_shape(self):
+        """Explicit rays pass holes: of a sphere the far side is hit; all holes let a ray pass, as do those of a plane and a disc."""
+        write(
+            "scene.yaml",
+            "camera: {position: [0, 0, -1], look_at: [0, 0, 0]}\n"
+            "materials: {half: {image: half.png, cutout: 0.5, size: 2}}\n"
+            "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: half}},\n"
+            "  {sphere: {center: [5, 0, 0], radius: 1, material: {image: half.png, cutout: 0.5, transmission: 0.5}}},\n"
+            "  {plane: {point: [0, 0, 9], normal: [0, 0, 1], material: half}},\n"
+            "  {disc: {center: [0, 0, -9], normal: [0, 0, 1], radius: 1.5, material: half}}]\n",
+        )
+        rays = [
+            ((-5, 0, 0.1), (1, 0, 0)), ((3, 0, 0.1), (-1, 0, 0)), ((0, 0, 0), (-1, 0, 0)), ((0, 0, 0), (1, 0, 0)), ((2, 0.5, 0), (1, 0, 0)), ((7, 0.5, 0), (-1, 0, 0)),
+            ((0.5, 3, 5), (0, 0, 1)), ((1.5, 3, 5), (0, 0, 1)), ((-0.5, 0, -5), (0, 0, -1)), ((0.5, 0, -5), (0, 0, -1)), ((0.5, 3, 30), (0, 0, -1)),
+        ]  # fmt: skip
+        root = math.sqrt(0.99)
+        side = math.sqrt(0.75)
+        expected = [(0, 5 + root), (0, 3 - root), None, (0, 1), (1, 3 + side), (1, 2 - side), None, (2, 4), (3, 4), None, None]
+        for precision in PRECISIONS:
+            for ray, hit, right in zip(rays, self.hits("scene.yaml", rays, f"--precision {precision}"), expected):
+                self.assertEqual(hit is None, right is None, f"{precision}: {ray}")
+                if hit:
+                    self.assertEqual(hit[0], right[0], f"{precision}: {ray}")
+                    self.assertLess(abs(hit[1] - right[1]), 2e-6, f"{precision}: {ray}")
+
+    def test_half_a_square(self):
+        """The image of a square whose left half is cut out is that of half a square, also in a mirror and behind glass."""
+        rest = (
+            "camera: {position: [0.3, 0.4, -4], look_at: [0, 0, 0], fov: 50}\nlights: [{point: {position: [-2, 2, -3]}}]\n"
+            "objects:\n  - plane: {point: [0, 0, 1.5], normal: [0, 0, -1], material: {reflection: 0.6}}\n"
+            "  - sphere: {center: [0.2, 0.4, -1.5], radius: 0.5, material: {transmission: 0.8}}\n"
+        )
+        half = QUAD.replace("v -1", "v 0").replace("vt 0", "vt 0.5")
+        write("half.obj", half)
+        images = []
+        for name, cutout in ("quad", ", cutout: 0.5"), ("half", ", cutout: 0"):
+            write(f"{name}.yaml", rest + f"  - mesh: {{file: {name}.obj, material: {{image: half.png{cutout}}}}}\n")
+            warned = "the alpha of 'half.png' is ignored" in self.glint(f"render {name}.yaml -o {name}.npy --size 64x64").stderr
+            self.assertEqual(warned, name == "half")
+            images.append(npy_read(f"{name}.npy")[2])
+        unequal = [i for i, (a, b) in enumerate(zip(*images)) if max(abs(p - q) for p, q in zip(a, b)) > 1e-5]
+        self.assertLess(len(unequal), 64)  # pixels whose ray, or mirrored ray, is at the edge
+        self.assertGreater(len([i for i, (a, b) in enumerate(zip(*images)) if a == b]), 3800)
+
+    def test_refused(self):
+        """Neither certified nor certify has cutouts; an opaque image is named."""
+        png("opaque.png", [[1, 1]])
+        scene = "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [1, 2, -5]}}]\nobjects: [{sphere: {center: [0, 0, 0], radius: 1, material: {image: %s.png, cutout: 0.5}}}]\n"
+        write("half.yaml", scene % "half")
+        write("opaque.yaml", scene % "opaque")
+        self.glint("check half.yaml")
+        self.assertIn("the alpha of 'opaque.png' is 1 everywhere: nothing is cut out", self.glint("check opaque.yaml").stderr)
+        self.refuses("render half.yaml -o a.npy --precision certified", "a material has a cutout, which has no error bound")
+        self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
+        self.refuses("certify half.yaml", "the exact reference has no cutouts, and so cannot judge this scene")
+
+
+if __name__ == "__main__":
+    main()
