@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
 """Cutouts: rays pass where the alpha of an image is low, for camera rays, shadows, mirrors and explicit rays, as if the holes
-were cut into the shape."""
+were cut into the shape; and what formats of meshes make of alpha."""
 import math
 import struct
 import zlib
@@ -151,6 +151,64 @@ class Cutouts(TestCase):
         self.assertLess(len(unequal), 64)  # pixels whose ray, or mirrored ray, is at the edge
         self.assertGreater(len([i for i, (a, b) in enumerate(zip(*images)) if a == b]), 3800)
 
+    def test_formats(self):
+        """The same holes by YAML, MTL and glTF, of which a factor multiplies the alpha."""
+        head = "camera: {position: [0, 0, 5], look_at: [0, 0, 0], fov: 30}\nobjects: [{mesh: {file: "
+        hole_png("gray.png", 0)
+        write("named.obj", "mtllib a.mtl\nusemtl m\n" + QUAD)
+        blends = "the alpha of '{}' does not blend: below 0.5 the surface is cut out"
+
+        def objects(mesh, *warnings, material=""):
+            write("scene.yaml", f"{head}{mesh}{material}}}}}]\n")
+            stderr = self.glint("render scene.yaml -o a.npy --size 40x40 --aov object").stderr
+            self.assertEqual(stderr.count("warning"), len(warnings) + 1, stderr)  # no lights
+            for warning in warnings:
+                self.assertIn(warning, stderr)
+            return [value != 0xFFFFFFFF for value in npy_read("a.object.npy")[2]]
+
+        expected = objects("quad.obj", material=", material: {image: hole.png, cutout: 0.5}")
+        share = sum(expected) / len(expected)
+        square = (2 / (2 * 5 * math.tan(math.radians(15)))) ** 2
+        self.assertLess(abs(share / (square * (1 - math.pi * HOLE**2 / 4)) - 1), 0.05)
+        for lines, warnings in [
+            ("map_d hole.png\n", [blends.format("hole.png")]),
+            ("map_d gray.png\n", [blends.format("gray.png")]),
+            ("map_Kd half.png\nmap_d gray.png\n", [blends.format("gray.png"), "the alpha of 'half.png' is ignored"]),
+            ("map_Kd hole.png\nmap_d hole.png\n", [blends.format("hole.png")]),
+        ]:
+            write("a.mtl", "newmtl m\n" + lines)
+            self.assertEqual(objects("named.obj", *warnings), expected, lines)
+        write("a.mtl", "newmtl m\nmap_d missing.png\n")
+        self.assertGreater(sum(objects("named.obj", "cannot read 'missing.png': No such file or directory: nothing is cut out")), sum(expected))
+        for options, warnings in [
+            ({"alphaMode": "MASK"}, []),
+            ({"alphaMode": "MASK", "alphaCutoff": 0.25, "factor": 0.5}, []),
+            ({"alphaMode": "BLEND"}, [blends.format("hole.png")]),
+        ]:
+            self.assertEqual(objects(self.gltf(**options), *warnings), expected, options)
+        for options, count in [({}, square), ({"alphaMode": "MASK", "alphaCutoff": 0}, square), ({"alphaMode": "MASK", "alphaCutoff": 0.75, "factor": 0.5}, square)]:
+            self.assertLess(abs(sum(objects(self.gltf(**options))) / 1600 / count - 1), 0.05, options)
+
+    def gltf(self, factor=1, **material):
+        import json
+
+        data = struct.pack("<12f8f6H", -1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 2, 0, 2, 3)
+        write_bytes("a.bin", data)
+        views = [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in ((0, 48), (48, 32), (80, 12))]
+        accessors = [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
+            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
+            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
+        ]
+        pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 1, factor]}
+        scene = {
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}],
+            "buffers": [{"uri": "a.bin", "byteLength": len(data)}], "bufferViews": views, "accessors": accessors,
+            "images": [{"uri": "hole.png"}], "textures": [{"source": 0}], "materials": [material | {"pbrMetallicRoughness": pbr}],
+        }  # fmt: skip
+        return write("a.gltf", json.dumps(scene))
+
     def test_refused(self):
         """Neither certified nor certify has cutouts; an opaque image is named."""
         png("opaque.png", [[1, 1]])
@@ -162,6 +220,11 @@ class Cutouts(TestCase):
         self.refuses("render half.yaml -o a.npy --precision certified", "a material has a cutout, which has no error bound")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.refuses("certify half.yaml", "the exact reference has no cutouts, and so cannot judge this scene")
+
+
+def write_bytes(path, data):
+    with open(path, "wb") as file:
+        file.write(data)
 
 
 if __name__ == "__main__":

@@ -502,7 +502,7 @@ class Test(TestCase):
             self.assertIn("IMAGES", report["features"])
 
     def test_alpha_of_images(self):
-        """It is named where a pixel is transparent and the format does not define it as ignored; the colors stay."""
+        """It is named where a pixel is transparent and the format does not define it as ignored, or blends by it; the colors stay."""
         palette = (b"PLTE", bytes([255, 0, 0, 0, 255, 0]))
         images = {
             "rgba": (png([[(1, 0, 0, 1), (0, 1, 0, 0.5)]], 6), True),
@@ -523,7 +523,7 @@ class Test(TestCase):
         for mode in ("OPAQUE", "MASK", "BLEND"):
             gltf = Gltf(images=[{"uri": "rgba.png"}], textures=[{"source": 0}])
             gltf.square(WHOLE, material=gltf.add("materials", alphaMode=mode, pbrMetallicRoughness={"baseColorTexture": {"index": 0}}))
-            self.checked(gltf.write("a.gltf"), *["the alpha of textures is not used"] * (mode != "OPAQUE"))
+            self.checked(gltf.write("a.gltf"), *["the alpha of 'rgba.png' does not blend: below 0.5"] * (mode == "BLEND"))
 
     def test_lights_and_cameras(self):
         gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [

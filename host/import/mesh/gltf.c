@@ -28,7 +28,6 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
     [GLTF_METAL_COLOR] = "reflections of metals do not have the colors of a texture",
     [GLTF_NORMAL_TEXTURE] = "normal textures are not used: the normals of the vertices are",
     [GLTF_OCCLUSION_TEXTURE] = "occlusion textures are not used: the lights' shadows are",
-    [GLTF_TEXTURE_ALPHA] = "the alpha of textures is not used: that of baseColorFactor is",
     [GLTF_TEXTURE_PLACE] = "the mesh lacks the texture's coordinates: the color is used",
     [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
     [GLTF_GLASS_COLOR] = "transmitted light does not have the colors of a texture",

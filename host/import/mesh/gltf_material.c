@@ -163,7 +163,7 @@ static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *materia
     uint32_t *known = &gltf->images[source];
     if (*known == DRAFT_NONE) {
         *known = image_add(gltf, &image);
-        // alphaMode decides whether alpha counts, and transparency_set warns where it does
+        // alphaMode decides whether alpha counts
         if (*known > 0) gltf->draft->scene->textures.items[*known - 1].ignores_alpha = true;
     }
     material->texture = *known;
@@ -259,8 +259,13 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
                  alpha = clamped(surface->base[3]);
     if (name && !is_mask && !is_blend && strcmp(name, "OPAQUE") != 0)
         gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND: OPAQUE is used");
-    if ((is_mask || is_blend) && surface->base_texture.json) gltf_lose(gltf, GLTF_TEXTURE_ALPHA, item);
     const double opacity = is_mask ? alpha >= surface->cutoff : is_blend ? alpha : 1;
+    if (surface->base_texture.json && opacity > 0) {
+        if (is_mask && surface->cutoff > 0) look->cutout = surface->cutoff / alpha;
+        if (is_blend) look->cutout = CUTOUT_OF_BLENDED;
+        if (is_blend && material->texture > 0)
+            gltf->draft->scene->textures.items[material->texture - 1].alpha_blends = true;
+    }
     if (opacity < 1) {
         material_set_opacity(look, opacity);
         material->textured_ambient *= opacity;
@@ -322,8 +327,9 @@ uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_texture
     uint32_t *index = &material->scene_index[is_textured];
     if (*index != DRAFT_NONE) return *index;
     Material look = material->look;
+    if (!is_textured) look.cutout = 0;
     if (is_textured) {
-        look.texture = material->texture;
+        look.texture = look.cutout_texture = material->texture;
         look.ambient = material->textured_ambient;
         if (material->texture_emits) look.emission = vector_all(0);
         memcpy(look.texture_wrap, material->wraps, sizeof look.texture_wrap);

@@ -14,6 +14,7 @@ typedef struct {
     char *name;
     Material material;
     char *image;           // of map_Kd, or NULL
+    char *opacity_image;   // of map_d, or NULL
     uint32_t scene_index;  // DRAFT_NONE: not in the scene yet
     double dissolve;       // d: the opacity; NAN: not given
     double transparency;   // Tr: 1 - d; NAN: not given
@@ -204,7 +205,8 @@ static bool texture_option_skip(Scan *scan)
     return true;
 }
 
-static void texture_read(MtlReader *reader, MtlMaterial *material)
+// Reads the name of an image. `otherwise` is what is used if it cannot be read.
+static void image_read_name(MtlReader *reader, const char *otherwise, char **image)
 {
     scan_more(&reader->scan);
     const size_t offset = scan_offset(&reader->scan);
@@ -220,18 +222,27 @@ static void texture_read(MtlReader *reader, MtlMaterial *material)
                        path);
     const SceneOptions *options = reader->draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);
-    free(material->image);
-    material->image = NULL;
+    free(*image);
+    *image = NULL;
     const char *obstacle = file_obstacle(path);
     if (obstacle)
-        report_warning(&reader->report, name.offset, "cannot read '%s': %s: the color is used", path,
-                       obstacle);
+        report_warning(&reader->report, name.offset, "cannot read '%s': %s: %s", path, obstacle, otherwise);
     else if (!image_is_known(path))
-        report_warning(&reader->report, name.offset, "'%s' is not a PNG, JPEG, PPM or EXR: the color is used",
-                       path);
+        report_warning(&reader->report, name.offset, "'%s' is not a PNG, JPEG, PPM or EXR: %s", path,
+                       otherwise);
     else
-        material->image = memory_copy_text(path);
+        *image = memory_copy_text(path);
     free(path);
+}
+
+static void texture_read(MtlReader *reader, MtlMaterial *material)
+{
+    image_read_name(reader, "the color is used", &material->image);
+}
+
+static void opacity_texture_read(MtlReader *reader, MtlMaterial *material)
+{
+    image_read_name(reader, "nothing is cut out", &material->opacity_image);
 }
 
 static void nothing_read(MtlReader *reader, MtlMaterial *material)
@@ -244,9 +255,19 @@ static const struct {
     const char *word;
     void (*read)(MtlReader *reader, MtlMaterial *material);
 } statements[] = {
-    {"newmtl", name_read}, {"Kd", diffuse_read},         {"Ks", specular_read}, {"Ns", shininess_read},
-    {"Ni", ior_read},      {"Tr", transparency_read},    {"d", dissolve_read},  {"map_Kd", texture_read},
-    {"Ka", nothing_read},  {"illum", illumination_read}, {"Ke", emission_read}, {"Tf", filter_read},
+    {"newmtl", name_read},
+    {"Kd", diffuse_read},
+    {"Ks", specular_read},
+    {"Ns", shininess_read},
+    {"Ni", ior_read},
+    {"Tr", transparency_read},
+    {"d", dissolve_read},
+    {"map_Kd", texture_read},
+    {"Ka", nothing_read},
+    {"illum", illumination_read},
+    {"Ke", emission_read},
+    {"Tf", filter_read},
+    {"map_d", opacity_texture_read},
 };
 
 static void line_read(MtlReader *reader)
@@ -367,32 +388,43 @@ static int name_compare(const void *name, const void *material)
     return order != 0 ? order : other->name[word->length] == '\0' ? 0 : -1;
 }
 
-// Multiplies the image by the diffuse color, as MTL defines.
-static void texture_use(MeshDraft *draft, MtlMaterial *material)
+// Adds an image to the scene. Returns 0 with a warning if it cannot be used.
+static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const char *image)
 {
-    if (!material->image) return;
     if (!draft_has(draft, DRAFT_UV)) {
-        draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", material->image,
+        draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", image,
                    material->name);
-        return;
+        return 0;
     }
-    const uint32_t texture = scene_add_texture(draft->scene, material->image, NULL, draft->import->offset);
-    if (texture == 0) {
+    const uint32_t texture = scene_add_texture(draft->scene, image, NULL, draft->import->offset);
+    if (texture == 0)
         draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
                    material->name);
-        return;
-    }
+    return texture;
+}
+
+// Multiplies the image by the diffuse color, as MTL defines. What the image of the opacity would blend is cut
+// out by its alpha or, as MTL defines, its luminance.
+static void textures_use(MeshDraft *draft, MtlMaterial *material)
+{
     Material *look = &material->material;
-    look->texture = texture;
-    look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
-                            look->diffuse.z * look->color.z};
-    look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
+    if (material->image) look->texture = image_add(draft, material, material->image);
+    if (look->texture > 0) {
+        look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
+                                look->diffuse.z * look->color.z};
+        look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
+    }
+    if (material->opacity_image) look->cutout_texture = image_add(draft, material, material->opacity_image);
+    if (look->cutout_texture == 0) return;
+    look->cutout = CUTOUT_OF_BLENDED;
+    SceneTexture *texture = &draft->scene->textures.items[look->cutout_texture - 1];
+    texture->alpha_by_luminance = texture->alpha_blends = true;
 }
 
 static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)
 {
     if (material->scene_index == DRAFT_NONE) {
-        texture_use(draft, material);
+        textures_use(draft, material);
         material->scene_index = scene_add_material(draft->scene, &material->material, material->name);
     }
     return material->scene_index;
@@ -423,6 +455,7 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
     for (size_t i = 0; i < reader.materials.count; i++) {
         free(reader.materials.items[i].name);
         free(reader.materials.items[i].image);
+        free(reader.materials.items[i].opacity_image);
     }
     free(reader.materials.items);
     free(reader.files.items);
