@@ -63,6 +63,12 @@ static const Pair pairs[] = {
      "[{triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], transform: {scale: [3, 2, 1], translate: "
      "[-1, -1, 0]}}}]",
      "[{triangle: {vertices: [[-1, -1, 0], [2, -1, 0], [-1, 1, 0]]}}]"},
+    // with sanitizers: no member of another shape is read
+    {"smooth triangle",
+     "[{triangle: {vertices: [[0, 0, 0], [3, 0, 0], [0, 2, 0]], normals: [[0.6, 0, 0.8], [0, 0.6, 0.8], [0, "
+     "0, 1]], transform: {translate: [-1, -1, 0]}}}]",
+     "[{triangle: {vertices: [[-1, -1, 0], [2, -1, 0], [-1, 1, 0]], normals: [[0.6, 0, 0.8], [0, 0.6, 0.8], "
+     "[0, 0, 1]]}}]"},
     {"torus",
      "[{torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 1, minor: 0.25, transform: {rotate: [90, 0, 0], "
      "scale: 2}}}]",

@@ -222,10 +222,10 @@ static bool numbers_fit(const Object *object)
         fits &= number_at(object, *offset) > 0 && number_at(object, *offset) <= NUMBER_LARGEST;
     for (const size_t *offset = shapes[object->kind].lengths; *offset > 0; offset++)
         fits &= number_at(object, *offset) <= NUMBER_LARGEST;
-    const bool is_cone = object->kind == SHAPE_CONE;
+    if (object->kind != SHAPE_CONE) return fits;
     const double widest = object->as.cone.finite ? object->as.cone.radius[0] + object->as.cone.radius[1]
                                                  : object->as.cone.slope;
-    return fits && (!is_cone || widest > 0);
+    return fits && widest > 0;
 }
 
 const char *object_transform(Scene *scene, Object *object, const Affine *affine)
