@@ -64,7 +64,7 @@ window_objects := $(if $(has_window),$(patsubst %.c,$(BUILD)/%.o,$(window_source
 objects := $(filter-out $(window_objects),$(sources:%.c=$(BUILD)/%.o)) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
 
-# Each tests/test_*.c, fuzz_*.c and oracle/*.c is a program; the other files are helpers of the programs.
+# Each tests/test_*.c, fuzz_*.c and oracle/*.c is a program; the other files are linked with all of them.
 test_programs := $(sort $(wildcard tests/test_*.c tests/fuzz_*.c tests/oracle/*.c))
 test_helpers  := $(filter-out $(test_programs),$(sort $(wildcard tests/*.c)))
 test_objects  := $(test_helpers:%.c=$(BUILD)/%.o)
@@ -132,11 +132,11 @@ $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 	$(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
 
 # Each test links only the objects that it uses, which takes half the time.
-$(BUILD)/tests.a: $(test_objects) $(library)
+$(BUILD)/tests.a: $(library)
 	rm -f $@
 	$(AR) rcsT $@ $^
 
-$(BUILD)/tests/%: $(BUILD)/tests/%.o $(BUILD)/tests.a
+$(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(BUILD)/tests.a
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(filter %.o,$^) $(BUILD)/tests.a -lcmocka $(LIBS) -o $@
 
 # Tests in which calls fail: those of OpenCL, and of the system's two, go through tests/failing.
