@@ -14,7 +14,7 @@
 #include <string.h>
 
 // The default limit for bytes of waiting bands, which usually holds one band per worker
-// (docs/performance.md).
+// (docs/measurements/README.md).
 static const size_t WAITING_BYTES_MIN = 64 << 20, WAITING_BYTES_OF_WORKER = 16 << 20;
 
 typedef struct {
