@@ -24,6 +24,7 @@ typedef struct {
 
 struct ImageOutput {
     const ImageOutputOptions *options;
+    ImageFormat format;
     const char *scene_path;
     const Scene *scene;
     const RenderSettings *settings;
@@ -64,13 +65,16 @@ char *image_output_default_path(const char *scene_path)
     return path.items;
 }
 
-bool image_output_format_choose(ImageOutputOptions *options)
+static bool is_to_stdout(const char *path)
 {
-    if (strcmp(options->path, "-") == 0) return true;
-    options->format = image_format_of(options->path);
-    if (options->format == IMAGE_UNKNOWN)
-        fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", options->path);
-    return options->format != IMAGE_UNKNOWN;
+    return strcmp(path, "-") == 0;
+}
+
+bool image_output_path_known(const char *path)
+{
+    if (is_to_stdout(path) || image_format_of(path) != IMAGE_UNKNOWN) return true;
+    fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
+    return false;
 }
 
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
@@ -79,6 +83,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 {
     ImageOutput *output = memory_allocate_zeroed(1, sizeof *output);
     *output = (ImageOutput){.options = options,
+                            .format = is_to_stdout(options->path) ? options->stdout_format
+                                                                  : image_format_of(options->path),
                             .scene_path = scene_path,
                             .scene = scene,
                             .settings = settings,
@@ -133,7 +139,7 @@ static void certified_describe(Text *text, const ImageOutput *output)
 
 static bool is_exr(const ImageOutput *output)
 {
-    return output->options->format == IMAGE_EXR;
+    return output->format == IMAGE_EXR;
 }
 
 bool image_output_holds_floats(ImageFormat format)
@@ -200,7 +206,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
     const bool is_display =
-        output->options->transfer == TRANSFER_SRGB && !image_output_holds_floats(output->options->format);
+        output->options->transfer == TRANSFER_SRGB && !image_output_holds_floats(output->format);
     NOTE("Transfer", "%s", is_display ? "srgb" : "none");
     if (output->options->exposure != 0) NOTE("Exposure", "%g", output->options->exposure);
     if (output->options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[output->options->tone]);
@@ -264,7 +270,7 @@ static bool file_spares_scene(const char *path, void *context)
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path)
 {
-    return strcmp(options->path, "-") != 0 &&
+    return !is_to_stdout(options->path) &&
            !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
 }
 
@@ -318,7 +324,7 @@ static bool image_open(ImageOutput *output, const Film *film, const ImageNote *n
 {
     const RenderSettings *settings = output->settings;
     ImageHeader header = layer_header(film, LAYER_COLOR);
-    header.format = output->options->format;
+    header.format = output->format;
     header.transfer = output->options->transfer;
     header.bits = output->options->bits;
     header.exposure = output->options->exposure;
@@ -431,7 +437,7 @@ static bool band_write(ImageOutput *output)
 {
     const Film *band = &output->band;
     MessageList *messages = output->messages;
-    const bool is_npy = output->options->format == IMAGE_NPY;
+    const bool is_npy = output->format == IMAGE_NPY;
     const void *arrays[LAYER_COUNT + 2];
     size_t count = 0;
     arrays[count++] = is_npy ? band->layers[LAYER_COLOR] : layer_narrowed(output, band, LAYER_COLOR);

@@ -10,7 +10,7 @@
 
 typedef struct {
     const char *path; // "-": standard output
-    ImageFormat format;
+    ImageFormat stdout_format;
     unsigned aovs; // AOV_COLOR means the linear values
     Transfer transfer;
     unsigned bits;
@@ -29,9 +29,8 @@ typedef struct ImageOutput ImageOutput;
 // Returns the scene's name with .png, of standard input image.png, in the current folder. The caller frees
 // it.
 char *image_output_default_path(const char *scene_path);
-// Sets the format by the path's ending, unless the path is "-". Returns false, having printed the known
-// endings, if it has none of them.
-bool image_output_format_choose(ImageOutputOptions *options);
+// Returns whether the path is "-" or its ending is known; if not, prints the known endings.
+bool image_output_path_known(const char *path);
 // Returns whether the format holds linear floats, which are not for display.
 bool image_output_holds_floats(ImageFormat format);
 // Returns true with a message if one of the files is a file that the scene was read from.

@@ -209,7 +209,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
         return option_usage_fault("render",
                                   "--work-group and --build-options need glint render, a single process");
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
-    if (image_output_format_choose(&options.output) && scene_open(&scene, options.scene, &options.common) &&
+    if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.parse_seconds = clock_seconds() - start, .stage = options.common.stage};
         if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)

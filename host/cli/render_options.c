@@ -191,7 +191,7 @@ static bool display_fits(const ImageOutputOptions *output)
 {
     const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
     const ImageFormat format =
-        is_to_stdout(output) || !output->path ? output->format : image_format_of(output->path);
+        is_to_stdout(output) || !output->path ? output->stdout_format : image_format_of(output->path);
     if (is_changed && image_output_holds_floats(format))
         option_usage_fault(
             "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
@@ -255,7 +255,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     case OPTION_FORMAT:
         if (!option_choice("format", value, (const char *const[]){"png", "ppm", "npy"}, 3, &choice))
             return false;
-        options->output.format = (const ImageFormat[]){IMAGE_PNG, IMAGE_PPM, IMAGE_NPY}[choice];
+        options->output.stdout_format = (const ImageFormat[]){IMAGE_PNG, IMAGE_PPM, IMAGE_NPY}[choice];
         options->has_format = true;
         return true;
     case OPTION_SKIP_EXISTING:
