@@ -361,7 +361,7 @@ MEANINGS = {
     "picks[].text": "text; as a sentence",
     # verify
     "reference_bits": "integer; significand of the exact reference",
-    "quick": "boolean; whether rays were fewer (`--quick`)",
+    "quick": "boolean; whether rays and pixels were fewer (`--quick`)",
     "precisions[]": "object",
     "tier": "text; `A`, `B`, `C` or `D`",
     "{trace_kernel,render_kernel}": "hash; zeros if not needed",

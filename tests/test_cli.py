@@ -42,7 +42,7 @@ WRONG_COMMAND_LINES = [
     ("--region: .*8x6", "render sphere.yaml --size 8x6 --region {0,0,9,1|0,0,1,7|8,0,1,1|0,6,1,1|99999,0,1,1}"),
     ("^--set:1:12: error: 'fov' must be a number, not '6O'$",
      "{render|trace --rays rays|check|bench|accuracy|certify} sphere.yaml --set camera.fov=6O"),
-    ("s.rt: --set needs a YAML scene", "{render|check} s.rt --set camera.fov=60"),
+    ("s.rt: only values of YAML scenes", "{render|check} s.rt --set camera.fov=60"),
     ("--set: may be given at most 64 times", "check sphere.yaml" + 65 * " --set camera.fov=60"),
     ('--bits: .*"12"', "render sphere.yaml --bits 12"),
     ('--tone: .*"flimic".*did you mean filmic', "render sphere.yaml --tone flimic"),

@@ -116,12 +116,13 @@ class Frames(TestCase):
         self.assertTrue(os.path.exists("image.png"))
         self.refuses("render -", r"-:1:1: error: unknown", input="ball: {}")
         for options, reason in {"-o -": "needs --format", "--format png": "is for --output -", "-o - --format exr": "expected png",
-                                "-o - --format png --aov t": "more files", "-o - --format png --timing=json": "--output - takes",
+                                "-o - --format png --aov t": "more files", "-o - --format png --skip-existing": "is for files", "-o - --format png --timing=json": "--output - takes",
                                 "-o - --format npy --dither": "linear values"}.items():
             self.refuses(f"render moving.yaml {options}", reason)
-        with open("/dev/full", "w") as device:
-            full = glint.run("render moving.yaml --size 512x512 -o - --format ppm", stdout=device)
-        self.assertEqual((full.returncode, "standard output" in full.stderr), (1, True), full.stderr)
+        for size in "8x8", "512x512":  # one whose bytes wait in a buffer, and one that fails while it is rendered
+            with open("/dev/full", "w") as device:
+                full = glint.run(f"render moving.yaml --frames 0-99 --quiet --size {size} -o - --format ppm", stdout=device)
+            self.assertEqual((full.returncode, full.stderr.count("standard output")), (2, 1), full.stderr)
 
     def test_refused(self):
         write("moving.yaml", SCENE.format(**KEYS))

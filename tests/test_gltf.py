@@ -556,6 +556,10 @@ class Test(TestCase):
             _, _, objects = npy_read("a.object.npy")
             hit = [i for i, number in enumerate(objects) if number != 0xFFFFFFFF]
             self.assertEqual(hit, [64 * row + column for row in range(8, 24) for column in range(24, 40)])
+        with open("a.obj", "w", encoding="utf-8") as file:
+            file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        process = self.glint("render a.gltf --precision certified --size 8x8 -o a.npy", status=1)
+        self.assertIn("the camera has parallel rays, which has no error bound", process.stderr)
 
     def test_formats_look_alike(self):
         """A smooth, textured square of four formats: the same image, with the same camera and lights."""

@@ -97,6 +97,7 @@ static char *section_read(char *line, const char *ending, BrokenScene *broken)
                 counted_line_append(&broken->text, value + 1, number);
         } else if (starts_with(line, "#### expected")) {
             is_expected = true;
+            assert_true(!strstr(line, "without") || broken->text.count > 0);
             if (strstr(line, "without the last newline")) broken->text.items[--broken->text.count] = '\0';
         } else {
             text_appendf(is_expected ? &broken->expected : &broken->text, "%s\n", line);

@@ -89,7 +89,7 @@ static Scene soak_scene(Random *random)
     const uint32_t plain_count = (uint32_t)scene.materials.count;
     Material textured = scene.materials.items[random_index(random, plain_count)];
     textured.checker = false;
-    textured.texture = scene_add_texture(&scene, image_path, NULL, 0);
+    textured.texture = scene_add_texture(&scene, image_path, NULL, false, 0);
     textured.texture_size = random_between(random, 0.5, 4);
     array_push(scene.materials, textured);
     for (uint32_t i = 0; i < kept; i++)

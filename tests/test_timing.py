@@ -48,7 +48,7 @@ class Timing(TestCase):
         write("mesh.yaml", PLANE.replace("objects: [", "objects: [{mesh: {file: mesh.obj}}, "))
         for _ in range(2):
             trace = self.json("render mesh.yaml --size 320x180 --quiet --timing=trace -o trace.png --aov t")
-        self.assertEqual(trace["otherData"], {"kernels_from_cache": True})
+        self.assertEqual((trace["otherData"]["schema"], trace["otherData"]["kernels_from_cache"]), (1, True))
         events, names = {}, {}
         for event in trace["traceEvents"]:
             self.assertEqual(event["pid"], 1)
@@ -57,8 +57,9 @@ class Timing(TestCase):
             else:
                 self.assertEqual(event["ph"], "X")
                 events.setdefault(names[event["tid"]], []).append(event)
-        host, bands, commands = events.values()
-        self.assertEqual(list(events)[1], f"bands of {list(events)[2]}")
+        host, bands, builds, commands = events.values()
+        self.assertEqual(list(events)[1], f"bands of {list(events)[3]}")
+        self.assertEqual([event["name"] for event in builds], ["building render", "building aov"])
         stages = [event["name"] for event in host]
         wanted = ["reading mesh.yaml", "reading mesh.obj", "opening the devices", "flattening the scene", "uploading the scene",
                   "building the kernel", "writing"]
@@ -67,6 +68,12 @@ class Timing(TestCase):
         self.assertTrue(all(abs(a["ts"] + a["dur"] - b["ts"]) < 1 for a, b in zip(host, host[1:])))
         self.assertTrue(all(a["ts"] + a["dur"] <= b["ts"] + 1 for a, b in zip(bands, bands[1:])))
         self.assertEqual({event["name"] for event in commands}, {"render", "aov", "read-back"})
+        certified = self.json("render mesh.yaml --size 64x36 --quiet --timing=trace -o trace.png --aov doubt,t --precision certified")
+        spans = [event for event in certified["traceEvents"] if event["ph"] == "X"]
+        self.assertTrue(all(event["dur"] >= 0 for event in spans))
+        whole = [event for event in spans if event["name"] == "band"]
+        self.assertEqual(sum(any(band["ts"] <= event["ts"] <= band["ts"] + band["dur"] for event in spans if event["name"] == "render")
+                             for band in whole), len(whole))
         for event in commands:
             times, end = event["args"], event["ts"] + event["dur"]
             if times["clock"] == "event":

@@ -81,9 +81,11 @@ void glint_device_info(const GlintDevice *device, GlintDeviceInfo *info);
 // How a scene is read. Only YAML scenes have values to replace and frames.
 typedef struct {
     size_t size;
-    const char *const *overrides; // values to replace, each as of glint render --set: "camera.fov=60"
+    // Values to replace, in the syntax of glint render --set, such as "camera.fov=60". An empty value removes
+    // the key.
+    const char *const *overrides;
     size_t override_count;
-    double frame; // of an animated scene
+    double frame; // the frame of an animated scene
 } GlintSceneOptions;
 
 // Reads a scene, mesh or glTF file. `options` may be NULL. Sets *scene to NULL on failure. Formats that
@@ -132,7 +134,7 @@ typedef struct {
     uint32_t lanes;          // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
     GlintProgress progress;  // or NULL
     void *context;           // passed to progress
-    double min_contribution; // 0 to 1: rays whose weight in the pixel is below it are left out
+    double min_contribution; // 0 to 1; rays whose weight in the pixel is lower are not traced
 } GlintRenderSettings;
 
 // Arrays of height x width pixels from the top left, which the caller owns, or NULL for layers that are not

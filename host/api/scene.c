@@ -25,6 +25,8 @@ static bool options_read(SceneOptions *options, const GlintSceneOptions *given, 
     if (given && !struct_read(&own, sizeof own, given, messages)) return false;
     if (own.override_count > 0 && !own.overrides)
         return message_error(messages, "override_count is not 0, but overrides is NULL");
+    for (size_t i = 0; i < own.override_count; i++)
+        if (!own.overrides[i]) return message_error(messages, "overrides[%zu] is NULL", i);
     if (!isfinite(own.frame)) return message_error(messages, "the frame is not finite");
     options->overrides = own.overrides;
     options->override_count = own.override_count;

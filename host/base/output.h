@@ -16,7 +16,7 @@ typedef struct {
     char *temporary;  // the name in the folder until the rename; NULL: none
 } OutputFile;
 
-// Opens a file for `target` or, for `-`, standard output, whose flushing main does and reports. On failure
+// Opens a file for `target` or, for `-`, standard output, which main flushes. On failure
 // adds a message and returns false. output_abandon removes the temporary, and so does an atexit handler.
 // Temporaries of killed processes are removed when the next one is needed.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);

@@ -15,6 +15,7 @@ struct Stage {
     size_t total;
     double start_seconds; // of the operation
     bool keeps_spans;
+    pthread_t opener;
     double stage_start_seconds;
     struct {
         StageSpan *items;
@@ -26,6 +27,7 @@ Stage *stage_open(bool keeps_spans)
 {
     Stage *stage = memory_allocate_zeroed(1, sizeof *stage);
     stage->keeps_spans = keeps_spans;
+    stage->opener = pthread_self();
     pthread_mutex_init(&stage->mutex, NULL);
     return stage;
 }
@@ -47,6 +49,11 @@ const StageSpan *stage_spans(const Stage *stage, size_t *count)
     return stage->spans.items;
 }
 
+static bool is_ignored(const Stage *stage)
+{
+    return !stage || (stage->keeps_spans && !pthread_equal(stage->opener, pthread_self()));
+}
+
 // The caller holds the mutex.
 static void span_end(Stage *stage, double now)
 {
@@ -59,7 +66,7 @@ static void span_end(Stage *stage, double now)
 
 void stage_begin(Stage *stage, const char *what, const char *path, size_t total)
 {
-    if (!stage) return;
+    if (is_ignored(stage)) return;
     const char *slash = path ? strrchr(path, '/') : NULL, *name = slash ? slash + 1 : path;
     pthread_mutex_lock(&stage->mutex);
     const double now = clock_seconds();
@@ -74,7 +81,7 @@ void stage_begin(Stage *stage, const char *what, const char *path, size_t total)
 
 void stage_end(Stage *stage)
 {
-    if (!stage) return;
+    if (is_ignored(stage)) return;
     pthread_mutex_lock(&stage->mutex);
     span_end(stage, clock_seconds());
     text_free(&stage->name);

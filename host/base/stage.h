@@ -13,10 +13,12 @@ typedef struct {
     double start_seconds, end_seconds;
 } StageSpan;
 
-// With `keeps_spans`, stages that have ended are kept until stage_close.
+// Opens a stage. If `keeps_spans` is set, it keeps each stage that has ended until stage_close, and ignores
+// what other threads than the caller's begin and end.
 Stage *stage_open(bool keeps_spans);
 void stage_close(Stage *stage);
-// Returns the `*count` stages that have ended, in the order in which they began.
+// Returns the `*count` stages that have ended, in the order in which they began. No other thread may use the
+// stage while the result is read.
 const StageSpan *stage_spans(const Stage *stage, size_t *count);
 
 // Sets the stage to `what`, such as "reading", of the file at `path`, which may be NULL, with nothing of

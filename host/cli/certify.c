@@ -308,7 +308,7 @@ static const char *reference_lacks(const Scene *scene)
     if (features & FEATURE_CUTOUTS) return "cutouts";
     if (features & FEATURE_AREA_LIGHTS) return "lights with an area";
     if (features & FEATURE_LENS) return "a lens ('aperture')";
-    return features & FEATURE_ORTHOGRAPHIC ? "parallel rays ('height')" : NULL;
+    return features & FEATURE_ORTHOGRAPHIC ? "parallel rays" : NULL;
 }
 
 static int scene_certify(const CertifyOptions *options, const Scene *scene, OpenDevice *open)

@@ -7,6 +7,7 @@
 #include "host/base/numbers.h"
 #include "host/base/text.h"
 #include "host/cli/options.h"
+#include <errno.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -580,6 +581,10 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
             whole = image_writer_commit(output->aovs[i], messages);
         else
             image_writer_abandon(output->aovs[i]);
+    }
+    if (whole && is_to_stdout(output->options->path) && fflush(stdout) != 0) {
+        whole = message_error(messages, "cannot write the standard output: %s", strerror(errno));
+        clearerr(stdout);
     }
     *seconds = output->seconds + (clock_seconds() - start);
     if (whole && output->options->prints_names) names_print(output);

@@ -26,8 +26,8 @@ extern const char *const tone_names[TONE_COUNT];
 
 typedef struct ImageOutput ImageOutput;
 
-// Returns the scene's name with .png, of standard input image.png, in the current folder. The caller frees
-// it.
+// Returns the scene's name with .png, or image.png for standard input, in the current folder. The caller
+// frees it.
 char *image_output_default_path(const char *scene_path);
 // Returns whether the path is "-" or its ending is known; if not, prints the known endings.
 bool image_output_path_known(const char *path);

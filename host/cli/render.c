@@ -72,7 +72,9 @@ static bool checkpoint_start(Checkpoint **checkpoint, const RenderOptions *optio
 // Prints what is left of a render that ended early.
 static void rest_print(const RenderOptions *options)
 {
-    if (progress_interrupted())
+    if (progress_interrupted() && options->has_format)
+        fprintf(stderr, "glint: interrupted: the image on standard output is incomplete\n");
+    else if (progress_interrupted())
         fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is as it was\n",
                 options->output.path);
     if (options->checkpoint)
@@ -135,10 +137,12 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     bool faulty = message_count(messages, MESSAGE_ERROR) > 0;
     messages_print(messages, NULL);
     int status = whole                    ? EXIT_DONE
-                 : faulty                 ? EXIT_USER
+                 : faulty                 ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
                  : progress_interrupted() ? EXIT_INTERRUPTED
                                           : EXIT_MACHINE;
     if (!whole) rest_print(options);
+    if (ranks && options->timing == TIMING_TRACE)
+        fprintf(stderr, "glint: --timing=trace has the first rank's devices only\n");
     if (whole && options->timing != TIMING_NONE)
         timing_print(options->timing, renderers, devices->count, ranks, settings, times);
     return status;
@@ -229,6 +233,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
 static char *frame_path_make(const RenderOptions *options, uint32_t frame)
 {
     const char *output = options->output.path;
+    if (options->has_format) return memory_copy_text(output);
     const FramePlace place = output ? frame_place_of(output) : (FramePlace){0};
     if (place.start)
         return text_format("%.*s%0*u%s", (int)(place.start - output), output, place.digits, frame, place.end);

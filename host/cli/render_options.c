@@ -61,10 +61,10 @@ static const struct option long_options[] = {
 #define HELP_LAYER(NAME, name, type, components, note) "                          " #name ": " note "\n"
 
 static const char help_text[] =
-    "usage: glint render SCENE... [OPTIONS]\n\n"
+    "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n\n"
     "  -o, --output FILE     .png, .ppm, .exr or .npy; a folder for several scenes; - with --format "
     "(default:\n"
-    "                        the scene's name with .png). A SCENE - is YAML on standard input\n" HELP_SET
+    "                        the scene's name with .png)\n" HELP_SET
     "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
     "      --region X,Y,W,H  render these pixels of the image only\n"
@@ -89,7 +89,7 @@ static const char help_text[] =
                     "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
-                    "      --format F        of --output -, standard output: png, ppm or npy\n"
+                    "      --format F        format of --output -: png, ppm or npy\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER
         HELP_PERTURB HELP_HELP;
@@ -176,6 +176,8 @@ static bool stdout_fits(const RenderOptions *options)
         option_usage_fault("render", "--output - needs --format png, ppm or npy");
     else if (!is_stdout && options->has_format)
         option_usage_fault("render", "--format is for --output -; the name of a file has its format");
+    else if (is_stdout && options->skips_existing)
+        option_usage_fault("render", "--skip-existing is for files, but --output is -");
     else if (is_stdout && options->output.aovs)
         option_usage_fault("render", "--aov writes more files than --output - can take");
     else if (is_stdout && options->timing >= TIMING_JSON)

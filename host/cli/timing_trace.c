@@ -1,8 +1,10 @@
 // The format is that of "Trace Event Format" (Google, 2016): complete events, with times in microseconds.
 #include "host/cli/timing_trace.h"
 
+#include "host/api/version.h"
 #include "host/base/json.h"
 #include <math.h>
+#include <stdlib.h>
 
 static void event_begin(Json *json, const char *phase, const char *name, size_t thread)
 {
@@ -87,23 +89,15 @@ static void command_add(Json *json, const Commands *commands, const NamedLaunch 
     json_end(json);
 }
 
-// Adds the bands: each lasts from its first launch to the end of its last read-back, by the host's clock.
-static void bands_add(Json *json, const Commands *commands, size_t thread, double origin)
+static void spans_add(Json *json, const char *verb, const HostSpan *spans, size_t count, size_t thread,
+                      double origin)
 {
-    const NamedLaunch *launches = commands->lists[0], *reads = commands->lists[1];
-    size_t launch = 0, read = 0;
-    while (launch < commands->counts[0] && read < commands->counts[1]) {
-        const double start = launches[launch].time.host_start_seconds;
-        double end = start;
-        while (launch < commands->counts[0] &&
-               launches[launch].time.host_start_seconds < reads[read].time.host_start_seconds)
-            launch++;
-        const double next =
-            launch < commands->counts[0] ? launches[launch].time.host_start_seconds : INFINITY;
-        for (; read < commands->counts[1] && reads[read].time.host_start_seconds < next; read++)
-            end = host_end(&reads[read].time);
-        span_begin(json, "band", thread, start - origin, end - start);
+    for (size_t i = 0; i < count; i++) {
+        char *name = text_format("%s%s", verb, spans[i].name);
+        span_begin(json, name, thread, spans[i].start_seconds - origin,
+                   spans[i].end_seconds - spans[i].start_seconds);
         json_end(json);
+        free(name);
     }
 }
 
@@ -114,21 +108,22 @@ static void device_add(Json *json, const RenderReport *report, size_t thread, do
     text_appendf(&name, "bands of %s", report->device->name);
     thread_name(json, thread, text_c(&name));
     text_free(&name);
-    const Commands all = commands_of(report, report->device);
-    bands_add(json, &all, thread, origin);
+    spans_add(json, "", report->bands.items, report->bands.count, thread, origin);
+    thread_name(json, thread + 1, "builds");
+    spans_add(json, "building ", report->builds.items, report->builds.count, thread + 1, origin);
     for (size_t k = 0; k < 2 && devices[k]; k++) {
         const Commands commands = commands_of(report, devices[k]);
-        thread_name(json, thread + 1 + k, devices[k]->name);
+        thread_name(json, thread + 2 + k, devices[k]->name);
         for (size_t list = 0; list < 2; list++)
             for (size_t i = 0; i < commands.counts[list]; i++)
                 if (commands.lists[list][i].time.device == devices[k])
-                    command_add(json, &commands, &commands.lists[list][i], thread + 1 + k, origin);
+                    command_add(json, &commands, &commands.lists[list][i], thread + 2 + k, origin);
     }
 }
 
 void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *stage)
 {
-    enum { THREADS_OF_DEVICE = 3 };
+    enum { THREADS_OF_DEVICE = 4 };
     size_t span_count;
     const StageSpan *spans = stage_spans(stage, &span_count);
     const double origin = span_count > 0 ? spans[0].start_seconds : 0;
@@ -138,6 +133,8 @@ void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *s
     Json *json = json_open();
     json_text(json, "displayTimeUnit", "ms");
     json_begin_object(json, "otherData");
+    json_int64(json, "schema", 1);
+    json_text(json, "glint", glint_version());
     json_bool(json, "kernels_from_cache", is_from_cache);
     json_end(json);
     json_begin_array(json, "traceEvents");

@@ -4,6 +4,6 @@
 #include "host/base/stage.h"
 #include "host/render/renderer.h"
 
-// Prints the trace to stdout: a thread of the host's stages, then for each device one of its commands and one
-// of its bands. `stage` keeps its spans.
+// Prints the trace to stdout: a row of the host's stages, then for each device a row of bands, one of builds,
+// one of commands and, at `certified`, one for the reference device. `stage` keeps its spans.
 void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *stage);

@@ -39,7 +39,7 @@ static const char help_text[] =
     "Runs the hard cases, or those named, on a device and checks each against its bound; exit status 3 if "
     "any fails.\n\n"
     "      --precision P     single, strict or double (default: all that the device has)\n"
-    "      --quick           a sixteenth of the random rays and of the largest images\n"
+    "      --quick           a sixteenth of the random rays, and fewer pixels\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
     HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_FORMAT HELP_HELP;
@@ -73,7 +73,7 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     bool every_precision;
-    bool quick, lean;   // as of VerifySettings
+    bool quick, lean;   // see VerifySettings
     VerifyChoice cases; // all if none is named
 } VerifyOptions;
 
@@ -353,7 +353,8 @@ static int device_verify(Verification *verification, Compute *compute)
     if (!options->every_precision && !journal->is_headed && !arithmetic_is_suitable(compute, options, first))
         return EXIT_USER;
     if (report_has_text(&options->report) && !journal->is_headed) {
-        printf("%s; reference of %d bits\n", compute->device->name, verify_reference_bits());
+        printf("%s; reference of %d bits%s\n", compute->device->name, verify_reference_bits(),
+               options->quick ? "; quick" : "");
         fflush(stdout);
     }
     journal->is_headed = true;

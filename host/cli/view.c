@@ -92,7 +92,11 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
     }
     if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
-    if (options->writes_camera && (!scene_is_yaml(options->scene) || strcmp(options->scene, "-") == 0)) {
+    if (options->writes_camera && strcmp(options->scene, "-") == 0) {
+        fprintf(stderr, "glint: --write-camera: standard input cannot be written; name a YAML file\n");
+        return EXIT_USER;
+    }
+    if (options->writes_camera && !scene_is_yaml(options->scene)) {
         fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", options->scene);
         return EXIT_USER;
     }

@@ -98,7 +98,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_ABSORPTION, "a material has 'absorption'"},
         {FEATURE_AREA_LIGHTS, "a light has an area"},
         {FEATURE_LENS, "the camera has an 'aperture'"},
-        {FEATURE_ORTHOGRAPHIC, "the camera has a 'height'"},
+        {FEATURE_ORTHOGRAPHIC, "the camera has parallel rays"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;
     for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)
@@ -117,8 +117,9 @@ bool cutouts_fit(const CompiledScene *compiled, const Scene *scene, const Compil
 {
     if (!settings->certifies || !(features_of(scene) & FEATURE_CUTOUTS) || !textures_cut(compiled, scene))
         return true;
-    return message_error(messages, "a material has a cutout, which has no error bound: choose a precision "
-                                   "other than certified");
+    return message_error(messages,
+                         "a material has holes ('cutout'), which have no error bound: choose a precision "
+                         "other than certified");
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,

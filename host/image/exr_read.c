@@ -246,7 +246,8 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
     }
 }
 
-// Sets the alpha of an image with transparent pixels. Those without a value are opaque.
+// Sets the alpha of an image with transparent pixels, such as those outside the data window. An alpha that is
+// not a number counts as 1.
 static void alpha_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
     const Plane *plane = &reader->planes[reader->layer.channel_count];
@@ -254,9 +255,11 @@ static void alpha_fill(const ExrReader *reader, Image *image, uint32_t width, ui
     size_t opaque_count = 0;
     while (opaque_count < count && !(plane->values[opaque_count] < 1))
         opaque_count++;
-    if (opaque_count == count) return;
     const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
     const int64_t top = (int64_t)reader->display.min.y - reader->window.min.y;
+    const bool is_covered =
+        left >= 0 && top >= 0 && left + image->width <= width && top + image->height <= height;
+    if (opaque_count == count && (count == 0 || is_covered)) return;
     image->alpha = memory_allocate_zeroed((size_t)image->width * image->height, sizeof *image->alpha);
     for (uint32_t y = 0; y < image->height; y++) {
         for (uint32_t x = 0; x < image->width; x++) {

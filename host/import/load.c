@@ -75,8 +75,8 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
     *scene = (Scene){0};
     const bool is_known = has_scene_ending(path);
     if (options->override_count > 0 && !scene_is_yaml(path))
-        return message_error(
-            messages, "%s: --set needs a YAML scene (.yaml, .yml or .json), whose values have names", path);
+        return message_error(messages,
+                             "%s: only values of YAML scenes (.yaml, .yml or .json) can be replaced", path);
     if (!is_known && mesh_is_known(path)) return scene_read_mesh(scene, path, options, messages);
     if (!is_known && !begins_dat(path))
         return message_error(

@@ -52,10 +52,13 @@ static uint64_t files_hash(const RenderCommand *command, Call call)
     return hash;
 }
 
-static bool reads_standard_input(const RenderCommand *command)
+// Only one rank can read standard input, or write images to standard output in order.
+static bool uses_standard_streams(const RenderCommand *command)
 {
     for (size_t i = 0; i < render_command_count(command); i++)
-        if (strcmp(render_command_scene(command, i), "-") == 0) return true;
+        if (strcmp(render_command_scene(command, i), "-") == 0 ||
+            strcmp(render_command_path(command, i), "-") == 0)
+            return true;
     return false;
 }
 
@@ -79,7 +82,8 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     char marker[MARKER_BYTES] = "";
     const uint64_t own = command ? files_hash(command, call) : 0;
     uint64_t hash = own;
-    const bool can_render = command && !reads_standard_input(command) && render_command_open_devices(command);
+    const bool can_render =
+        command && !uses_standard_streams(command) && render_command_open_devices(command);
     if (is_first) {
         progress_hold_signals(); // the marker is removed whatever comes
         marker_make(command, marker);

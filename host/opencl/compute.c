@@ -164,13 +164,8 @@ void buffer_release(cl_mem buffer)
 
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes)
 {
-    return buffer_read_part(compute, buffer, 0, size, bytes);
-}
-
-bool buffer_read_part(Compute *compute, cl_mem buffer, size_t begin, size_t size, void *bytes)
-{
-    return compute_try(
-        compute, clEnqueueReadBuffer(compute->queue, buffer, CL_TRUE, begin, size, bytes, 0, NULL, NULL));
+    return compute_try(compute,
+                       clEnqueueReadBuffer(compute->queue, buffer, CL_TRUE, 0, size, bytes, 0, NULL, NULL));
 }
 
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes)

@@ -114,7 +114,6 @@ cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_fl
 void buffer_release(cl_mem buffer); // accepts NULL
 // Copies the first `size` bytes and waits. On failure buffer_read leaves `bytes` undefined.
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
-bool buffer_read_part(Compute *compute, cl_mem buffer, size_t begin, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
 // Returns memory to which to write `size` bytes of a buffer's new contents, at least 1, from `begin`, or NULL

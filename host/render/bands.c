@@ -168,9 +168,11 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
         uint32_t wanted = band_rows(renderer, pace, settings->sample_count, buffers.rows);
         BandRows rows = queue->take(queue->context, wanted, step);
         if (rows.row_count == 0) break;
+        const double start = clock_seconds();
         go_on = band_sample(renderer, &buffers, rows, 0, settings->sample_count, &delivery) &&
                 band_fill_aovs(renderer, &buffers, aovs, rows) &&
                 band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
+        array_push(renderer->report.bands, ((HostSpan){"band", start, clock_seconds()}));
     }
     band_buffers_close(&buffers, renderer);
     return go_on && compute_ok(compute);

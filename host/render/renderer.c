@@ -447,6 +447,8 @@ void renderer_close(Renderer *renderer)
     renderer_kernels_close(renderer);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);
+    free(renderer->report.builds.items);
+    free(renderer->report.bands.items);
     free(renderer->spares.items);
     free(renderer);
 }
@@ -480,6 +482,20 @@ void *renderer_map(Renderer *renderer, cl_mem buffer, size_t begin, size_t size,
     return mapped;
 }
 
+bool renderer_read(Renderer *renderer, cl_mem buffer, size_t begin, size_t size, void *bytes)
+{
+    Compute *compute = renderer->compute;
+    if (!compute_ok(compute)) return false;
+    const double start = clock_seconds();
+    cl_event event = NULL;
+    if (!compute_try(compute, clEnqueueReadBuffer(compute->queue, buffer, CL_FALSE, begin, size, bytes, 0,
+                                                  NULL, &event)))
+        return false;
+    NamedLaunch read = {"read-back", event_time(compute, event, "clEnqueueReadBuffer", start)};
+    array_push(renderer->report.reads, read);
+    return compute_ok(compute);
+}
+
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped)
 {
     if (mapped) compute_unmap(renderer->compute, buffer, mapped);
@@ -493,6 +509,6 @@ const RenderReport *renderer_report(const Renderer *renderer)
 void renderer_report_restart(Renderer *renderer)
 {
     RenderReport *report = &renderer->report;
-    report->launches.count = report->reads.count = 0;
+    report->launches.count = report->reads.count = report->bands.count = 0;
     memset(report->rays, 0, sizeof report->rays);
 }

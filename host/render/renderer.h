@@ -202,6 +202,12 @@ typedef struct {
     LaunchTime time;
 } NamedLaunch;
 
+// What the host waited for, by clock_seconds.
+typedef struct {
+    const char *name; // of the kernel that was built, or "band"
+    double start_seconds, end_seconds;
+} HostSpan;
+
 typedef struct {
     const Device *device;
     const Device *reference_device; // re-renders flagged pixels at `certified`; NULL if `device` does
@@ -219,6 +225,10 @@ typedef struct {
         NamedLaunch *items;
         size_t count, capacity;
     } launches, reads;
+    struct {
+        HostSpan *items;
+        size_t count, capacity;
+    } builds, bands;
     WorkerShare share; // in the last render
 } RenderReport;
 const RenderReport *renderer_report(const Renderer *renderer);
@@ -231,5 +241,5 @@ uint64_t renderer_scene_hash(const Renderer *renderer);
 char *renderer_kernel_text(const Renderer *renderer);
 // Returns the hash of that text, which the report contains once the kernel is built.
 uint64_t renderer_kernel_hash(const Renderer *renderer);
-// Clears launches, reads and counted rays, so that the next render has its own report.
+// Clears launches, reads, bands and counted rays, so that the next render has its own report.
 void renderer_report_restart(Renderer *renderer);

@@ -1,6 +1,7 @@
 // Builds and launches the kernels of a renderer. Variants of a kernel differ in the definitions before their
 // text and in compiler options.
 #include "host/base/array.h"
+#include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/compile/features.h"
@@ -173,7 +174,10 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     };
     stage_begin(renderer->settings.stage, "building the kernel", NULL, 0);
     fault_note_kernel(slot->request.kernel);
+    const double start = clock_seconds();
     program_build(renderer->compute, &slot->request, &slot->program);
+    const HostSpan build = {kernel_sources[kind].name, start, clock_seconds()};
+    array_push(renderer->report.builds, build);
     fault_note_kernel(NULL);
     stage_begin(renderer->settings.stage, "rendering", NULL, 0);
     if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;

@@ -101,4 +101,6 @@ Pace *renderer_pace(Renderer *renderer, KernelKind kind);
 // Maps `size` bytes of a buffer, beginning at `begin`, for the host to read or write, and adds the time to
 // the report. Returns NULL if the device failed. renderer_unmap releases the mapping and accepts NULL.
 void *renderer_map(Renderer *renderer, cl_mem buffer, size_t begin, size_t size, cl_map_flags access);
+// Reads a part of a buffer and waits. Returns false if the device failed.
+bool renderer_read(Renderer *renderer, cl_mem buffer, size_t begin, size_t size, void *bytes);
 void renderer_unmap(Renderer *renderer, cl_mem buffer, const void *mapped);

@@ -53,8 +53,8 @@ static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_l
     const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
     void *values = band_map(renderer, of_band, layer, CL_MAP_READ | CL_MAP_WRITE);
     void *repeated = memory_allocate(of_list->layer_sizes[layer], 1);
-    const bool is_read = buffer_read_part(repeat->compute, of_list->film, of_list->layer_begins[layer],
-                                          of_list->layer_sizes[layer], repeated);
+    const bool is_read = renderer_read(repeat, of_list->film, of_list->layer_begins[layer],
+                                       of_list->layer_sizes[layer], repeated);
     for (size_t i = 0; i < list->index.count && values && is_read; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->index.items[i] * components + k;
@@ -77,7 +77,10 @@ static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
     report->build_seconds += of_repeat->build_seconds;
     report->build_from_cache &= of_repeat->build_from_cache;
     report->is_out_of_line |= of_repeat->is_out_of_line;
+    for (size_t i = 0; i < of_repeat->builds.count; i++)
+        array_push(report->builds, of_repeat->builds.items[i]);
     of_repeat->build_seconds = 0;
+    of_repeat->builds.count = 0;
     of_repeat->launches.count = of_repeat->reads.count = 0;
 }
 
@@ -181,7 +184,7 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
     const size_t tile_count = film_tile_count(renderer, &band.film);
     uint32_t *flags = memory_allocate(tile_count, sizeof *flags);
-    bool is_whole = buffer_read(renderer->compute, doubts, tile_count * sizeof *flags, flags);
+    bool is_whole = renderer_read(renderer, doubts, 0, tile_count * sizeof *flags, flags);
     PixelList list = {0};
     if (is_whole) list = doubts_list(renderer, rows, flags, tile_count);
     free(flags);

@@ -72,21 +72,25 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
     return (uint32_t)(scene->materials.count - 1);
 }
 
-static bool texture_is(const SceneTexture *texture, const char *path, const char *layer)
+static bool texture_is(const SceneTexture *texture, const char *path, const char *layer,
+                       bool alpha_by_luminance)
 {
-    return strcmp(texture->path, path) == 0 && !texture->layer == !layer &&
-           (!layer || strcmp(texture->layer, layer) == 0);
+    return texture->alpha_by_luminance == alpha_by_luminance && strcmp(texture->path, path) == 0 &&
+           !texture->layer == !layer && (!layer || strcmp(texture->layer, layer) == 0);
 }
 
-uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, size_t offset)
+uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, bool alpha_by_luminance,
+                           size_t offset)
 {
     size_t index = 0;
-    while (index < scene->textures.count && !texture_is(&scene->textures.items[index], path, layer))
+    while (index < scene->textures.count &&
+           !texture_is(&scene->textures.items[index], path, layer, alpha_by_luminance))
         index++;
     if (index == SCENE_TEXTURES_MAX) return 0;
     if (index == scene->textures.count)
         array_push(scene->textures, ((SceneTexture){.path = memory_copy_text(path),
                                                     .layer = layer ? memory_copy_text(layer) : NULL,
+                                                    .alpha_by_luminance = alpha_by_luminance,
                                                     .offset = offset}));
     return (uint32_t)index + 1;
 }

@@ -282,7 +282,8 @@ enum { SCENE_TEXTURES_MAX = 1000 };
 
 // Returns what a material's `texture` is for the image, which materials with the same image share, or 0 if
 // the scene has too many. `layer` may be NULL, as in SceneTexture.
-uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, size_t offset);
+uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, bool alpha_by_luminance,
+                           size_t offset);
 
 // Adds an object with a separate material.
 void scene_add_object(Scene *scene, Object object, const Material *material);

@@ -15,7 +15,7 @@ typedef enum { TIER_A, TIER_B, TIER_C, TIER_D, TIER_COUNT } VerifyTier;
 typedef struct {
     RenderSettings render; // precision, lanes, bounce_count, no_cache and perturb_…; each scene sets the rest
     bool lean;             // build kernels of what each scene needs alone, not one for all scenes
-    bool quick;            // a sixteenth of the random rays and of the largest images
+    bool quick;            // a sixteenth of the random rays, and fewer pixels
     // Gets the scene and settings of each image, for checks of one's own; or NULL.
     void (*picture)(void *context, const Scene *scene, const RenderSettings *settings);
     void *context;

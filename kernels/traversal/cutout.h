@@ -14,7 +14,7 @@
 #include "traversal/query.h"
 
 // Returns the texture coordinates of a hit, without their density. `entry` is the object's
-// kind_index_material. Shading has the same ones.
+// kind_index_material. Shading computes the same coordinates.
 static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 entry, const Ray *ray, real t)
 {
     TextureCoordinates coordinates = {(real)(0), (real)(0), (real)(0)};
@@ -48,7 +48,7 @@ static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 en
     return coordinates;
 }
 
-// Returns the lanes, of those in `wanted`, whose alpha is too low for a hit.
+// Returns the lanes in `wanted` where the alpha is too low for a hit.
 static inline mask alpha_is_low(const Scene *scene, uint4 cutout, uint wrap_v, TextureCoordinates coordinates,
                                 mask wanted)
 {
@@ -65,8 +65,8 @@ static inline mask alpha_is_low(const Scene *scene, uint4 cutout, uint wrap_v, T
 }
 
 // Returns the lanes in `wanted` that pass through a hole at t.
-static OUT_OF_LINE mask object_lets_pass(const Traversal *traversal, const Scene *scene, const Ray *ray,
-                                         uint id, mask wanted, real t)
+static OUT_OF_LINE mask object_hole_lanes(const Traversal *traversal, const Scene *scene, const Ray *ray,
+                                          uint id, mask wanted, real t)
 {
     const uint4 entry = object_entry(traversal, scene, id);
     const uint4 cutout = scene->materials[entry.z].cutout;
@@ -75,15 +75,15 @@ static OUT_OF_LINE mask object_lets_pass(const Traversal *traversal, const Scene
                         cutout_coordinates(scene, entry, ray, t), wanted);
 }
 
-// Removes crossings that would not be recorded, and those in holes, from the lanes `found`. Returns the lanes
-// of the latter.
+// Removes from `found` the crossings that would not be recorded and those in holes. Returns the lanes whose
+// crossing is in a hole.
 static inline mask traversal_cut(const Traversal *traversal, const Scene *scene, const Ray *ray, uint id,
                                  mask *found, real t)
 {
     const Hit *hit = &traversal->hit;
     *found = *found & (traversal->query == OCCLUSION ? traversal->active & (t < hit->t) : t <= hit->t);
     if (!lanes_any(*found)) return mask_none();
-    const mask cut = object_lets_pass(traversal, scene, ray, id, *found, t);
+    const mask cut = object_hole_lanes(traversal, scene, ray, id, *found, t);
     *found = *found & !cut;
     return cut;
 }

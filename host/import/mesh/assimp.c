@@ -311,10 +311,6 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
                                 .field_axis = FIELD_HORIZONTAL,
                                 .half_tangent = tan(camera->mHorizontalFOV / 2),
                                 .frame_aspect = fmax(camera->mAspect, 0)};
-        if (camera->mOrthographicWidth > 0) { // half of it, despite the name
-            view->camera.orthographic = true;
-            view->camera.half_tangent = camera->mOrthographicWidth;
-        }
         view->has_camera = true;
     }
     for (unsigned i = 0; i < file->mNumLights && view; i++) {

@@ -132,7 +132,7 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
 
 static uint32_t texture_add(MeshDraft *draft, const char *path, const char *owner)
 {
-    const uint32_t texture = scene_add_texture(draft->scene, path, NULL, draft->import->offset);
+    const uint32_t texture = scene_add_texture(draft->scene, path, NULL, false, draft->import->offset);
     if (texture == 0) draft_warn(draft, "%s: too many images in one scene: the color is used", owner);
     return texture;
 }

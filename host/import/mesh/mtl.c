@@ -389,14 +389,16 @@ static int name_compare(const void *name, const void *material)
 }
 
 // Adds an image to the scene. Returns 0 with a warning if it cannot be used.
-static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const char *image)
+static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const char *image,
+                          bool alpha_by_luminance)
 {
     if (!draft_has(draft, DRAFT_UV)) {
         draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", image,
                    material->name);
         return 0;
     }
-    const uint32_t texture = scene_add_texture(draft->scene, image, NULL, draft->import->offset);
+    const uint32_t texture =
+        scene_add_texture(draft->scene, image, NULL, alpha_by_luminance, draft->import->offset);
     if (texture == 0)
         draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
                    material->name);
@@ -408,17 +410,17 @@ static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const c
 static void textures_use(MeshDraft *draft, MtlMaterial *material)
 {
     Material *look = &material->material;
-    if (material->image) look->texture = image_add(draft, material, material->image);
+    if (material->image) look->texture = image_add(draft, material, material->image, false);
     if (look->texture > 0) {
         look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
                                 look->diffuse.z * look->color.z};
         look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
     }
-    if (material->opacity_image) look->cutout_texture = image_add(draft, material, material->opacity_image);
+    if (material->opacity_image)
+        look->cutout_texture = image_add(draft, material, material->opacity_image, true);
     if (look->cutout_texture == 0) return;
     look->cutout = CUTOUT_OF_BLENDED;
-    SceneTexture *texture = &draft->scene->textures.items[look->cutout_texture - 1];
-    texture->alpha_by_luminance = texture->alpha_blends = true;
+    draft->scene->textures.items[look->cutout_texture - 1].alpha_blends = true;
 }
 
 static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)

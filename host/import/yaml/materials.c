@@ -150,7 +150,7 @@ bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, 
     if (!path) return false;
     node = names.file;
     const char *layer = names.layer ? yaml_text(&reader->tree, names.layer) : NULL;
-    const uint32_t texture = scene_add_texture(reader->scene, path, layer, node->offset);
+    const uint32_t texture = scene_add_texture(reader->scene, path, layer, false, node->offset);
     free(path);
     if (texture == 0)
         report_error(&reader->report, node->offset, "more than %d textures", SCENE_TEXTURES_MAX);

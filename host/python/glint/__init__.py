@@ -197,7 +197,8 @@ class Scene:
 
     def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
                  frame: float = 0):
-        """overrides: values to replace, such as {"camera.fov": 60}. frame: of an animated scene. name: of its messages."""
+        """overrides: values to replace, such as {"camera.fov": 60}; a text is YAML, and an empty one removes the key.
+        frame: the frame of an animated scene. name: begins its messages."""
         text = description if isinstance(description, str) else _yaml(description)
         encoded = text.encode()
         options = _options(overrides, frame)
@@ -333,8 +334,7 @@ def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) ->
 
 
 def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0) -> Scene:
-    """Reads a scene, mesh or glTF file. overrides: values of a YAML scene to replace, such as {"camera.fov": 60}. frame: of an
-    animated scene."""
+    """Reads a scene, mesh or glTF file. overrides, frame: of a YAML scene, as for Scene."""
     options = _options(overrides, frame)
     scene = Scene.__new__(Scene)
     scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
