@@ -42,9 +42,19 @@ static bool build_try(Compute *compute, const Variant *variant, bool no_cache, d
     return true;
 }
 
+// Acquires the passports of the device. Builds without the cache would otherwise measure them again, although
+// they are not part of a build's time. Returns false if the settings do not fit the device.
+static bool passports_acquire(Compute *compute, const Variant *variant, MessageList *messages)
+{
+    Renderer *renderer = renderer_open_empty(compute, &variant->settings, NULL, messages);
+    renderer_close(renderer);
+    return renderer != NULL;
+}
+
 static bool builds_measure(Compute *compute, const Variant *variant, BenchRow *row, MessageList *messages)
 {
     bool from_cache = false;
+    if (!passports_acquire(compute, variant, messages)) return false;
     if (!build_try(compute, variant, true, &row->build_cold.value, &from_cache, messages)) return false;
     // the first build may fill the cache
     for (int attempt = 0; attempt < 2 && !from_cache; attempt++)
