@@ -17,6 +17,7 @@ from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkp
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
+              "OMPI_MCA_mpi_yield_when_idle": "1",  # ranks that wait leave the processor to other tests
               # more ranks than processors, in Open MPI 4 and in 5
               "OMPI_MCA_rmaps_base_oversubscribe": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe"}
 BUILD = os.environ.get("BUILD", "build")
