@@ -217,7 +217,7 @@ class Cutouts(TestCase):
         write("opaque.yaml", scene % "opaque")
         self.glint("check half.yaml")
         self.assertIn("the alpha of 'opaque.png' is 1 everywhere: nothing is cut out", self.glint("check opaque.yaml").stderr)
-        self.refuses("render half.yaml -o a.npy --precision certified", "a material has a cutout, which has no error bound")
+        self.refuses("render half.yaml -o a.npy --precision certified", r"a material has holes \('cutout'\), which have no error bound")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.refuses("certify half.yaml", "the exact reference has no cutouts, and so cannot judge this scene")
 

@@ -220,7 +220,7 @@ class Soft(TestCase):
         point, command = "point: {position: [0, 5, 0]}", "render soft.yaml --size 8x8 --precision certified -o soft.npy"
         for key, light, message in (("", "{sphere: {center: [0, 5, 0], radius: 1}}", "a light has an area, "),
                                     (", aperture: 1", f"{{{point}}}", "the camera has an 'aperture', "),
-                                    (", height: 1", f"{{{point}}}", "the camera has a 'height', ")):
+                                    (", height: 1", f"{{{point}}}", "the camera has parallel rays, ")):
             write("soft.yaml", camera.format(key, light))
             self.refuses(command, f"{message}which has no error bound: choose a precision other than certified")
             self.refuses("certify soft.yaml --precision strict --size 8x8", "the exact reference has no .*cannot judge this scene")

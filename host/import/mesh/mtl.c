@@ -410,7 +410,9 @@ static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const c
 static void textures_use(MeshDraft *draft, MtlMaterial *material)
 {
     Material *look = &material->material;
-    if (material->image) look->texture = image_add(draft, material, material->image, false);
+    const bool is_one_file =
+        material->image && material->opacity_image && strcmp(material->image, material->opacity_image) == 0;
+    if (material->image) look->texture = image_add(draft, material, material->image, is_one_file);
     if (look->texture > 0) {
         look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
                                 look->diffuse.z * look->color.z};
