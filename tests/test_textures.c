@@ -470,7 +470,7 @@ static void scene_faults_are_reported(void **state)
 {
     (void)state;
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
-                    "4:21: error: 'color' cannot stand beside 'image'\n");
+                    "4:21: error: 'color' cannot be combined with 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n", "4:6: error: material lacks 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
                     "4:27: error: 'size' must be greater than 0\n");

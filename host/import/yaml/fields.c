@@ -102,7 +102,7 @@ static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *fi
     const Field *other = fields;
     while (!seen[other - fields] || (other->forms & field->forms))
         other++;
-    return report_error(&reader->report, key->offset, "'%s' cannot stand beside '%s'", field->name,
+    return report_error(&reader->report, key->offset, "'%s' cannot be combined with '%s'", field->name,
                         other->name);
 }
 
