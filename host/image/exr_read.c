@@ -242,33 +242,27 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
             for (uint32_t i = 0; i < image->channels; i++)
                 plane_sample(&reader->planes[i], (uint32_t)(x + left), (uint32_t)(y + top), &pixel[i]);
             if (reader->layer.form == EXR_CHROMA) chroma_convert(pixel);
+            if (!image->alpha) continue;
+            float *alpha = image->alpha + (size_t)y * image->width + x;
+            plane_sample(&reader->planes[reader->layer.channel_count], (uint32_t)(x + left),
+                         (uint32_t)(y + top), alpha);
+            *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1; // not a number: 1
         }
     }
 }
 
-// Sets the alpha of an image with transparent pixels, such as those outside the data window. An alpha that is
-// not a number counts as 1.
-static void alpha_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
+// Gives an image with transparent pixels, such as those outside the data window, an alpha of zeros.
+static void alpha_open(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
+    if (!reader->layer.has_alpha) return;
     const Plane *plane = &reader->planes[reader->layer.channel_count];
-    const size_t count = reader->layer.has_alpha ? (size_t)width * height : 0;
-    size_t opaque_count = 0;
-    while (opaque_count < count && !(plane->values[opaque_count] < 1))
-        opaque_count++;
     const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
     const int64_t top = (int64_t)reader->display.min.y - reader->window.min.y;
-    const bool is_covered =
-        left >= 0 && top >= 0 && left + image->width <= width && top + image->height <= height;
-    if (opaque_count == count && (count == 0 || is_covered)) return;
-    image->alpha = memory_allocate_zeroed((size_t)image->width * image->height, sizeof *image->alpha);
-    for (uint32_t y = 0; y < image->height; y++) {
-        for (uint32_t x = 0; x < image->width; x++) {
-            if (x + left < 0 || x + left >= width || y + top < 0 || y + top >= height) continue;
-            float *alpha = image->alpha + (size_t)y * image->width + x;
-            plane_sample(plane, (uint32_t)(x + left), (uint32_t)(y + top), alpha);
-            *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1;
-        }
-    }
+    bool is_opaque = left >= 0 && top >= 0 && left + image->width <= width && top + image->height <= height;
+    for (size_t i = 0; i < (size_t)width * height && is_opaque; i++)
+        is_opaque = !(plane->values[i] < 1);
+    if (!is_opaque)
+        image->alpha = memory_allocate_zeroed((size_t)image->width * image->height, sizeof *image->alpha);
 }
 
 static void primaries_check(const ExrReader *reader)
@@ -316,8 +310,8 @@ static bool exr_pixels(ExrReader *reader, Image *image)
                                      height < 0 ? 0 : (uint64_t)height, layer->channel_count, UINT64_MAX);
     if (done) {
         image->data = layer->form == EXR_DIRECTION || layer->form == EXR_NUMBERS;
+        alpha_open(reader, image, store.width, store.height);
         image_fill(reader, image, store.width, store.height);
-        alpha_fill(reader, image, store.width, store.height);
         if (reader->planes[0].is_integer) integers_widen(image);
         if (!image->data) primaries_check(reader);
     }
