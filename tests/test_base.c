@@ -547,7 +547,7 @@ static void test_stage(void **state)
     stage_add(stage, 9); // more than there are
     stage_check(stage, "building 100%");
     size_t count;
-    const StageSpan *spans = stage_spans(stage, &count);
+    const HostSpan *spans = stage_spans(stage, &count);
     assert_int_equal(count, 1);
     assert_string_equal(spans[0].name, "reading a.obj");
     assert_true(spans[0].start_seconds <= spans[0].end_seconds);

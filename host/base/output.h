@@ -16,9 +16,9 @@ typedef struct {
     char *temporary;  // the name in the folder until the rename; NULL: none
 } OutputFile;
 
-// Opens a file for `target` or, for `-`, standard output, which main flushes. On failure
-// adds a message and returns false. output_abandon removes the temporary, and so does an atexit handler.
-// Temporaries of killed processes are removed when the next one is needed.
+// Opens a file for `target` or, for `-`, standard output, which main flushes. On failure adds a message and
+// returns false. output_abandon removes the temporary, and so does an atexit handler. Temporaries of killed
+// processes are removed when the next one is needed.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);
 // Opens a file of mode 0600 for `name` in an open folder, and replaces whatever has that name. It is not
 // synced: for contents that may be lost.

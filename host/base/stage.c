@@ -5,6 +5,7 @@
 #include "host/base/memory.h"
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -18,7 +19,7 @@ struct Stage {
     pthread_t opener;
     double stage_start_seconds;
     struct {
-        StageSpan *items;
+        HostSpan *items;
         size_t count, capacity;
     } spans;
 };
@@ -38,12 +39,12 @@ void stage_close(Stage *stage)
     pthread_mutex_destroy(&stage->mutex);
     text_free(&stage->name);
     for (size_t i = 0; i < stage->spans.count; i++)
-        free(stage->spans.items[i].name);
+        free((void *)(uintptr_t)stage->spans.items[i].name);
     free(stage->spans.items);
     free(stage);
 }
 
-const StageSpan *stage_spans(const Stage *stage, size_t *count)
+const HostSpan *stage_spans(const Stage *stage, size_t *count)
 {
     *count = stage->spans.count;
     return stage->spans.items;
@@ -58,9 +59,9 @@ static bool is_ignored(const Stage *stage)
 static void span_end(Stage *stage, double now)
 {
     if (stage->keeps_spans && stage->name.count > 0)
-        array_push(stage->spans, ((StageSpan){.name = memory_copy_text(text_c(&stage->name)),
-                                              .start_seconds = stage->stage_start_seconds,
-                                              .end_seconds = now}));
+        array_push(stage->spans, ((HostSpan){.name = memory_copy_text(text_c(&stage->name)),
+                                             .start_seconds = stage->stage_start_seconds,
+                                             .end_seconds = now}));
     stage->stage_start_seconds = now;
 }
 

@@ -7,11 +7,11 @@
 
 typedef struct Stage Stage;
 
-// A stage that has ended, by clock_seconds.
+// What the host did, by clock_seconds.
 typedef struct {
-    char *name;
+    const char *name;
     double start_seconds, end_seconds;
-} StageSpan;
+} HostSpan;
 
 // Opens a stage. If `keeps_spans` is set, it keeps each stage that has ended until stage_close, and ignores
 // what other threads than the caller's begin and end.
@@ -19,7 +19,7 @@ Stage *stage_open(bool keeps_spans);
 void stage_close(Stage *stage);
 // Returns the `*count` stages that have ended, in the order in which they began. No other thread may use the
 // stage while the result is read.
-const StageSpan *stage_spans(const Stage *stage, size_t *count);
+const HostSpan *stage_spans(const Stage *stage, size_t *count);
 
 // Sets the stage to `what`, such as "reading", of the file at `path`, which may be NULL, with nothing of
 // `total` done. A `total` of 0 is not counted. The first stage starts the operation.

@@ -66,14 +66,14 @@ char *image_output_default_path(const char *scene_path)
     return path.items;
 }
 
-static bool is_to_stdout(const char *path)
+bool image_output_is_stdout(const char *path)
 {
     return strcmp(path, "-") == 0;
 }
 
 bool image_output_path_known(const char *path)
 {
-    if (is_to_stdout(path) || image_format_of(path) != IMAGE_UNKNOWN) return true;
+    if (image_output_is_stdout(path) || image_format_of(path) != IMAGE_UNKNOWN) return true;
     fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
     return false;
 }
@@ -84,8 +84,8 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const char *sc
 {
     ImageOutput *output = memory_allocate_zeroed(1, sizeof *output);
     *output = (ImageOutput){.options = options,
-                            .format = is_to_stdout(options->path) ? options->stdout_format
-                                                                  : image_format_of(options->path),
+                            .format = image_output_is_stdout(options->path) ? options->stdout_format
+                                                                            : image_format_of(options->path),
                             .scene_path = scene_path,
                             .scene = scene,
                             .settings = settings,
@@ -271,7 +271,7 @@ static bool file_spares_scene(const char *path, void *context)
 bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
                                    const char *scene_path)
 {
-    return !is_to_stdout(options->path) &&
+    return !image_output_is_stdout(options->path) &&
            !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
 }
 
@@ -582,7 +582,7 @@ bool image_output_commit(ImageOutput *output, MessageList *messages, double *sec
         else
             image_writer_abandon(output->aovs[i]);
     }
-    if (whole && is_to_stdout(output->options->path) && fflush(stdout) != 0) {
+    if (whole && image_output_is_stdout(output->options->path) && fflush(stdout) != 0) {
         whole = message_error(messages, "cannot write the standard output: %s", strerror(errno));
         clearerr(stdout);
     }

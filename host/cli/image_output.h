@@ -29,6 +29,8 @@ typedef struct ImageOutput ImageOutput;
 // Returns the scene's name with .png, or image.png for standard input, in the current folder. The caller
 // frees it.
 char *image_output_default_path(const char *scene_path);
+// Returns whether the path is "-", standard output.
+bool image_output_is_stdout(const char *path);
 // Returns whether the path is "-" or its ending is known; if not, prints the known endings.
 bool image_output_path_known(const char *path);
 // Returns whether the format holds linear floats, which are not for display.

@@ -165,7 +165,7 @@ static bool exposure_read(const char *value, double *exposure)
 
 static bool is_to_stdout(const ImageOutputOptions *output)
 {
-    return output->path && strcmp(output->path, "-") == 0;
+    return output->path && image_output_is_stdout(output->path);
 }
 
 // Rejects options that standard output cannot have, or --format without it. Returns false with a message.
@@ -180,7 +180,7 @@ static bool stdout_fits(const RenderOptions *options)
         option_usage_fault("render", "--skip-existing is for files, but --output is -");
     else if (is_stdout && options->output.aovs)
         option_usage_fault("render", "--aov writes more files than --output - can take");
-    else if (is_stdout && options->timing >= TIMING_JSON)
+    else if (is_stdout && timing_uses_stdout(options->timing))
         option_usage_fault("render",
                            "--timing=json and =trace print to standard output, which --output - takes");
     else
@@ -289,7 +289,7 @@ static bool several_fit(const RenderOptions *options)
         option_usage_fault(
             "render", has_scenes ? "--checkpoint takes one scene, but several are given"
                                  : "--checkpoint takes one frame; --skip-existing continues with the rest");
-    else if (options->timing >= TIMING_JSON)
+    else if (timing_uses_stdout(options->timing))
         option_usage_fault("render", has_scenes
                                          ? "--timing=json and =trace take one scene, but several are given"
                                          : "--timing=json and =trace take one frame, but several are given");
@@ -327,7 +327,7 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
                                   "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
     if (!stdout_fits(options) || !display_fits(&options->output)) return EXIT_USER;
-    if (options->skips_existing && options->timing >= TIMING_JSON)
+    if (options->skips_existing && timing_uses_stdout(options->timing))
         return option_usage_fault("render",
                                   "--skip-existing may leave --timing=json or =trace nothing to report");
     options->scenes = arguments + optind;

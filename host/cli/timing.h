@@ -6,6 +6,12 @@
 
 typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON, TIMING_TRACE } TimingStyle;
 
+// Returns whether timing_print writes to standard output.
+static inline bool timing_uses_stdout(TimingStyle style)
+{
+    return style == TIMING_JSON || style == TIMING_TRACE;
+}
+
 bool timing_style_read(const char *value, TimingStyle *style); // a value of NULL means text
 
 typedef struct {

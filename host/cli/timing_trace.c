@@ -104,10 +104,9 @@ static void spans_add(Json *json, const char *verb, const HostSpan *spans, size_
 static void device_add(Json *json, const RenderReport *report, size_t thread, double origin)
 {
     const Device *devices[] = {report->device, report->reference_device};
-    Text name = {0};
-    text_appendf(&name, "bands of %s", report->device->name);
-    thread_name(json, thread, text_c(&name));
-    text_free(&name);
+    char *name = text_format("bands of %s", report->device->name);
+    thread_name(json, thread, name);
+    free(name);
     spans_add(json, "", report->bands.items, report->bands.count, thread, origin);
     thread_name(json, thread + 1, "builds");
     spans_add(json, "building ", report->builds.items, report->builds.count, thread + 1, origin);
@@ -125,7 +124,7 @@ void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *s
 {
     enum { THREADS_OF_DEVICE = 4 };
     size_t span_count;
-    const StageSpan *spans = stage_spans(stage, &span_count);
+    const HostSpan *spans = stage_spans(stage, &span_count);
     const double origin = span_count > 0 ? spans[0].start_seconds : 0;
     bool is_from_cache = true;
     for (size_t i = 0; i < count; i++)
@@ -139,11 +138,7 @@ void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *s
     json_end(json);
     json_begin_array(json, "traceEvents");
     thread_name(json, 0, "host");
-    for (size_t i = 0; i < span_count; i++) {
-        span_begin(json, spans[i].name, 0, spans[i].start_seconds - origin,
-                   spans[i].end_seconds - spans[i].start_seconds);
-        json_end(json);
-    }
+    spans_add(json, "", spans, span_count, 0, origin);
     for (size_t i = 0; i < count; i++)
         device_add(json, renderer_report(renderers[i]), 1 + THREADS_OF_DEVICE * i, origin);
     json_end(json);

@@ -202,12 +202,6 @@ typedef struct {
     LaunchTime time;
 } NamedLaunch;
 
-// What the host waited for, by clock_seconds.
-typedef struct {
-    const char *name; // of the kernel that was built, or "band"
-    double start_seconds, end_seconds;
-} HostSpan;
-
 typedef struct {
     const Device *device;
     const Device *reference_device; // re-renders flagged pixels at `certified`; NULL if `device` does
@@ -226,7 +220,7 @@ typedef struct {
         size_t count, capacity;
     } launches, reads;
     struct {
-        HostSpan *items;
+        HostSpan *items; // a build has its kernel's name
         size_t count, capacity;
     } builds, bands;
     WorkerShare share; // in the last render
