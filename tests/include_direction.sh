@@ -1,5 +1,5 @@
 #!/bin/sh
-# Includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene; opencl; image}, base. A room
+# Includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene, then image; opencl}, base. A room
 # includes itself and the rooms below it; only compile, render and opencl include the kernels' shared headers, each its own;
 # only opencl and render include OpenCL's, only view those of the window, only mpi MPI's.
 set -eu
@@ -9,10 +9,10 @@ cd "$(dirname "$0")/.."
 forbidden_includes() {
     (cd "$1" && find host kernels -name '*.[ch]' -o -name '*.cl' | sort | xargs grep -nHE '^[ \t]*#[ \t]*include') |
         awk -F: '
-            BEGIN { level["base"] = 0; level["scene"] = level["opencl"] = level["image"] = 1; level["import"] = 2
-                    level["compile"] = 3; level["render"] = 4; level["api"] = 5
-                    level["measure"] = level["verify"] = level["view"] = 6
-                    level["cli"] = 7; level["mpi"] = level["main.c"] = 8
+            BEGIN { level["base"] = 0; level["image"] = 1; level["scene"] = level["opencl"] = 2; level["import"] = 3
+                    level["compile"] = 4; level["render"] = 5; level["api"] = 6
+                    level["measure"] = level["verify"] = level["view"] = 7
+                    level["cli"] = 8; level["mpi"] = level["main.c"] = 9
                     shared["compile kernels/types.h"] = shared["compile kernels/features.h"] = 1
                     shared["render kernels/aovs.h"] = shared["opencl kernels/probes.h"] = 1
                     split("shapes traversal shading numerics", folders, " ")

@@ -189,6 +189,20 @@ class Cutouts(TestCase):
         for options, count in [({}, square), ({"alphaMode": "MASK", "alphaCutoff": 0}, square), ({"alphaMode": "MASK", "alphaCutoff": 0.75, "factor": 0.5}, square)]:
             self.assertLess(abs(sum(objects(self.gltf(**options))) / 1600 / count - 1), 0.05, options)
 
+    def test_each_use_decides_about_alpha(self):
+        """A material shows an image's alpha, another ignores it, whatever the rest of the scene does with the same image."""
+        head = "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 2, 5]}}]\nobjects:\n"
+        opaque = "  - mesh: {file: %s}\n" % self.gltf()
+        plain = "  - mesh: {file: quad.obj, material: {image: hole.png}}\n"
+        for objects, count in (opaque, 0), (opaque + plain, 1), (plain + opaque, 1):
+            stderr = self.glint(f"check {write('scene.yaml', head + objects)}").stderr
+            self.assertEqual(stderr.count("the alpha of 'hole.png' is ignored: its transparent parts are opaque"), count, stderr)
+            self.assertEqual(stderr.count("alpha"), count, stderr)
+        cut = "  - mesh: {file: quad.obj, material: {image: hole.png, cutout: 0.5}}\n"
+        self.assertNotIn("alpha", self.glint(f"check {write('scene.yaml', head + cut + opaque)}").stderr)
+        blended = "  - mesh: {file: %s}\n" % self.gltf(alphaMode="BLEND")
+        self.assertIn("the alpha of 'hole.png' does not blend", self.glint(f"check {write('scene.yaml', head + blended + cut)}").stderr)
+
     def gltf(self, factor=1, **material):
         import json
 
@@ -217,8 +231,9 @@ class Cutouts(TestCase):
         write("opaque.yaml", scene % "opaque")
         self.glint("check half.yaml")
         self.assertIn("the alpha of 'opaque.png' is 1 everywhere: nothing is cut out", self.glint("check opaque.yaml").stderr)
-        self.refuses("render half.yaml -o a.npy --precision certified", r"a material has holes \('cutout'\), which have no error bound")
+        self.refuses("render half.yaml -o a.npy --precision certified", "a material has a 'cutout', which has no error bound")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
+        self.glint("certify opaque.yaml --size 4x4")
         self.refuses("certify half.yaml", "the exact reference has no cutouts, and so cannot judge this scene")
 
 

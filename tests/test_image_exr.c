@@ -228,22 +228,28 @@ static void test_layers_by_name(void **state)
 }
 
 // value_at is below 1 everywhere, and only a layer's own alpha counts.
-static void test_alpha_is_noticed(void **state)
+static void test_alpha_is_read(void **state)
 {
     (void)state;
+    enum { NONE = CHANNELS };
     static const struct {
         const char *names, *layer;
-        bool expected;
+        uint32_t alpha; // the number of its channel
     } files[] = {
-        {"A,B,G,R", NULL, true},       {"B,G,R", NULL, false},         {"A,Y", NULL, true},
-        {"A,a.B,a.G,a.R", "a", false}, {"a.A,a.B,a.G,a.R", "a", true}, {"A,depth.Z", "depth", false}};
+        {"A,B,G,R", NULL, 0},          {"B,G,R", NULL, NONE},       {"A,Y", NULL, 0},
+        {"A,a.B,a.G,a.R", "a", NONE},  {"a.A,a.B,a.G,a.R", "a", 0}, {"A,depth.Z", "depth", NONE},
+        {"A,a.A,a.B,a.G,a.R", "a", 1},
+    };
     for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
         exr_write(files[i].names, plain);
         MessageList messages = {0};
         Image image;
         assert_true(layer_read(&image, files[i].layer, &messages));
         assert_int_equal(messages.count, 0);
-        if (!image.alpha == files[i].expected) fail_msg("%s", files[i].names);
+        if (!image.alpha != (files[i].alpha == NONE)) fail_msg("%s", files[i].names);
+        for (uint32_t k = 0; image.alpha && k < WIDTH * HEIGHT; k++)
+            if (image.alpha[k] != value_at(k % WIDTH, k / WIDTH, files[i].alpha))
+                fail_msg("%s: pixel %u", files[i].names, k);
         image_free(&image);
     }
 }
@@ -397,7 +403,7 @@ int main(void)
         cmocka_unit_test(test_compressions),
         cmocka_unit_test(test_choice_of_channels),
         cmocka_unit_test(test_layers_by_name),
-        cmocka_unit_test(test_alpha_is_noticed),
+        cmocka_unit_test(test_alpha_is_read),
         cmocka_unit_test(test_parts_are_layers),
         cmocka_unit_test(test_windows),
         cmocka_unit_test(test_luminance_and_chroma),

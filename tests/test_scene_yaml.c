@@ -1,11 +1,13 @@
 // The native format: every key's value, every default, warnings, and the scene that is read.
 #include "host/import/load.h"
+#include "tests/files.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include <cmocka.h>
 
@@ -415,26 +417,45 @@ static void test_aliases_keep_what_is_set_elsewhere(void **state)
     scene_free(&scene);
 }
 
-// A message about a texture that was set points into the override's text, which the scene keeps.
+// A message about an image that was set points into the override's text.
 static void test_textures_that_are_set_have_a_place(void **state)
 {
     (void)state;
-    Scene scene = SET(LIT SPHERE, "ambient=1", "objects[0].sphere.material={image: a.png}");
-    const Source source = scene_source(&scene);
+    static const char *const overrides[] = {"ambient=1", "objects[0].sphere.material={image: lost.png}"};
+    Text source = {0}, described = {0};
+    text_append(&source, LIT SPHERE, strlen(LIT SPHERE));
     MessageList messages = {0};
-    message_add_at(&messages, MESSAGE_ERROR, &source, scene.textures.items[0].offset, "lost");
-    Text described = {0};
+    Scene scene;
+    assert_false(scene_read_set(&scene, "s.yaml", &source, overrides, 2, &messages));
+    assert_int_equal(messages.count, 1);
     message_describe(&described, &messages.items[0]);
-    assert_string_equal(text_c(&described), "--set:1:36: error: lost\n");
-    assert_string_equal(messages.items[0].source_line, "objects[0].sphere.material={image: a.png}");
+    assert_string_equal(text_c(&described),
+                        "--set:1:36: error: cannot read 'lost.png': No such file or directory\n");
+    assert_string_equal(messages.items[0].source_line, overrides[1]);
     text_free(&described);
+    text_free(&source);
     message_list_free(&messages);
-    scene_free(&scene);
+}
+
+// Writes an image of one pixel, 1 in the default layer and 2 in `diffuse`.
+static void write_layered_image(const char *path)
+{
+    static const ImageLayer diffuse = {"diffuse.R,diffuse.G,diffuse.B", 3, 'f'};
+    static const float colors[][3] = {{1, 1, 1}, {2, 2, 2}};
+    const ImageHeader header = {IMAGE_EXR,       1, 1, 3, .npy_type = 'f', .bits = 16, .layers = &diffuse,
+                                .layer_count = 1};
+    MessageList messages = {0};
+    ImageWriter *writer = image_writer_open(path, &header, &messages);
+    assert_non_null(writer);
+    assert_true(image_writer_layer_rows(writer, (const void *const[]){colors[0], colors[1]}, 1, &messages));
+    assert_true(image_writer_commit(writer, &messages));
 }
 
 static void test_layers_of_images(void **state)
 {
     (void)state;
+    assert_int_equal(mkdir("scenes", 0700), 0);
+    write_layered_image("scenes/a.exr");
     Scene scene =
         scene_of_text("scenes/s.yaml", CAMERA "materials:\n"
                                               "  a: {image: {file: a.exr, layer: diffuse}}\n"
@@ -445,6 +466,8 @@ static void test_layers_of_images(void **state)
     assert_string_equal(scene.textures.items[0].path, "scenes/a.exr");
     assert_string_equal(scene.textures.items[0].layer, "diffuse");
     assert_null(scene.textures.items[1].layer);
+    for (size_t i = 0; i < 2; i++)
+        assert_number((double)scene.textures.items[i].image.values[0], i == 0 ? 2 : 1);
     static const uint32_t textures[] = {1, 2, 2, 1};
     for (size_t i = 0; i < 4; i++)
         assert_int_equal(scene.materials.items[i].texture, textures[i]);
@@ -523,7 +546,7 @@ int main(void)
         cmocka_unit_test(test_values_are_removed),
         cmocka_unit_test(test_aliases_keep_what_is_set_elsewhere),
         cmocka_unit_test(test_textures_that_are_set_have_a_place),
-        cmocka_unit_test(test_layers_of_images),
+        cmocka_unit_test_setup_teardown(test_layers_of_images, folder_open, folder_close),
         cmocka_unit_test(test_materials_may_follow_objects),
         cmocka_unit_test(test_warnings),
         cmocka_unit_test(test_a_failed_scene_is_empty),

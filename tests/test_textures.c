@@ -1,6 +1,6 @@
 // Textures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
-#include "host/compile/compile.h"
+#include "host/compile/features.h"
 #include "host/image/image.h"
 #include "tests/files.h"
 #include "tests/film.h"
@@ -64,12 +64,18 @@ static void texture_write(const TestTexture *texture)
 }
 
 // A scene that shows colors as they are, and one object, whose material is the texture's.
-static Scene scene_make(const char *camera, const char *object)
+static Text scene_text(const char *camera, const char *object)
 {
     Text text = {0};
     text_appendf(&text, "camera: {%s}\nambient: [1, 1, 1]\nmaterials: {texture: {image: %s, size: 2}}\n",
                  camera, texture_path);
     text_appendf(&text, "objects: [{%s material: texture}}]\n", object);
+    return text;
+}
+
+static Scene scene_make(const char *camera, const char *object)
+{
+    Text text = scene_text(camera, object);
     Scene scene = scene_of_text("s.yaml", text_c(&text));
     text_free(&text);
     return scene;
@@ -396,25 +402,24 @@ static void instances_have_the_holes_of_copies(void **state)
     scene_free(&scene);
 }
 
-// Kernels have cutouts only if a pixel is transparent.
+// Scenes have cutouts only if a pixel is transparent.
 static void opaque_images_cut_nothing(void **state)
 {
     (void)state;
     static const char *const images[] = {"scenes/images/globe.png", "tests/textures/leaf.png"};
     for (size_t i = 0; i < 2; i++) {
         Text text = {0};
-        text_appendf(&text, "camera: {%s}\nobjects: [{%s material: {image: %s, cutout: 0.5}}}]\n",
+        text_appendf(&text,
+                     "camera: {%s}\nlights: [{point: {position: [0, 5, 5]}}]\n"
+                     "objects: [{%s material: {image: %s, cutout: 0.5}}}]\n",
                      FROM(0, 0, 5), BALL, images[i]);
         Scene scene = scene_of_text("s.yaml", text_c(&text));
+        assert_int_equal((features_of(&scene) & FEATURE_CUTOUTS) != 0, i == 1);
+        assert_messages("s.yaml", text_c(&text),
+                        i == 1 ? ""
+                               : "3:69: warning: the alpha of 'scenes/images/globe.png' is 1 everywhere: "
+                                 "nothing is cut out\n");
         text_free(&text);
-        const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .lanes = 1};
-        CompiledScene compiled;
-        MessageList messages = {0};
-        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-        assert_int_equal((compiled.features & FEATURE_CUTOUTS) != 0, i == 1);
-        assert_int_equal(messages.count, i == 0);
-        message_list_free(&messages);
-        compiled_scene_free(&compiled);
         scene_free(&scene);
     }
 }
@@ -489,22 +494,14 @@ static void scene_faults_are_reported(void **state)
                     "5:60: error: the mesh has no uv for the material's image\n");
 }
 
-// Checks the message of renderer_open about the texture, at its place in the scene file.
+// Checks the message about the texture, at its place in the scene file.
 static void check_refused(const char *expected)
 {
-    Scene scene = scene_make(FROM(0, 0, 5), BALL);
-    RenderSettings settings = film_settings(4, 4, PRECISION_SINGLE);
-    MessageList messages = {0};
-    assert_null(renderer_open(&probe_compute, &scene, &settings, &messages));
-    assert_int_equal(messages.count, 1);
-    Text described = {0};
-    message_describe(&described, &messages.items[0]);
+    Text text = scene_text(FROM(0, 0, 5), BALL), described = scene_messages("s.yaml", text_c(&text), false);
     if (!strstr(text_c(&described), expected) || strncmp(text_c(&described), "3:30: error: ", 13) != 0)
         fail_msg("%s lacks %s", text_c(&described), expected);
-    assert_non_null(messages.items[0].source_line);
     text_free(&described);
-    message_list_free(&messages);
-    scene_free(&scene);
+    text_free(&text);
 }
 
 static void texture_faults_are_reported(void **state)
@@ -526,13 +523,19 @@ static void texture_faults_are_reported(void **state)
 static void textures_are_shared(void **state)
 {
     (void)state;
-    Scene scene = scene_of_text(
-        "there/s.yaml",
-        MATERIALS "  a: {image: a.png}\n  b: {image: b.png}\n  c: {image: a.png}\n  d: {image: /a.png}\n");
+    const TestTexture texture = texture_make(3, 2);
+    texture_write(&texture);
+    Text text = {0};
+    text_appendf(&text,
+                 MATERIALS "  a: {image: globe.png}\n  b: {image: ../images/globe.png}\n"
+                           "  c: {image: globe.png}\n  d: {image: %s}\n",
+                 texture_path);
+    Scene scene = scene_of_text("scenes/images/s.yaml", text_c(&text));
     assert_int_equal(scene.textures.count, 3);
-    assert_string_equal(scene.textures.items[0].path, "there/a.png");
-    assert_string_equal(scene.textures.items[2].path, "/a.png");
+    assert_string_equal(scene.textures.items[0].path, "scenes/images/globe.png");
+    assert_string_equal(scene.textures.items[2].path, texture_path);
     assert_int_equal(scene.materials.items[2].texture, 1);
+    text_free(&text);
     scene_free(&scene);
 }
 

@@ -153,18 +153,6 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
     json_print(json, stdout);
 }
 
-static bool images_are_there(const Scene *scene, MessageList *messages)
-{
-    const Source source = scene_source(scene);
-    Report report = report_open(&source, messages);
-    for (size_t i = 0; i < scene->textures.count && !report_is_full(&report); i++) {
-        const SceneTexture *texture = &scene->textures.items[i];
-        const char *obstacle = texture->bytes.count > 0 ? NULL : file_obstacle(texture->path);
-        if (obstacle) report_error(&report, texture->offset, "cannot read '%s': %s", texture->path, obstacle);
-    }
-    return report_close(&report);
-}
-
 // Returns whether the scene fits the default precision of glint render.
 static bool scene_renders(const Scene *scene, MessageList *messages)
 {
@@ -223,8 +211,7 @@ static bool scene_check(const CheckOptions *options, const char *path)
     Scene scene = {0};
     MessageList messages = {0};
     const SceneOptions scene_options = scene_options_of(&options->common);
-    bool loaded = scene_load(&scene, path, &scene_options, &messages) &&
-                  images_are_there(&scene, &messages) && scene_renders(&scene, &messages);
+    bool loaded = scene_load(&scene, path, &scene_options, &messages) && scene_renders(&scene, &messages);
     if (options->as_json) {
         json_report(path, &scene, loaded, &messages);
         message_list_free(&messages);

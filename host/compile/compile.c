@@ -29,10 +29,9 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
 {
     compiled->instances = instances_plan(scene, settings);
     if (!size_fits(compiled, scene, messages) || !features_fit(scene, settings, messages) ||
-        !lights_fit(compiled, scene, settings, messages) ||
-        !textures_load(compiled, scene, settings, messages) ||
-        !cutouts_fit(compiled, scene, settings, messages))
+        !lights_fit(compiled, scene, settings, messages))
         return false;
+    textures_flatten(compiled, scene, settings);
     const Rounding rounding = rounding_from(eye_of(scene, settings), settings);
     compiled->eye = rounding.eye;
     stage_begin(settings->stage, "flattening the scene", NULL, 0);
@@ -41,9 +40,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     lights_flatten(compiled, scene, &rounding);
     if (!numbers_fit(compiled, scene, settings, messages)) return false;
     neighbors_find(compiled, scene, settings);
-    FeatureSet features = features_of(scene);
-    if (!textures_cut(compiled, scene)) features &= ~(FeatureSet)FEATURE_CUTOUTS;
-    compiled->features |= features | settings->extra_features;
+    compiled->features |= features_of(scene) | settings->extra_features;
     if (compiled->instances) compiled->features |= FEATURE_INSTANCES;
     if (settings->hashes_primitives) {
         compiled->primitives_hash = HASH_START;

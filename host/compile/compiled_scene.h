@@ -31,8 +31,6 @@ typedef enum {
 // A texture's full size, its levels in FLAT_TEXTURE_LEVELS, and its largest channel.
 typedef struct CompiledTexture {
     uint32_t width, height, first_level, level_count;
-    bool cuts;      // a material has holes where its alpha is low
-    bool has_alpha; // in its first level's texels, of which some are not opaque
     float largest_texel;
     Color sky_mean; // over all directions, of which it is an image
 } CompiledTexture;

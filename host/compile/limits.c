@@ -99,6 +99,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_AREA_LIGHTS, "a light has an area"},
         {FEATURE_LENS, "the camera has an 'aperture'"},
         {FEATURE_ORTHOGRAPHIC, "the camera has parallel rays"},
+        {FEATURE_CUTOUTS, "a material has a 'cutout'"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;
     for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)
@@ -110,16 +111,6 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         return message_error(messages, "a material has 'shadow: false', which has no error bound: choose a "
                                        "precision other than certified");
     return true;
-}
-
-bool cutouts_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                 MessageList *messages)
-{
-    if (!settings->certifies || !(features_of(scene) & FEATURE_CUTOUTS) || !textures_cut(compiled, scene))
-        return true;
-    return message_error(messages,
-                         "a material has holes ('cutout'), which have no error bound: choose a precision "
-                         "other than certified");
 }
 
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,

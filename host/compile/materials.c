@@ -43,9 +43,8 @@ static scalar4 conductor_imaginary_squared(const Material *material)
 
 static uint4 cutout_of(const CompiledScene *compiled, const Material *material)
 {
-    const CompiledTexture *texture =
-        material->cutout_texture > 0 ? &compiled->textures[material->cutout_texture - 1] : NULL;
-    if (!texture || !texture->has_alpha || material->cutout == 0) return (uint4){0, 0, 0, 0};
+    if (material->cutout == 0 || material->cutout_texture == 0) return (uint4){0, 0, 0, 0};
+    const CompiledTexture *texture = &compiled->textures[material->cutout_texture - 1];
     const float least = (float)material->cutout;
     uint4 cutout = {1 + texture->first_level, 0, material->texture_wrap[0], material->texture_wrap[1]};
     memcpy(&cutout.y, &least, sizeof least);

@@ -41,8 +41,7 @@ typedef struct {
     bool shift_to_eye;         // positions are relative to the eye; else as they are
     bool hashes_primitives;    // sets CompiledScene.primitives_hash
     bool is_preview;           // scene_move leaves the arrays as the last eye saw them, and takes no time
-    // From an earlier compilation of the same textures, whose arrays are then left empty; NULL: read the
-    // images.
+    // From an earlier compilation of the same textures, whose arrays are then left empty; NULL: none.
     const struct CompiledTexture *textures;
     Stage *stage; // NULL: not wanted
 } CompileSettings;

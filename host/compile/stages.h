@@ -25,18 +25,9 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages);
 
-// textures.c: reads the scene's images, makes them linear (display values are sRGB; a scene of display colors
-// takes all values as they are) and halves them level by level: FLAT_TEXTURE_LEVELS, FLAT_TEXELS and
-// `textures`. False with a message, at the place in the scene file, where an image cannot be used.
-bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                   MessageList *messages);
-
-// textures.c: whether a texture of a material with holes has pixels that are not opaque.
-bool textures_cut(const CompiledScene *compiled, const Scene *scene);
-
-// limits.c: false with a message if surfaces have holes at `certified`.
-bool cutouts_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                 MessageList *messages);
+// textures.c: makes the scene's images linear (display values are sRGB; a scene of display colors takes all
+// values as they are) and halves them level by level: FLAT_TEXTURE_LEVELS, FLAT_TEXELS and `textures`.
+void textures_flatten(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);
 
 // objects.c, materials.c, lights.c: the arrays of each shape, FLAT_TRIANGLE_NORMALS, FLAT_TRIANGLE_UVS,
 // FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS.

@@ -1,45 +1,19 @@
 #include "host/compile/stages.h"
 
-#include "host/base/array.h"
-#include "host/base/file.h"
 #include "host/base/memory.h"
-#include "host/image/image.h"
 #include "host/image/srgb.h"
 #include "host/scene/portable.h"
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-// SIDE_MAX: a position in float, 24 bits, cannot resolve a texel of a longer side. TEXELS_MAX: a kernel
-// counts the texels of all textures in 32 bits.
-enum { SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
-
-typedef struct {
-    uint32_t width, height;
-    float (*colors)[3];
-    float *alpha; // of each texel in the first level of a texture with transparent ones; else NULL
-} Level;
-
-typedef struct {
-    struct {
-        Level *items;
-        size_t count, capacity;
-    } levels; // of all textures, one after another
-    size_t texel_count;
-} LevelList;
-
-static Level level_open(uint32_t width, uint32_t height)
+static void texel_set(Texel *texel, const float color[3])
 {
-    return (Level){width, height, memory_allocate((size_t)width * height, sizeof(float[3])), NULL};
+    memcpy(&texel->color, color, sizeof(float[3]));
 }
 
-static void levels_free(LevelList *list)
+static void texel_color(const Texel *texel, float color[3])
 {
-    for (size_t i = 0; i < list->levels.count; i++) {
-        free(list->levels.items[i].colors);
-        free(list->levels.items[i].alpha);
-    }
-    free(list->levels.items);
+    memcpy(color, &texel->color, sizeof(float[3]));
 }
 
 // A line of texels re-divided: `part` from 0 to `count` covers the old texels first .. last, the outer ones
@@ -67,208 +41,90 @@ static uint32_t half_of(uint32_t side)
     return (side + 1) / 2;
 }
 
+// Returns how many levels lead from the full size to a single texel.
+static uint32_t level_count_of(uint32_t width, uint32_t height)
+{
+    uint32_t count = 1;
+    for (; width > 1 || height > 1; count++) {
+        width = half_of(width);
+        height = half_of(height);
+    }
+    return count;
+}
+
 // Half as many texels in each dimension, rounded up; each is the mean of what it covers, so that the
 // texture's mean stays.
-static Level level_halved(const Level *fine)
+static void level_halve(Texel *coarse, const Texel *fine, uint32_t fine_width, uint32_t fine_height)
 {
-    Level coarse = level_open(half_of(fine->width), half_of(fine->height));
-    for (uint32_t y = 0; y < coarse.height; y++) {
-        Span rows = span_of(y, coarse.height, fine->height);
-        for (uint32_t x = 0; x < coarse.width; x++) {
-            Span columns = span_of(x, coarse.width, fine->width);
+    const uint32_t width = half_of(fine_width), height = half_of(fine_height);
+    for (uint32_t y = 0; y < height; y++) {
+        Span rows = span_of(y, height, fine_height);
+        for (uint32_t x = 0; x < width; x++) {
+            Span columns = span_of(x, width, fine_width);
             double sum[3] = {0};
+            float color[3];
             for (uint32_t row = rows.first; row <= rows.last; row++) {
                 for (uint32_t column = columns.first; column <= columns.last; column++) {
-                    const float *color = fine->colors[(size_t)row * fine->width + column];
                     double weight = span_covers(&rows, row) * span_covers(&columns, column);
+                    texel_color(&fine[(size_t)row * fine_width + column], color);
                     for (size_t channel = 0; channel < 3; channel++)
                         sum[channel] += weight * (double)color[channel];
                 }
             }
             double area = (rows.end - rows.start) * (columns.end - columns.start);
-            float *color = coarse.colors[(size_t)y * coarse.width + x];
             for (size_t channel = 0; channel < 3; channel++)
                 color[channel] = (float)(sum[channel] / area);
+            texel_set(&coarse[(size_t)y * width + x], color);
         }
     }
-    return coarse;
 }
 
 // Light below 0, which the filters of other programs leave, counts as none.
-static bool level_fill(Level *level, const Image *image, bool decodes)
+static void level_fill(Texel *texels, const Image *image, bool decodes)
 {
     size_t count = (size_t)image->width * image->height;
     for (size_t i = 0; i < count; i++) {
+        float color[3];
         for (size_t channel = 0; channel < 3; channel++) {
             float value = image->values[i * image->channels + (image->channels < 3 ? 0 : channel)];
-            if (!isfinite(value)) return false;
-            level->colors[i][channel] = decodes ? (float)srgb_decode((double)value) : fmaxf(value, 0);
+            color[channel] = decodes ? (float)srgb_decode((double)value) : fmaxf(value, 0);
         }
+        texel_set(&texels[i], color);
+        if (image->alpha) memcpy(&texels[i].color.w, &image->alpha[i], sizeof image->alpha[i]);
     }
-    return true;
-}
-
-// Moves the image's alpha to the first level. Returns what is wrong with the image, or NULL.
-static const char *levels_add(LevelList *list, Image *image, bool as_displayed)
-{
-    if (image->width > SIDE_MAX || image->height > SIDE_MAX) return "a side of more than 65536 texels";
-    if ((size_t)image->width * image->height > TEXELS_MAX - list->texel_count)
-        return "too many texels in all textures";
-    Level level = level_open(image->width, image->height);
-    level.alpha = image->alpha;
-    image->alpha = NULL;
-    array_push(list->levels, level);
-    if (!level_fill(&level, image, image->display && !as_displayed)) return "a color is not finite";
-    list->texel_count += (size_t)level.width * level.height;
-    while (level.width > 1 || level.height > 1) {
-        level = level_halved(&level);
-        array_push(list->levels, level);
-        list->texel_count += (size_t)level.width * level.height;
-    }
-    return list->texel_count > TEXELS_MAX ? "too many texels in all textures" : NULL;
-}
-
-// Sets the alpha of an opaque image to the luminance of its values, as they are stored.
-static void alpha_by_luminance(Image *image)
-{
-    const size_t count = (size_t)image->width * image->height;
-    image->alpha = memory_allocate(count, sizeof *image->alpha);
-    for (size_t i = 0; i < count; i++) {
-        const float *value = image->values + i * image->channels;
-        const float luminance =
-            image->channels < 3 ? value[0] : 0.2126F * value[0] + 0.7152F * value[1] + 0.0722F * value[2];
-        image->alpha[i] = luminance < 1 ? fmaxf(luminance, 0) : 1;
-    }
-}
-
-static bool texture_read(Image *image, const SceneTexture *texture, MessageList *messages)
-{
-    const Text *bytes = &texture->bytes;
-    if (bytes->count > 0)
-        return image_read_bytes(image, &(Source){texture->path, bytes->items, bytes->count}, messages);
-    const char *obstacle = file_obstacle(texture->path);
-    if (obstacle) return message_error(messages, "cannot read '%s': %s", texture->path, obstacle);
-    return image_read_layer(image, texture->path, texture->layer, messages);
 }
 
 // A coarser level's texels are means.
-static float largest_texel(const Level *level)
+static float largest_texel(const Texel *texels, size_t count)
 {
-    float largest = 0;
-    for (size_t i = 0; i < (size_t)level->width * level->height; i++)
-        largest = fmaxf(largest, fmaxf(level->colors[i][0], fmaxf(level->colors[i][1], level->colors[i][2])));
+    float largest = 0, color[3];
+    for (size_t i = 0; i < count; i++) {
+        texel_color(&texels[i], color);
+        largest = fmaxf(largest, fmaxf(color[0], fmaxf(color[1], color[2])));
+    }
     return largest;
 }
 
 // A row's share of the directions is the difference of the sines of its edges' latitudes.
-static Color sky_mean(const Level *level)
+static Color sky_mean(const Texel *texels, uint32_t width, uint32_t height)
 {
     Color mean = {0};
     double below = 1;
-    for (uint32_t y = 0; y < level->height; y++) {
+    for (uint32_t y = 0; y < height; y++) {
         const double above = below;
-        below = portable_cosine((y + 1) * M_PI / level->height);
-        const double share = (above - below) / 2 / level->width;
-        for (uint32_t x = 0; x < level->width; x++) {
-            const float *color = level->colors[(size_t)y * level->width + x];
+        below = portable_cosine((y + 1) * M_PI / height);
+        const double share = (above - below) / 2 / width;
+        for (uint32_t x = 0; x < width; x++) {
+            float color[3];
+            texel_color(&texels[(size_t)y * width + x], color);
             mean = vector_add(mean, vector_scale((Color){color[0], color[1], color[2]}, share));
         }
     }
     return mean;
 }
 
-// Sets which textures cut out parts of surfaces.
-static void cutouts_find(CompiledTexture *textures, const Scene *scene)
-{
-    for (size_t i = 0; i < scene->materials.count; i++) {
-        const Material *material = &scene->materials.items[i];
-        if (material->cutout > 0 && material->cutout_texture > 0)
-            textures[material->cutout_texture - 1].cuts = true;
-    }
-}
-
-// Returns whether a texel is neither transparent nor opaque.
-static bool level_is_translucent(const Level *level)
-{
-    const size_t count = level->alpha ? (size_t)level->width * level->height : 0;
-    for (size_t i = 0; i < count; i++)
-        if (level->alpha[i] > 0 && level->alpha[i] < 1) return true;
-    return false;
-}
-
-// Warns of alpha that is not shown, and of a cutout by an opaque image.
-static void alpha_check(const Scene *scene, const SceneTexture *texture, const Level *level, bool cuts,
-                        MessageList *messages)
-{
-    const Source source = scene_source(scene);
-    const char *what = NULL;
-    if (cuts && texture->alpha_blends && level_is_translucent(level))
-        what = "does not blend: below 0.5 the surface is cut out, elsewhere it is opaque";
-    if (!texture->ignores_alpha && level->alpha && !cuts)
-        what = "is ignored: its transparent parts are opaque";
-    if (!texture->ignores_alpha && !level->alpha && cuts) what = "is 1 everywhere: nothing is cut out";
-    if (what)
-        message_add_at(messages, MESSAGE_WARNING, &source, texture->offset, "the alpha of '%s' %s",
-                       texture->path, what);
-}
-
-static bool texture_add(LevelList *list, CompiledTexture *texture, const Scene *scene,
-                        const SceneTexture *scene_texture, MessageList *messages)
-{
-    const uint32_t first_level = (uint32_t)list->levels.count;
-    const Source source = scene_source(scene);
-    Image image = {0};
-    MessageList problems = {0};
-    bool done = texture_read(&image, scene_texture, &problems);
-    if (done) {
-        if (!image.alpha && scene_texture->alpha_by_luminance) alpha_by_luminance(&image);
-        const char *problem = levels_add(list, &image, scene->color_meaning == COLORS_DISPLAY);
-        done = !problem;
-        if (done) {
-            const Level *first = &list->levels.items[first_level];
-            *texture = (CompiledTexture){.width = first->width,
-                                         .height = first->height,
-                                         .first_level = first_level,
-                                         .level_count = (uint32_t)list->levels.count - first_level,
-                                         .cuts = texture->cuts,
-                                         .has_alpha = first->alpha != NULL,
-                                         .largest_texel = largest_texel(first),
-                                         .sky_mean = sky_mean(first)};
-            alpha_check(scene, scene_texture, first, texture->cuts, messages);
-        }
-        image_free(&image);
-        if (problem)
-            message_add_at(messages, MESSAGE_ERROR, &source, scene_texture->offset, "cannot use '%s': %s",
-                           scene_texture->path, problem);
-    }
-    for (size_t i = 0; i < problems.count; i++)
-        message_add_at(messages, problems.items[i].severity, &source, scene_texture->offset, "%s",
-                       problems.items[i].text);
-    message_list_free(&problems);
-    return done;
-}
-
-bool textures_cut(const CompiledScene *compiled, const Scene *scene)
-{
-    for (size_t i = 0; i < scene->textures.count; i++)
-        if (compiled->textures[i].cuts && compiled->textures[i].has_alpha) return true;
-    return false;
-}
-
-static void texels_flatten(CompiledScene *compiled, const LevelList *list)
-{
-    flat_array_renew(compiled, FLAT_TEXELS, list->texel_count);
-    Texel *texel = compiled->arrays[FLAT_TEXELS].items;
-    for (size_t i = 0; i < list->levels.count; i++) {
-        const Level *level = &list->levels.items[i];
-        for (size_t k = 0; k < (size_t)level->width * level->height; k++, texel++) {
-            memcpy(&texel->color, level->colors[k], sizeof level->colors[k]);
-            if (level->alpha) memcpy(&texel->color.w, &level->alpha[k], sizeof level->alpha[k]);
-        }
-    }
-}
-
-static void levels_flatten(CompiledScene *compiled, size_t texture_count)
+// Lists the levels of each texture, down to a single texel. Returns how many texels they have in all.
+static size_t levels_flatten(CompiledScene *compiled, size_t texture_count)
 {
     size_t level_count = 0;
     for (size_t i = 0; i < texture_count; i++)
@@ -285,28 +141,45 @@ static void levels_flatten(CompiledScene *compiled, size_t texture_count)
             height = half_of(height);
         }
     }
+    return first;
 }
 
-bool textures_load(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
-                   MessageList *messages)
+static void texels_flatten(CompiledScene *compiled, const Scene *scene)
 {
-    LevelList list = {0};
-    compiled->textures = memory_allocate_zeroed(scene->textures.count + 1, sizeof *compiled->textures);
+    Texel *texels = compiled->arrays[FLAT_TEXELS].items;
+    const TextureLevel *levels = compiled->arrays[FLAT_TEXTURE_LEVELS].items;
+    for (size_t i = 0; i < scene->textures.count; i++) {
+        CompiledTexture *texture = &compiled->textures[i];
+        const TextureLevel *level = &levels[texture->first_level];
+        const Image *image = &scene->textures.items[i].image;
+        Texel *fine = texels + level->place.x;
+        level_fill(fine, image, image->display && scene->color_meaning != COLORS_DISPLAY);
+        texture->largest_texel = largest_texel(fine, (size_t)image->width * image->height);
+        texture->sky_mean = sky_mean(fine, image->width, image->height);
+        for (uint32_t k = 1; k < texture->level_count; k++)
+            level_halve(texels + level[k].place.x, texels + level[k - 1].place.x, level[k - 1].place.y,
+                        level[k - 1].place.z);
+    }
+}
+
+void textures_flatten(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
+{
+    const size_t count = scene->textures.count;
+    compiled->textures = memory_allocate_zeroed(count + 1, sizeof *compiled->textures);
     if (settings->textures) {
-        memcpy(compiled->textures, settings->textures, scene->textures.count * sizeof *compiled->textures);
-        levels_flatten(compiled, scene->textures.count);
-        return true;
+        memcpy(compiled->textures, settings->textures, count * sizeof *compiled->textures);
+        levels_flatten(compiled, count);
+        return;
     }
-    bool done = true;
-    cutouts_find(compiled->textures, scene);
-    for (size_t i = 0; i < scene->textures.count && done; i++) {
-        stage_begin(settings->stage, "reading", scene->textures.items[i].path, 0);
-        done = texture_add(&list, &compiled->textures[i], scene, &scene->textures.items[i], messages);
+    uint32_t level_count = 0;
+    for (size_t i = 0; i < count; i++) {
+        const Image *image = &scene->textures.items[i].image;
+        compiled->textures[i] = (CompiledTexture){.width = image->width,
+                                                  .height = image->height,
+                                                  .first_level = level_count,
+                                                  .level_count = level_count_of(image->width, image->height)};
+        level_count += compiled->textures[i].level_count;
     }
-    if (done) {
-        levels_flatten(compiled, scene->textures.count);
-        texels_flatten(compiled, &list);
-    }
-    levels_free(&list);
-    return done;
+    flat_array_renew(compiled, FLAT_TEXELS, levels_flatten(compiled, count));
+    texels_flatten(compiled, scene);
 }

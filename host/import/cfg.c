@@ -278,5 +278,5 @@ bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {0.2, 0.2, 0.2}};
     CfgReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report)) blocks_read(&reader);
-    return scene_finish(scene, &reader.report);
+    return scene_finish(scene, &reader.report, NULL);
 }

@@ -258,5 +258,5 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
     }
     free(reader.textures.items);
     free(reader.slots);
-    return scene_finish(scene, &reader.report);
+    return scene_finish(scene, &reader.report, NULL);
 }

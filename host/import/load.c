@@ -4,12 +4,14 @@
 #include "host/base/hash.h"
 #include "host/base/text.h"
 #include "host/import/mesh/mesh_import.h"
+#include "host/import/textures.h"
 #include <ctype.h>
 #include <string.h>
 #include <strings.h>
 
-bool scene_finish(Scene *scene, Report *report)
+bool scene_finish(Scene *scene, Report *report, Stage *stage)
 {
+    if (report->error_count == 0) textures_decode(scene, report, stage);
     if (!report_close(report)) {
         scene_free(scene);
         return false;

@@ -45,5 +45,6 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
 // Makes a scene of a mesh, which it takes: gray, with a camera that frames it and two lights.
 void scene_of_mesh(Scene *scene, Mesh *mesh);
 
-// Closes a reader's report, warns of what makes an image black, and frees the scene if there are errors.
-bool scene_finish(Scene *scene, Report *report);
+// Decodes the images of a scene without errors, closes its reader's report, warns of what makes an image
+// black, and frees the scene if there are errors.
+bool scene_finish(Scene *scene, Report *report, Stage *stage);

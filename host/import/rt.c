@@ -312,5 +312,5 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
             report_error(&reader.report, source->length, "no camera: a line with C");
     }
     places_close(&places);
-    return scene_finish(scene, &reader.report);
+    return scene_finish(scene, &reader.report, NULL);
 }

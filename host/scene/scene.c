@@ -187,10 +187,9 @@ void scene_free(Scene *scene)
         free(scene->textures.items[i].path);
         free(scene->textures.items[i].layer);
         text_free(&scene->textures.items[i].bytes);
+        image_free(&scene->textures.items[i].image);
     }
     free(scene->textures.items);
-    free(scene->file);
-    text_free(&scene->text);
     while (scene->overrides) {
         Source *freed = scene->overrides;
         scene->overrides = freed->next;
@@ -198,11 +197,6 @@ void scene_free(Scene *scene)
         free(freed);
     }
     *scene = (Scene){0};
-}
-
-Source scene_source(const Scene *scene)
-{
-    return (Source){scene->file, text_c(&scene->text), scene->text.count, scene->overrides};
 }
 
 void scene_add_override(Scene *scene, const char *text)

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "host/base/text.h"
+#include "host/image/image.h"
 #include "host/scene/affine.h"
 #include "host/scene/bounds.h"
 #include "host/scene/vector.h"
@@ -91,6 +92,8 @@ typedef struct {
     TextureWrap texture_wrap[2]; // along u and v, on a mesh
     uint32_t cutout_texture;     // the surface is not there where the alpha of this texture is below `cutout`
     double cutout;               // 0: it is everywhere
+    bool cutout_blends;          // its format blends by this alpha
+    bool ignores_alpha;          // its format defines what becomes of the alpha of `texture`
 } Material;
 
 // Returns the texture whose place on a surface is that of all textures of its material, or 0.
@@ -102,15 +105,17 @@ static inline uint32_t material_any_texture(const Material *material)
 // The cutout for images by whose alpha other programs blend.
 #define CUTOUT_OF_BLENDED 0.5
 
-// A texture's image; scene_compile decodes it.
+// The side of an image in texels: a position in float, 24 bits, cannot resolve a texel of a longer one. The
+// texels of all images: with their coarser levels, a third more, kernels count them in 32 bits.
+enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
+
 typedef struct {
     char *path;              // of the image's file; where it has `bytes`, only for messages
     char *layer;             // of an EXR file; NULL: its default layer, or its only one with colors
     size_t offset;           // of its name in the scene's text
-    Text bytes;              // of an image within another file; else empty
-    bool ignores_alpha;      // its format defines its alpha as ignored, or its reader has reported the loss
+    Text bytes;              // of an image within another file, until it is decoded; else empty
     bool alpha_by_luminance; // where all pixels are opaque, the luminance is the alpha
-    bool alpha_blends;       // its format blends by its alpha, which glint uses for a cutout
+    Image image;             // finite, of 1 or 3 channels or more
 } SceneTexture;
 
 // Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
@@ -252,8 +257,6 @@ typedef struct {
         SceneTexture *items;
         size_t count, capacity;
     } textures;
-    char *file;         // of a scene that has textures, and
-    Text text;          // what was read from it: for messages about them, see scene_source
     uint64_t text_hash; // of the file's bytes and the overrides; hash_bytes
     Source *overrides;  // what replaced values of the file, PATH=VALUE each, in order; NULL if none
     bool is_animated;   // values depend on the frame
@@ -288,8 +291,6 @@ uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, bo
 // Adds an object with a separate material.
 void scene_add_object(Scene *scene, Object object, const Material *material);
 
-// Returns the source of messages about a scene that has images.
-Source scene_source(const Scene *scene);
 // Adds PATH=VALUE to the scene's overrides, which its reader applies.
 void scene_add_override(Scene *scene, const char *text);
 

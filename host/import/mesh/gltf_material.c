@@ -161,11 +161,7 @@ static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *materia
     sampler_read(gltf, &texture, material);
     const GltfItem image = gltf_entry(gltf, "images", source);
     uint32_t *known = &gltf->images[source];
-    if (*known == DRAFT_NONE) {
-        *known = image_add(gltf, &image);
-        // alphaMode decides whether alpha counts
-        if (*known > 0) gltf->draft->scene->textures.items[*known - 1].ignores_alpha = true;
-    }
+    if (*known == DRAFT_NONE) *known = image_add(gltf, &image);
     material->texture = *known;
 }
 
@@ -263,8 +259,7 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
     if (surface->base_texture.json && opacity > 0) {
         if (is_mask && surface->cutoff > 0) look->cutout = surface->cutoff / alpha;
         if (is_blend) look->cutout = CUTOUT_OF_BLENDED;
-        if (is_blend && material->texture > 0)
-            gltf->draft->scene->textures.items[material->texture - 1].alpha_blends = true;
+        look->cutout_blends = is_blend;
     }
     if (opacity < 1) {
         material_set_opacity(look, opacity);
@@ -298,6 +293,7 @@ static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *materi
                                .uv_rows = {{1, 0, 0}, {0, 1, 0}},
                                .scene_index = {DRAFT_NONE, DRAFT_NONE}};
     Material *look = &material->look;
+    look->ignores_alpha = true; // alphaMode decides
     for (int i = 0; i < 4; i++)
         surface.base[i] = fmax(surface.base[i], 0);
     texture_read(gltf, &surface.base_texture, material);

@@ -170,7 +170,7 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
                                .report = &report,
                                .offset = MESSAGE_WHOLE_FILE};
     Object object = {.kind = SHAPE_MESH};
-    *scene = (Scene){.file = memory_copy_text(path)};
+    *scene = (Scene){0};
     if (mesh_import(scene, &import, &object.as.mesh.index)) {
         const Material material = material_default();
         scene->meshes.items[0].path = memory_copy_text(path);
@@ -178,5 +178,5 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
         scene_show(scene, &view, path, &report);
     }
     free(view.lights.items);
-    return scene_finish(scene, &report);
+    return scene_finish(scene, &report, options->stage);
 }

@@ -422,7 +422,7 @@ static void textures_use(MeshDraft *draft, MtlMaterial *material)
         look->cutout_texture = image_add(draft, material, material->opacity_image, true);
     if (look->cutout_texture == 0) return;
     look->cutout = CUTOUT_OF_BLENDED;
-    draft->scene->textures.items[look->cutout_texture - 1].alpha_blends = true;
+    look->cutout_blends = true;
 }
 
 static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)

@@ -189,11 +189,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
     if (yaml_tree_read(&reader.tree, &reader.report, options->stage) && yaml_override(&reader) &&
         yaml_animate(&reader))
         document_read(&reader);
-    if (scene->textures.count > 0) {
-        scene->file = memory_copy_text(source->file);
-        text_append(&scene->text, source->bytes, source->length);
-    }
     yaml_tree_free(&reader.tree);
     free(reader.names.items);
-    return scene_finish(scene, &reader.report);
+    return scene_finish(scene, &reader.report, options->stage);
 }

@@ -1,0 +1,142 @@
+#include "host/import/textures.h"
+
+#include "host/base/file.h"
+#include "host/base/memory.h"
+#include <math.h>
+#include <stdlib.h>
+
+// Sets the alpha of an opaque image to the luminance of its values, as they are stored.
+static void alpha_by_luminance(Image *image)
+{
+    const size_t count = (size_t)image->width * image->height;
+    image->alpha = memory_allocate(count, sizeof *image->alpha);
+    for (size_t i = 0; i < count; i++) {
+        const float *value = image->values + i * image->channels;
+        const float luminance =
+            image->channels < 3 ? value[0] : 0.2126F * value[0] + 0.7152F * value[1] + 0.0722F * value[2];
+        image->alpha[i] = luminance < 1 ? fmaxf(luminance, 0) : 1;
+    }
+}
+
+static bool texture_read(SceneTexture *texture, MessageList *messages)
+{
+    const Text *bytes = &texture->bytes;
+    if (bytes->count > 0)
+        return image_read_bytes(&texture->image, &(Source){texture->path, bytes->items, bytes->count},
+                                messages);
+    const char *obstacle = file_obstacle(texture->path);
+    if (obstacle) return message_error(messages, "cannot read '%s': %s", texture->path, obstacle);
+    return image_read_layer(&texture->image, texture->path, texture->layer, messages);
+}
+
+static bool colors_are_finite(const Image *image)
+{
+    const size_t count = (size_t)image->width * image->height;
+    for (size_t i = 0; i < count; i++)
+        for (size_t channel = 0; channel < (image->channels < 3 ? 1 : 3); channel++)
+            if (!isfinite(image->values[i * image->channels + channel])) return false;
+    return true;
+}
+
+// Returns what is wrong with an image of a scene whose others have `texel_count` texels, or NULL.
+static const char *image_problem(const Image *image, size_t texel_count)
+{
+    if (image->width > TEXTURE_SIDE_MAX || image->height > TEXTURE_SIDE_MAX)
+        return "a side of more than 65536 texels";
+    if ((size_t)image->width * image->height > TEXELS_MAX - texel_count)
+        return "too many texels in all textures";
+    return colors_are_finite(image) ? NULL : "a color is not finite";
+}
+
+// Decodes an image and adds its texels to the count. Its reader's messages become those about its place in
+// the scene. Returns false if it cannot be used.
+static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *report)
+{
+    MessageList problems = {0};
+    const size_t offset = texture->offset;
+    bool is_usable = texture_read(texture, &problems);
+    for (size_t i = 0; i < problems.count; i++) {
+        const Message *message = &problems.items[i];
+        if (message->severity == MESSAGE_ERROR)
+            report_error(report, offset, "%s", message->text);
+        else
+            report_warning(report, offset, "%s", message->text);
+    }
+    message_list_free(&problems);
+    text_free(&texture->bytes);
+    const Image *image = &texture->image;
+    const char *problem = is_usable ? image_problem(image, *texel_count) : NULL;
+    if (problem) is_usable = report_error(report, offset, "cannot use '%s': %s", texture->path, problem);
+    if (!is_usable) return false;
+    *texel_count += (size_t)image->width * image->height;
+    if (!image->alpha && texture->alpha_by_luminance) alpha_by_luminance(&texture->image);
+    return true;
+}
+
+// How a scene uses the alpha of an image.
+typedef struct {
+    bool loses;  // shows the image as if it were opaque, although its format does not say so
+    bool cuts;   // has holes where it is low,
+    bool blends; // in place of blending,
+    bool asks;   // because the scene's author says so
+} AlphaUse;
+
+// Returns the use of each image. The caller frees it.
+static AlphaUse *alpha_uses(const Scene *scene)
+{
+    AlphaUse *uses = memory_allocate_zeroed(scene->textures.count + 1, sizeof *uses);
+    uses[scene->sky.texture].loses = true; // uses[0] is that of no image
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        const Material *material = &scene->materials.items[i];
+        const uint32_t cutout = material->cutout > 0 ? material->cutout_texture : 0;
+        uses[cutout].cuts = true;
+        uses[cutout].blends |= material->cutout_blends;
+        uses[cutout].asks |= !material->ignores_alpha;
+        if (material->texture != cutout) uses[material->texture].loses |= !material->ignores_alpha;
+    }
+    return uses;
+}
+
+// Returns whether a pixel is neither transparent nor opaque.
+static bool is_translucent(const Image *image)
+{
+    const size_t count = image->alpha ? (size_t)image->width * image->height : 0;
+    for (size_t i = 0; i < count; i++)
+        if (image->alpha[i] > 0 && image->alpha[i] < 1) return true;
+    return false;
+}
+
+// Returns what a user must know about an image's alpha, or NULL.
+static const char *alpha_warning(const Image *image, const AlphaUse *use)
+{
+    if (image->alpha && use->loses) return "is ignored: its transparent parts are opaque";
+    if (use->cuts && use->blends && is_translucent(image))
+        return "does not blend: below 0.5 the surface is cut out, elsewhere it is opaque";
+    return use->asks && !image->alpha ? "is 1 everywhere: nothing is cut out" : NULL;
+}
+
+// Removes the holes of opaque images, so that kernels need not look for them.
+static void cutouts_prune(Scene *scene)
+{
+    for (size_t i = 0; i < scene->materials.count; i++) {
+        Material *material = &scene->materials.items[i];
+        if (material->cutout == 0 || material->cutout_texture == 0) continue;
+        if (!scene->textures.items[material->cutout_texture - 1].image.alpha)
+            material->cutout = material->cutout_texture = 0;
+    }
+}
+
+void textures_decode(Scene *scene, Report *report, Stage *stage)
+{
+    AlphaUse *uses = alpha_uses(scene);
+    size_t texel_count = 0;
+    for (size_t i = 0; i < scene->textures.count && !report_is_full(report); i++) {
+        SceneTexture *texture = &scene->textures.items[i];
+        stage_begin(stage, "reading", texture->path, 0);
+        if (!texture_decode(texture, &texel_count, report)) continue;
+        const char *warning = alpha_warning(&texture->image, &uses[i + 1]);
+        if (warning) report_warning(report, texture->offset, "the alpha of '%s' %s", texture->path, warning);
+    }
+    free(uses);
+    cutouts_prune(scene);
+}

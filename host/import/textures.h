@@ -1,0 +1,10 @@
+// The images of a scene's materials and sky.
+#pragma once
+
+#include "host/base/stage.h"
+#include "host/import/report.h"
+#include "host/scene/scene.h"
+
+// Decodes the images and removes cutouts by opaque ones. Reports images that cannot be read or used, and
+// warns of alpha that is not shown and of cutouts that are removed.
+void textures_decode(Scene *scene, Report *report, Stage *stage);
