@@ -106,9 +106,9 @@ static void fma_measure(Measurement *measurement)
     const double cost = fma_cost(measurement);
     if (passport->fma_is_fused) passport->fma_cost = cost;
     // doubles have no replacement, and OpenCL demands that their fma rounds once
-    passport->uses_fma =
-        measurement->is_double || (measurement->compute->device->fma_in_hardware && passport->fma_is_fused &&
-                                   passport->fma_cost < PASSPORT_FMA_COST_MAX);
+    const double cost_max = measurement->compute->device->fma_in_hardware ? PASSPORT_FMA_COST_MAX
+                                                                          : PASSPORT_UNCLAIMED_FMA_COST_MAX;
+    passport->uses_fma = measurement->is_double || (passport->fma_is_fused && passport->fma_cost < cost_max);
     if (passport->uses_fma) return;
     probe_kernel_close(measurement);
     const double before = passport->build_seconds;
