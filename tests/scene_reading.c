@@ -24,7 +24,7 @@ bool scene_read_set(Scene *scene, const char *name, const Text *text, const char
                     size_t count, MessageList *messages)
 {
     const Source source = {.file = name, .bytes = text_c(text), .length = text->count};
-    const SceneOptions options = {.overrides = overrides, .override_count = count};
+    const SceneOptions options = {.overrides = overrides, .override_count = count, .override_name = "--set"};
     return scene_read_yaml(scene, &source, &options, messages);
 }
 

@@ -85,7 +85,7 @@ class Images(unittest.TestCase):
             path.write_text(json.dumps(moving))
             np.testing.assert_array_equal(image(glint.load(path, frame=2)), large)
             np.testing.assert_array_equal(image(glint.load(path, {"objects[0].sphere.radius": 1.5})), large)
-        for overrides, reason in ({"camera.zoom.x": 1}, "has no 'zoom'"), ({"camera.fov": "wide"}, "--set:1:12: error: .*fov"):
+        for overrides, reason in ({"camera.zoom.x": 1}, "has no 'zoom'"), ({"camera.fov": "wide"}, "overrides:1:12: error: .*fov"):
             with self.assertRaisesRegex(glint.SceneError, reason):
                 glint.Scene(SPHERE, overrides=overrides)
         with self.assertRaisesRegex(glint.SceneError, "frame is not finite"):

@@ -29,6 +29,7 @@ static bool options_read(SceneOptions *options, const GlintSceneOptions *given, 
         if (!own.overrides[i]) return message_error(messages, "overrides[%zu] is NULL", i);
     if (!isfinite(own.frame)) return message_error(messages, "the frame is not finite");
     options->overrides = own.overrides;
+    options->override_name = "overrides";
     options->override_count = own.override_count;
     options->frame = own.frame;
     return true;

@@ -277,6 +277,7 @@ SceneOptions scene_options_of(const CommonOptions *common)
 {
     return (SceneOptions){.lenient = common->lenient,
                           .overrides = common->overrides,
+                          .override_name = "--set",
                           .override_count = common->override_count,
                           .frame = common->frame,
                           .stage = common->stage};

@@ -11,7 +11,8 @@ typedef struct {
     // camera.fov=60.
     const char *const *overrides;
     size_t override_count;
-    double frame; // of an animated YAML scene
+    const char *override_name; // of their source in messages
+    double frame;              // of an animated YAML scene
     // Called with each mesh and image that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);
     void *context;

@@ -199,13 +199,13 @@ void scene_free(Scene *scene)
     *scene = (Scene){0};
 }
 
-void scene_add_override(Scene *scene, const char *text)
+void scene_add_override(Scene *scene, const char *name, const char *text)
 {
     Source **end = &scene->overrides;
     while (*end)
         end = &(*end)->next;
     *end = memory_allocate_zeroed(1, sizeof **end);
-    **end = (Source){.file = "--set", .bytes = memory_copy_text(text), .length = strlen(text)};
+    **end = (Source){.file = name, .bytes = memory_copy_text(text), .length = strlen(text)};
 }
 
 static bool is_same_file(const char *path, const struct stat *other)

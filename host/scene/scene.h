@@ -291,8 +291,9 @@ uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, bo
 // Adds an object with a separate material.
 void scene_add_object(Scene *scene, Object object, const Material *material);
 
-// Adds PATH=VALUE to the scene's overrides, which its reader applies.
-void scene_add_override(Scene *scene, const char *text);
+// Adds PATH=VALUE to the scene's overrides, which its reader applies. `name` says in messages where it comes
+// from, and must outlive the scene.
+void scene_add_override(Scene *scene, const char *name, const char *text);
 
 // Returns whether `path` is the file that the scene was read from, or one of its images or meshes, by
 // whatever name.

@@ -4,9 +4,9 @@
 // two parts of the product to c without error and rounds the sum once, after rounding the remainder to odd
 // (Boldo, Melquiond, Emulation of a FMA and correctly rounded sums: proved algorithms using rounding to odd,
 // IEEE Transactions on Computers 57(4), 2008; here operands are split between bits, which never overflows).
-// Products of extreme size are computed 2^64 times larger or smaller, so its bits differ from fma's only where
-// the sum is subnormal, or the product is below 2^-166 and c below 2^-64 (on a device that flushes subnormals,
-// 2^22 times that).
+// Products of extreme size are computed 2^64 times larger or smaller, so its bits differ from fma's only
+// where the sum is subnormal, or the product is below 2^-166 and c below 2^-64 (on a device that flushes
+// subnormals, 2^22 times that).
 #ifndef PAIR_H
 #define PAIR_H
 

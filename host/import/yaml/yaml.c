@@ -179,7 +179,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
 {
     *scene = (Scene){.color_meaning = COLORS_LINEAR};
     for (size_t i = 0; i < options->override_count; i++)
-        scene_add_override(scene, options->overrides[i]);
+        scene_add_override(scene, options->override_name, options->overrides[i]);
     const Source whole = {source->file, source->bytes, source->length, scene->overrides};
     YamlReader reader = {.report = report_open(&whole, messages),
                          .scene = scene,
