@@ -174,7 +174,8 @@ static void terms_make(float *a, float *b, float *c)
         for (size_t k = 0; k < 2; k++) {
             double mantissa =
                 whole(&random, i / 4 % 2 ? 24 : 5 + (int)(i / 8 % 16), random_between(&random, 0, 1) < 0.5);
-            int scale = (int)floor(random_between(&random, -75, 64));
+            const double largest = i / 16 % 2 ? 127 : 64;
+            int scale = (int)floor(random_between(&random, -largest, largest));
             *factors[k] =
                 (float)copysign(ldexp(mantissa, scale - ilogb(mantissa)), random_between(&random, -1, 1));
         }
@@ -211,7 +212,8 @@ static void fma_in_software_is_exact(void **state)
         multiply_add(lanes, a, b, c, sums, errors);
         for (size_t i = 0; i < OPERAND_COUNT; i++) {
             float product = a[i] * b[i], sum = fmaf(a[i], b[i], c[i]);
-            if (fabsf(sum) >= FLT_MIN && !same(sums[i], sum))
+            if (isinf(product) && isinf(c[i])) continue; // may be NaN
+            if (ilogbf(a[i]) + ilogbf(b[i]) >= -166 && !same(sums[i], sum))
                 fail_msg("%u lanes: %a * %a + %a is %a, not %a", lanes, (double)a[i], (double)b[i],
                          (double)c[i], (double)sum, (double)sums[i]);
             if (isfinite(product) && errors[i] != fmaf(a[i], b[i], -product))

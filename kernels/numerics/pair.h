@@ -5,8 +5,7 @@
 // (Boldo, Melquiond, Emulation of a FMA and correctly rounded sums: proved algorithms using rounding to odd,
 // IEEE Transactions on Computers 57(4), 2008; here operands are split between bits, which never overflows).
 // Products of extreme size are computed 2^64 times larger or smaller, so its bits differ from fma's only
-// where the sum is subnormal, or the product is below 2^-166 and c below 2^-64 (on a device that flushes
-// subnormals, 2^22 times that).
+// where the product is below 2^-166 (on a device that flushes subnormals, 2^-144) or above 2^192.
 #ifndef PAIR_H
 #define PAIR_H
 
@@ -32,7 +31,7 @@ static inline Pair two_sum(real a, real b)
 
 #else
 
-// a b without error, from parts of 12 bits, whose products are exact (Dekker, A floating-point technique for
+// a b without error, if that is neither tiny nor huge, from parts of 12 bits, whose products are exact (Dekker, A floating-point technique for
 // extending the available precision, Numerische Mathematik 18, 1971).
 static inline Pair moderate_product(real a, real b)
 {
@@ -54,19 +53,6 @@ static inline real pair_round_to_odd(Pair sum)
     return real_from_bits(lanes_select(moves, bits + step, bits));
 }
 
-// The same for sizes at which neither the product nor the sum overflows, and the product's low part is
-// normal.
-static inline real moderate_fma(real a, real b, real c)
-{
-    Pair product = moderate_product(a, b);
-    Pair lower = two_sum(c, product.low), upper = two_sum(product.high, lower.high);
-    real rounded_once = upper.high + pair_round_to_odd(two_sum(upper.low, lower.low));
-    // has the right sign if the sum is 0, and is right beyond the largest real
-    real rounded_twice = product.high + c;
-    mask finite = (fabs(rounded_twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
-    return lanes_select(finite & (rounded_once != (real)(0)), rounded_once, rounded_twice);
-}
-
 // Inlined in hundreds of places, it doubles the time of Intel's compiler.
 __attribute__((noinline)) static real real_fma(real a, real b, real c)
 {
@@ -79,10 +65,24 @@ __attribute__((noinline)) static real real_fma(real a, real b, real c)
     real greater = lanes_select(a_is_less, b, a) * lanes_select(is_large, down, one);
     // of a c that would vanish next to a large product, the sign alone decides, where the product is in the
     // middle between two reals
-    real large_c = lanes_select(c != (real)(0), copysign(fmax(c_size * down, (real)(0x1p-60f)), c), c);
+    real large_c = lanes_select(c_size > (real)(0), copysign(fmax(c_size * down, (real)(0x1p-60f)), c), c);
     real scaled_c = lanes_select(is_large, large_c, c * lanes_select(is_small, up, one));
     real back = lanes_select(is_small, down, lanes_select(is_large, up, one));
-    return moderate_fma(less, greater, scaled_c) * back;
+
+    Pair product = moderate_product(less, greater);
+    Pair lower = two_sum(scaled_c, product.low), upper = two_sum(product.high, lower.high);
+    real rest = pair_round_to_odd(two_sum(upper.low, lower.low));
+    real rounded_once = upper.high + rest;
+    // what is subnormal once it is scaled back is rounded next to a number of the same ulp
+    real normal = copysign((real)(0x1p-62f), rounded_once);
+    Pair shifted = two_sum(normal, upper.high);
+    real rounded_steps = (shifted.high + pair_round_to_odd(two_sum(shifted.low, rest))) - normal;
+    mask is_subnormal = is_small & (fabs(rounded_once) <= (real)(0x1p-62f));
+    rounded_once = lanes_select(is_subnormal, copysign(rounded_steps, rounded_once), rounded_once);
+    // has the right sign if the sum is 0, and is right beyond the largest real
+    real rounded_twice = product.high + scaled_c;
+    mask finite = (fabs(rounded_twice) <= (real)(LARGEST)) & (fabs(upper.high) <= (real)(LARGEST));
+    return lanes_select(finite & (upper.high + rest != (real)(0)), rounded_once, rounded_twice) * back;
 }
 
 #endif
