@@ -2,6 +2,7 @@
 // users run them, and the next step finds what the first one left.
 //
 // run_tests: first
+// run_tests: sanitize-long-only
 #include "host/base/fault.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
