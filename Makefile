@@ -5,7 +5,11 @@ VERSION := 0.2.0
 MAKEFLAGS += --no-builtin-rules
 
 BUILD  ?= build
-CFLAGS ?= $(if $(filter %-sanitize,$(BUILD)),-O1 -g1,-O2 -g)
+# What only runs the tests is built like that in every folder.
+ifeq ($(origin CFLAGS),undefined)
+CFLAGS := $(if $(filter %-sanitize,$(BUILD)),-O1 -g1,-O2 -g)
+$(BUILD)/tests/%.o: private CFLAGS := -O1 -g1
+endif
 PKG_CONFIG ?= pkg-config
 OBJCOPY ?= objcopy
 
