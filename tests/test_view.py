@@ -380,6 +380,22 @@ class View(TestCase):
         window.shows_at_last(png_rows("before.png"))
         window.close()
 
+    def test_reload_of_an_included_file(self):
+        """The included camera cannot be written into the scene's file."""
+        camera, background, *others = SCENE.splitlines(keepends=True)
+        write("stage.yaml", camera + background)
+        write("scene.yaml", "include: stage.yaml\n" + "".join(others))
+        window = Window(self, options="--write-camera")
+        window.shows_at_last(self.image_of(SCENE))
+        window.key("Left")
+        window.camera()
+        window.line("^scene.yaml:1:10: error: the camera cannot be written: it is in an included file")
+        window.key("r", "x")
+        changed = background.replace("0.125", "0.75")
+        write("stage.yaml", camera + changed)
+        window.shows_at_last(self.image_of(SCENE.replace(background, changed)))
+        window.close()
+
     def test_mesh_of_a_mistaken_scene(self):
         """A mesh that only the mistaken scene names is watched."""
         window = Window(self)

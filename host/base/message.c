@@ -76,11 +76,17 @@ bool message_error(MessageList *list, const char *format, ...)
     return false;
 }
 
+const Source *source_at(const Source *source, size_t *offset)
+{
+    for (; source->next && *offset > source->length && *offset != MESSAGE_WHOLE_FILE; source = source->next)
+        *offset -= source->length + 1;
+    return source;
+}
+
 static Message message_place(const Source *source, size_t offset)
 {
     Message message = {0};
-    for (; source->next && offset > source->length && offset != MESSAGE_WHOLE_FILE; source = source->next)
-        offset -= source->length + 1;
+    source = source_at(source, &offset);
     if (source->file) message.file = printable_copy(source->file, strlen(source->file), SIZE_MAX, false);
     if (offset == MESSAGE_WHOLE_FILE) return message;
     if (offset > source->length) offset = source->length;
@@ -101,6 +107,14 @@ static Message message_place(const Source *source, size_t offset)
     if (message.column <= CHARACTERS_SHOWN)
         message.source_line = printable_copy(source->bytes + start, end - start, CHARACTERS_SHOWN, true);
     return message;
+}
+
+char *message_place_text(const Source *source, size_t offset)
+{
+    Message message = message_place(source, offset);
+    char *text = text_format("%s:%u:%u", message.file, message.line, message.column);
+    message_free(&message);
+    return text;
 }
 
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,

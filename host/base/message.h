@@ -41,6 +41,12 @@ bool message_error(MessageList *list, const char *format, ...) __attribute__((fo
 // past the end is taken as the end. Control characters are replaced by `?`.
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
+// Returns the place of a byte offset, as in FILE:LINE:COLUMN. The caller frees it.
+char *message_place_text(const Source *source, size_t offset);
+
+// Returns the source, of one and those that follow it, whose text has an offset, and makes the offset one in
+// that text.
+const Source *source_at(const Source *source, size_t *offset);
 
 size_t message_count(const MessageList *list, MessageSeverity severity);
 

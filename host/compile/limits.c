@@ -1,3 +1,4 @@
+#include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/camera_basis.h"
 #include "host/compile/instances.h"
@@ -5,6 +6,7 @@
 #include "host/compile/stages.h"
 #include <float.h>
 #include <stdatomic.h>
+#include <stdlib.h>
 
 bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages)
 {
@@ -46,13 +48,15 @@ static double box_width(const Bounds *bounds)
     return middle > 0 ? middle : fmax(size.x, fmax(size.y, size.z));
 }
 
-static void extreme_describe(const Extreme *extreme, char text[48])
+// Returns the shape of an object and its line. The caller frees it.
+static char *extreme_describe(const Scene *scene, const Extreme *extreme)
 {
-    const char *name = shape_names[extreme->object->kind];
-    if (extreme->object->line > 0)
-        snprintf(text, 48, "%s on line %u", name, extreme->object->line);
-    else
-        snprintf(text, 48, "%s", name);
+    const Object *object = extreme->object;
+    const char *name = shape_names[object->kind];
+    if (object->line == 0) return memory_copy_text(name);
+    if (object->file == 0) return text_format("%s on line %u", name, object->line);
+    return text_format("%s on line %u of %s", name, object->line,
+                       scene->included.items[object->file - 1].path);
 }
 
 void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages)
@@ -72,14 +76,14 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
         if (width > 0 && width < smallest.size) smallest = (Extreme){object, width};
     }
     if (!farthest.object || !(smallest.size < detail * farthest.size)) return;
-    char names[2][48];
-    extreme_describe(&farthest, names[0]);
-    extreme_describe(&smallest, names[1]);
+    char *names[] = {extreme_describe(scene, &farthest), extreme_describe(scene, &smallest)};
     message_warning(
         messages,
         "the %s reaches %.3g from the eye, and the width of the %s is %.3g: precision %s may lose "
         "details below a trillionth; change the sizes, or use --precision double",
         names[0], farthest.size, names[1], smallest.size, precision_names[settings->precision]);
+    free(names[0]);
+    free(names[1]);
 }
 
 static FeatureSet material_shadow(const Material *material)

@@ -259,7 +259,7 @@ static void block_open(CfgReader *reader)
 
 static void blocks_read(CfgReader *reader)
 {
-    Places places = places_open(reader->report.source);
+    Places places = places_open(reader->report.source, NULL);
     while (!report_is_full(&reader->report) && line_next_filled(&reader->line)) {
         Word word = line_peek(&reader->line);
         if (word_opens_block(word))

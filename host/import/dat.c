@@ -244,7 +244,7 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {1, 1, 1}};
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report)) {
-        Places places = places_open(source);
+        Places places = places_open(source, NULL);
         if (!dat_is(dat_peek(&reader), "begin_scene"))
             report_error(&reader.report, dat_peek(&reader).offset, "a scene starts with 'begin_scene'");
         while (!report_is_full(&reader.report) && !reader.is_at_end && dat_peek(&reader).length) {

@@ -93,6 +93,8 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
         Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         read = scene_read(scene, &source, options, messages);
         scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
+        for (size_t i = 0; i < scene->included.count; i++)
+            scene->text_hash = hash_bytes(scene->text_hash, &scene->included.items[i].hash, sizeof(uint64_t));
         for (const Source *set = scene->overrides; set; set = set->next)
             scene->text_hash = hash_bytes(scene->text_hash, set->bytes, set->length + 1);
         if (scene->is_animated)

@@ -360,7 +360,7 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
     NffReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report)) {
         bool is_empty = true;
-        Places places = places_open(source);
+        Places places = places_open(source, NULL);
         while (!report_is_full(&reader.report) && reach_word(&reader)) {
             const size_t offset = line_peek(&reader.line).offset;
             is_empty = false;

@@ -47,8 +47,19 @@ bool report_is_full(const Report *report)
     return report->error_count >= MESSAGES_MAX;
 }
 
-static bool message_is_before(const Message *a, const Message *b)
+// Returns the position of the message's file among the sources.
+static size_t message_file(const Report *report, const Message *message)
 {
+    size_t position = 0;
+    for (const Source *source = report->source; source; source = source->next, position++)
+        if (!source->file || !message->file || !strcmp(source->file, message->file)) break;
+    return position;
+}
+
+static bool message_is_before(const Report *report, const Message *a, const Message *b)
+{
+    const size_t file_of_a = message_file(report, a), file_of_b = message_file(report, b);
+    if (file_of_a != file_of_b) return file_of_a < file_of_b;
     return a->line != b->line ? a->line < b->line : a->column < b->column;
 }
 
@@ -90,7 +101,7 @@ static void report_sort(Report *report)
             continue;
         }
         size_t place = kept++;
-        for (; place > report->first && message_is_before(&message, &list->items[place - 1]); place--)
+        for (; place > report->first && message_is_before(report, &message, &list->items[place - 1]); place--)
             list->items[place] = list->items[place - 1];
         list->items[place] = message;
     }

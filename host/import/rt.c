@@ -300,7 +300,7 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     RtReader reader = {
         .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
-    Places places = places_open(source);
+    Places places = places_open(source, NULL);
     if (line_open(&reader.line, &reader.report)) {
         while (!report_is_full(&reader.report) && line_next(&reader.line, '#')) {
             element_read(&reader);

@@ -41,6 +41,7 @@ void object_describe(Text *text, const Scene *scene, const char *path, size_t id
     if (mesh) text_appendf(text, "triangle %zu of ", primitive);
     text_appendf(text, "%s %zu", shape_names[object->kind], id - primitive);
     if (mesh && mesh->path) text_appendf(text, ", %s", file_name(mesh->path));
+    if (object->file > 0) path = scene->included.items[object->file - 1].path;
     if (object->line > 0) text_appendf(text, ", %s:%u", file_name(path), object->line);
     const char *name = scene->material_names.items[object_material(scene, object, primitive)];
     if (name[0] != '\0') text_appendf(text, ", material %s", name);

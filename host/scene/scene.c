@@ -190,6 +190,9 @@ void scene_free(Scene *scene)
         image_free(&scene->textures.items[i].image);
     }
     free(scene->textures.items);
+    for (size_t i = 0; i < scene->included.count; i++)
+        free(scene->included.items[i].path);
+    free(scene->included.items);
     while (scene->overrides) {
         Source *freed = scene->overrides;
         scene->overrides = freed->next;
@@ -220,6 +223,8 @@ bool scene_was_read_from(const Scene *scene, const char *scene_path, const char 
     struct stat status;
     if (stat(path, &status) != 0) return false;
     bool is_read = is_same_file(scene_path, &status);
+    for (size_t i = 0; i < scene->included.count && !is_read; i++)
+        is_read = is_same_file(scene->included.items[i].path, &status);
     for (size_t i = 0; i < scene->textures.count && !is_read; i++)
         is_read = is_same_file(scene->textures.items[i].path, &status);
     for (size_t i = 0; i < scene->meshes.count && !is_read; i++)

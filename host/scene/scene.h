@@ -142,7 +142,8 @@ extern const char *const shape_names[SHAPE_COUNT];
 typedef struct {
     ShapeKind kind;
     uint32_t material; // index into the scene's materials
-    uint32_t line;     // of the scene's file, from 1; 0: unknown
+    uint32_t line;     // of its file, from 1; 0: unknown
+    uint32_t file;     // 0: the scene's, else 1 + index into those that it includes
     union {
         struct {
             Vector3 center;
@@ -214,6 +215,12 @@ typedef struct {
     uint64_t file_device, file_index; // of that file, by whatever name
 } Mesh;
 
+// A file that a scene's file includes.
+typedef struct {
+    char *path;
+    uint64_t hash; // of its bytes; hash_bytes
+} IncludedFile;
+
 // How a format defines colors: as linear light, or as values that a display takes unchanged.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 
@@ -257,10 +264,14 @@ typedef struct {
         SceneTexture *items;
         size_t count, capacity;
     } textures;
-    uint64_t text_hash; // of the file's bytes and the overrides; hash_bytes
-    Source *overrides;  // what replaced values of the file, PATH=VALUE each, in order; NULL if none
-    bool is_animated;   // values depend on the frame
-    double frame;       // that the options named
+    uint64_t text_hash; // of the bytes of all files and the overrides; hash_bytes
+    struct {
+        IncludedFile *items;
+        size_t count, capacity;
+    } included;
+    Source *overrides; // what replaced values of the file, PATH=VALUE each, in order; NULL if none
+    bool is_animated;  // values depend on the frame
+    double frame;      // that the options named
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;
@@ -295,8 +306,8 @@ void scene_add_object(Scene *scene, Object object, const Material *material);
 // from, and must outlive the scene.
 void scene_add_override(Scene *scene, const char *name, const char *text);
 
-// Returns whether `path` is the file that the scene was read from, or one of its images or meshes, by
-// whatever name.
+// Returns whether `path` is the file that the scene was read from or includes, or one of its images or
+// meshes, by whatever name.
 bool scene_was_read_from(const Scene *scene, const char *scene_path, const char *path);
 
 // Returns a material with every default of the YAML format: white, ambient 1, diffuse 1, specular 0,

@@ -36,10 +36,14 @@ static bool camera_file_read(CameraFile *file, const Source *source, MessageList
     *file = (CameraFile){.reader.report = report_open(source, messages)};
     YamlReader *reader = &file->reader;
     reader->scene = &file->scene;
-    if (yaml_tree_read(&reader->tree, &reader->report, NULL)) {
+    if (yaml_tree_read(&reader->tree, &reader->report, 0, NULL)) {
         const YamlNode *root = reader->tree.nodes.items;
         file->camera = root->kind == YAML_MAPPING ? field_node(reader, root, "camera") : root;
-        if (file->camera == root)
+        const YamlNode *include = root->kind == YAML_MAPPING ? field_node(reader, root, "include") : root;
+        if (file->camera == root && include != root)
+            report_error(&reader->report, include->offset,
+                         "the camera cannot be written: it is in an included file");
+        else if (file->camera == root)
             report_error(&reader->report, root->offset, "the scene has no camera");
         else if (camera_is_constant(file))
             yaml_read_camera(reader, file->camera);

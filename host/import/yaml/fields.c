@@ -2,6 +2,7 @@
 
 #include "host/base/text.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -62,6 +63,19 @@ void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, 
     report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", kind, WORD_SHOWN, word,
                  text_c(&choices));
     text_free(&choices);
+}
+
+void twice_report(YamlReader *reader, const char *kind, const char *name, size_t offset, size_t before)
+{
+    const Source *source = reader->report.source;
+    size_t in_file = offset, before_in_file = before;
+    if (source_at(source, &in_file) == source_at(source, &before_in_file)) {
+        report_error(&reader->report, offset, "%s '%.*s' is given twice", kind, WORD_SHOWN, name);
+        return;
+    }
+    char *place = message_place_text(source, before);
+    report_error(&reader->report, offset, "%s '%.*s' is already given at %s", kind, WORD_SHOWN, name, place);
+    free(place);
 }
 
 static void unknown_field_report(YamlReader *reader, const YamlNode *key, const char *what,

@@ -18,6 +18,7 @@ typedef struct {
 // What `define` gives a name. The objects' meshes are those of the definition.
 typedef struct {
     const char *name; // in the tree's texts
+    size_t offset;
     Object *objects;
     size_t object_count;
 } Definition;
@@ -27,6 +28,10 @@ typedef struct {
     Report report;
     Scene *scene;
     const SceneOptions *options;
+    struct {
+        Source **items;
+        size_t count, capacity;
+    } included; // texts of files, which follow that of the scene's
     struct {
         MaterialName *items;
         size_t count, capacity;
@@ -91,6 +96,8 @@ FieldReader read_color, read_strength;
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target);
 
+// Reports at an offset that the name of a `kind`, such as a material, was given before, and in which file.
+void twice_report(YamlReader *reader, const char *kind, const char *name, size_t offset, size_t before);
 // Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
 // Appends the known word that `word` may stand for, if there is one, and the known words unless they are

@@ -76,11 +76,14 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
     if (transform != mapping) yaml_transform_objects(reader, first, &group.transform, transform);
 }
 
-// Moves the scene's objects from the given index on to a definition. Their meshes stay in the scene.
-static Definition definition_move(YamlReader *reader, const char *name, size_t first_object)
+// Moves the scene's objects from the given index on to a definition, named by a key. Their meshes stay in the
+// scene.
+static Definition definition_move(YamlReader *reader, const YamlNode *key, size_t first_object)
 {
     Scene *scene = reader->scene;
-    Definition definition = {.name = name, .object_count = scene->objects.count - first_object};
+    Definition definition = {.name = yaml_text(&reader->tree, key),
+                             .offset = key->offset,
+                             .object_count = scene->objects.count - first_object};
     definition.objects = memory_allocate(definition.object_count, sizeof *definition.objects);
     for (size_t i = 0; i < definition.object_count; i++) {
         Object *object = &definition.objects[i];
@@ -125,8 +128,9 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
         const char *name = yaml_text(&reader->tree, key);
         const size_t first_object = reader->scene->objects.count;
         const YamlNode *objects = NULL;
-        if (definition_find(reader, name)) {
-            report_error(&reader->report, key->offset, "'%.*s' is given twice", WORD_SHOWN, name);
+        const Definition *known = definition_find(reader, name);
+        if (known) {
+            twice_report(reader, "definition", name, key->offset, known->offset);
             continue;
         }
         if (reader->definitions.count == DEFINITIONS_MAX) {
@@ -136,7 +140,7 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
         if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL) &&
             copies_add(reader, GROUP_COST * (1 + (size_t)objects->child_count), value))
             yaml_read_object_list(reader, objects, false);
-        const Definition definition = definition_move(reader, name, first_object);
+        const Definition definition = definition_move(reader, key, first_object);
         array_push(reader->definitions, definition);
         copies_add(reader, definition_cost(&definition), value);
     }

@@ -115,16 +115,27 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
     return true;
 }
 
+// Returns the file that has the node: of a value of --set the scene's.
+static const char *node_file(const YamlReader *reader, const YamlNode *node)
+{
+    const Source *scene_source = reader->report.source;
+    size_t offset = node->offset;
+    const Source *source = source_at(scene_source, &offset);
+    for (const Source *set = reader->scene->overrides; set; set = set->next)
+        if (set == source) return scene_source->file;
+    return source->file;
+}
+
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 {
     if (node->kind != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
         expected_report(reader, name, "the name of a file", node);
         return NULL;
     }
-    const char *scene_file = reader->report.source->file, *file = yaml_text(&reader->tree, node);
-    const char *slash = strrchr(scene_file, '/');
-    int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - scene_file) : 0;
-    char *path = text_format("%.*s%s", folder_length, scene_file, file);
+    const char *naming_file = node_file(reader, node), *file = yaml_text(&reader->tree, node);
+    const char *slash = strrchr(naming_file, '/');
+    int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - naming_file) : 0;
+    char *path = text_format("%.*s%s", folder_length, naming_file, file);
     const SceneOptions *options = reader->options;
     if (options->file_named) options->file_named(options->context, path);
     return path;
@@ -256,7 +267,7 @@ static int names_compare(const void *a, const void *b)
 {
     const MaterialName *first = a, *second = b;
     int order = strcmp(first->name, second->name);
-    return order ? order : (first->offset > second->offset) - (first->offset < second->offset);
+    return order ? order : (first->material > second->material) - (first->material < second->material);
 }
 
 static int name_matches(const void *word, const void *name)
@@ -282,10 +293,10 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node)
     }
     if (!reader->names.count) return;
     qsort(reader->names.items, reader->names.count, sizeof(MaterialName), names_compare);
-    for (size_t i = 1; i < reader->names.count; i++) {
+    for (size_t i = 1; i < reader->names.count && !report_is_full(&reader->report); i++) {
         const MaterialName *name = &reader->names.items[i];
         if (!strcmp(name[-1].name, name->name))
-            report_error(&reader->report, name->offset, "material '%.40s' is given twice", name->name);
+            twice_report(reader, "material", name->name, name->offset, name[-1].offset);
     }
 }
 

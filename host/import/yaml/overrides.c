@@ -30,20 +30,6 @@ static YamlNode *node_at(const Path *path, uint32_t index)
     return &path->tree->nodes.items[index];
 }
 
-// Aliases share their children, so that a change of one would change the others.
-static void children_unshare(const Path *path)
-{
-    uint32_t last = 0;
-    for (uint32_t child = node_at(path, path->node)->first; child && path->tree->has_aliases;) {
-        const YamlNode copy = *node_at(path, child);
-        const uint32_t index = (uint32_t)path->tree->nodes.count;
-        array_push(path->tree->nodes, copy);
-        *(last ? &node_at(path, last)->next : &node_at(path, path->node)->first) = index;
-        last = index;
-        child = copy.next;
-    }
-}
-
 // Adds a scalar without a parent, which stands at the offset of the override's text.
 static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
 {
@@ -126,7 +112,7 @@ static void path_move(Path *path, uint32_t previous, uint32_t child)
 static bool key_follow(Path *path, const char *name, size_t start)
 {
     if (!node_is(path, YAML_MAPPING)) return false;
-    children_unshare(path);
+    yaml_children_unshare(path->tree, path->node);
     uint32_t last = 0, key = node_at(path, path->node)->first;
     for (; key; key = node_at(path, last)->next) {
         const YamlNode *node = node_at(path, key);
@@ -152,7 +138,7 @@ static bool index_follow(Path *path, uint32_t index, size_t start)
     if (index > count || (index == count && !can_add(path)))
         return report_error(path->report, start, "'%.*s' has %u element%s, counted from [0]", PARENT(path),
                             count, text_plural(count));
-    children_unshare(path);
+    yaml_children_unshare(path->tree, path->node);
     uint32_t last = 0, child = node_at(path, path->node)->first;
     for (uint32_t i = 0; i < index; i++) {
         last = child;
@@ -208,27 +194,6 @@ static bool path_follow(Path *path)
     return true;
 }
 
-// Appends another tree and returns the index of its root.
-static uint32_t tree_append(const Path *path, const YamlTree *added)
-{
-    YamlTree *tree = path->tree;
-    const uint32_t first_node = (uint32_t)tree->nodes.count, first_text = (uint32_t)tree->texts.count;
-    for (size_t i = 0; i < added->nodes.count; i++) {
-        YamlNode node = added->nodes.items[i];
-        node.offset += (uint32_t)path->base;
-        node.end += (uint32_t)path->base;
-        if (node.next > 0) node.next += first_node;
-        if (node.kind == YAML_SCALAR)
-            node.text += first_text;
-        else if (node.first > 0)
-            node.first += first_node;
-        array_push(tree->nodes, node);
-    }
-    text_append(&tree->texts, added->texts.items, added->texts.count);
-    tree->has_aliases |= added->has_aliases;
-    return first_node;
-}
-
 // Adds the nodes of the VALUE and sets the index of their root. A # there begins a color, since a comment
 // would be of no use.
 static bool value_read(const Path *path, uint32_t *root)
@@ -238,11 +203,8 @@ static bool value_read(const Path *path, uint32_t *root)
         *root = scalar_add(path, path->text + start, start);
         return true;
     }
-    YamlTree tree = {0};
-    const bool is_read = yaml_value_read(&tree, path->report, start);
-    if (is_read) *root = tree_append(path, &tree);
-    yaml_tree_free(&tree);
-    return is_read;
+    *root = (uint32_t)path->tree->nodes.count;
+    return yaml_value_read(path->tree, path->report, path->base, start);
 }
 
 static void node_remove(const Path *path)
@@ -272,9 +234,11 @@ static bool override_apply(YamlTree *tree, Report *report, size_t base)
 bool yaml_override(YamlReader *reader)
 {
     bool all_applied = true;
-    const Source *source = reader->report.source;
-    size_t base = source->length + 1;
-    for (const Source *text = source->next; text; text = text->next) {
+    const Source *text = reader->report.source;
+    size_t base = 0;
+    for (; text != reader->scene->overrides; text = text->next)
+        base += text->length + 1;
+    for (; text; text = text->next) {
         MessageList messages = {0};
         const Source alone = {.file = text->file, .bytes = text->bytes, .length = text->length};
         Report report = report_open(&alone, &messages);

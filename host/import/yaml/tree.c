@@ -24,6 +24,8 @@ typedef struct {
 typedef struct {
     YamlTree *tree;
     Report *report;
+    size_t root; // index of the source's first node
+    size_t base; // of the offsets of the source's nodes
     OpenNode open[DEPTH_MAX];
     size_t depth;
     size_t end;       // of the last event: the position of an empty value
@@ -38,6 +40,8 @@ static void node_append(TreeBuilder *builder, YamlNode node)
 {
     YamlTree *tree = builder->tree;
     uint32_t index = (uint32_t)tree->nodes.count;
+    node.offset += (uint32_t)builder->base;
+    node.end += (uint32_t)builder->base;
     array_push(tree->nodes, node);
     if (!builder->depth) return;
     OpenNode *parent = &builder->open[builder->depth - 1];
@@ -90,9 +94,9 @@ static bool collection_open(TreeBuilder *builder, YamlNode node)
 static void collection_close(TreeBuilder *builder)
 {
     YamlNode *node = &builder->tree->nodes.items[builder->open[--builder->depth].node];
-    const char first = builder->report->source->bytes[node->offset];
+    const char first = builder->report->source->bytes[node->offset - builder->base];
     if (first == '[' || first == '{') builder->value_end = builder->end;
-    node->end = (uint32_t)builder->value_end;
+    node->end = (uint32_t)(builder->base + builder->value_end);
 }
 
 // Later anchors of a name hide earlier ones (YAML 1.2.2, section 7.1).
@@ -118,6 +122,8 @@ static bool alias_append(TreeBuilder *builder, const char *name, size_t length, 
     }
     YamlNode copy = builder->tree->nodes.items[anchor->node];
     copy.next = 0;
+    copy.offset -= (uint32_t)builder->base; // which node_append adds
+    copy.end -= (uint32_t)builder->base;
     node_append(builder, copy);
     builder->tree->has_aliases = true;
     return true;
@@ -150,7 +156,7 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
 
     switch (event->type) {
     case FYET_DOCUMENT_START:
-        if (builder->tree->nodes.count)
+        if (builder->tree->nodes.count > builder->root)
             return report_error(builder->report, node.offset, "a second document");
         return true;
     case FYET_SCALAR:
@@ -225,7 +231,8 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
         stage_set(stage, builder->end);
         if (!taken) return false;
     }
-    if (!builder->tree->nodes.count) return report_error(builder->report, 0, "the scene is empty");
+    if (builder->tree->nodes.count == builder->root)
+        return report_error(builder->report, 0, "the scene is empty");
     return true;
 }
 
@@ -240,9 +247,10 @@ static bool source_is_text(const Source *source, Report *report)
 }
 
 // Reads `parsed`, which is the report's source or as long.
-static bool source_read(YamlTree *tree, Report *report, const Source *parsed, Stage *stage)
+static bool source_read(YamlTree *tree, Report *report, size_t base, const Source *parsed, Stage *stage)
 {
-    if (parsed->length > source_length_max) return report_error(report, 0, "a scene of more than 2 GiB");
+    if (base > source_length_max || parsed->length > source_length_max - base)
+        return report_error(report, 0, "a scene of more than 2 GiB");
     if (!source_is_text(report->source, report)) return false;
     struct fy_diag_cfg quiet;
     fy_diag_cfg_default(&quiet);
@@ -255,7 +263,7 @@ static bool source_read(YamlTree *tree, Report *report, const Source *parsed, St
     if (!parser || fy_parser_set_string(parser, parsed->bytes, parsed->length))
         fault("libfyaml: cannot make a parser");
 
-    TreeBuilder builder = {.tree = tree, .report = report};
+    TreeBuilder builder = {.tree = tree, .report = report, .root = tree->nodes.count, .base = base};
     errno = 0;
     bool built = tree_build(&builder, parser, diagnostics, parsed, stage);
     free(builder.anchors.items);
@@ -264,21 +272,34 @@ static bool source_read(YamlTree *tree, Report *report, const Source *parsed, St
     return built;
 }
 
-bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage)
+bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage)
 {
-    return source_read(tree, report, report->source, stage);
+    return source_read(tree, report, base, report->source, stage);
 }
 
-bool yaml_value_read(YamlTree *tree, Report *report, size_t start)
+bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start)
 {
     const Source *source = report->source;
     Text blanked = {0}; // in which all offsets are those of the source
     text_append(&blanked, source->bytes, source->length);
     memset(blanked.items, ' ', start);
     const bool is_read =
-        source_read(tree, report, &(Source){.bytes = blanked.items, .length = blanked.count}, NULL);
+        source_read(tree, report, base, &(Source){.bytes = blanked.items, .length = blanked.count}, NULL);
     text_free(&blanked);
     return is_read;
+}
+
+void yaml_children_unshare(YamlTree *tree, uint32_t node)
+{
+    uint32_t last = 0;
+    for (uint32_t child = tree->nodes.items[node].first; child && tree->has_aliases;) {
+        const YamlNode copy = tree->nodes.items[child];
+        const uint32_t index = (uint32_t)tree->nodes.count;
+        array_push(tree->nodes, copy);
+        *(last ? &tree->nodes.items[last].next : &tree->nodes.items[node].first) = index;
+        last = index;
+        child = copy.next;
+    }
 }
 
 void yaml_tree_free(YamlTree *tree)

@@ -29,12 +29,17 @@ typedef struct {
     bool has_aliases;
 } YamlTree;
 
-// Reports errors and returns false if the text is malformed, empty, larger than 2 GiB, nested too deeply, or
-// has several documents or tags. The stage, which may be NULL, is set to the bytes that were read.
-bool yaml_tree_read(YamlTree *tree, Report *report, Stage *stage);
-// Reads the value that begins at a byte of the source, and skips the bytes before it.
-bool yaml_value_read(YamlTree *tree, Report *report, size_t start);
+// Adds the nodes of the report's source to the tree, root first, with offsets that begin at `base`. Reports
+// errors and returns false if the text is malformed, empty, nested too deeply, or has several documents or
+// tags, or if all texts are larger than 2 GiB. The stage, which may be NULL, is set to the bytes that were
+// read.
+bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage);
+// Adds the value that begins at a byte of the source, and skips the bytes before it.
+bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start);
 void yaml_tree_free(YamlTree *tree);
+
+// Copies the children of a node if they may be those of another one, which an alias makes share them.
+void yaml_children_unshare(YamlTree *tree, uint32_t node);
 
 // Returns the next child, or NULL at the end. A mapping's children are key, value, key, value …
 const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node);

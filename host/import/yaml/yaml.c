@@ -3,6 +3,7 @@
 #include "host/base/memory.h"
 #include "host/import/load.h"
 #include "host/import/yaml/animation.h"
+#include "host/import/yaml/include.h"
 #include "host/import/yaml/overrides.h"
 #include "host/scene/portable.h"
 
@@ -143,6 +144,14 @@ static void scene_set_background(Scene *scene, const Background *background, Col
     scene->sky.forward = vector_turned(vector_cross(up, right), up, background->turn);
 }
 
+// Takes what --set adds, since files are included before values are set.
+static bool read_include(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    (void)target;
+    return report_error(&reader->report, node->offset,
+                        "'%s' cannot be set: files are included before values are set", field->name);
+}
+
 typedef struct {
     Background background;
     Color ambient;
@@ -152,6 +161,7 @@ typedef struct {
 static void document_read(YamlReader *reader)
 {
     static const Field fields[] = {
+        {"include", read_include, 0, FORM_ANY, OPTIONAL, NULL},
         {"camera", read_node, offsetof(Document, camera), FORM_ANY, REQUIRED, NULL},
         {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
         {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
@@ -167,7 +177,7 @@ static void document_read(YamlReader *reader)
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them
         yaml_read_materials(reader, document.materials);
-    reader->places = places_open(reader->report.source);
+    reader->places = places_open(reader->report.source, reader->scene->overrides);
     if (document.definitions) yaml_read_definitions(reader, document.definitions);
     if (document.objects) yaml_read_object_list(reader, document.objects, true);
     scene_add_lamps(reader->scene);
@@ -180,16 +190,18 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
     *scene = (Scene){.color_meaning = COLORS_LINEAR};
     for (size_t i = 0; i < options->override_count; i++)
         scene_add_override(scene, options->override_name, options->overrides[i]);
-    const Source whole = {source->file, source->bytes, source->length, scene->overrides};
+    Source whole = {source->file, source->bytes, source->length, scene->overrides};
     YamlReader reader = {.report = report_open(&whole, messages),
                          .scene = scene,
                          .options = options,
                          .default_material = UINT32_MAX};
     stage_begin(options->stage, "reading", source->file, source->length);
-    if (yaml_tree_read(&reader.tree, &reader.report, options->stage) && yaml_override(&reader) &&
-        yaml_animate(&reader))
+    if (yaml_tree_read(&reader.tree, &reader.report, 0, options->stage) && yaml_include(&reader, &whole) &&
+        yaml_override(&reader) && yaml_animate(&reader))
         document_read(&reader);
     yaml_tree_free(&reader.tree);
     free(reader.names.items);
-    return scene_finish(scene, &reader.report, options->stage);
+    const bool is_read = scene_finish(scene, &reader.report, options->stage);
+    yaml_included_free(&reader);
+    return is_read;
 }

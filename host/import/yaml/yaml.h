@@ -17,8 +17,8 @@ FieldReader read_texture;
 // Returns the default material's index.
 uint32_t material_default_index(YamlReader *reader);
 
-// Returns the path of a file named in the scene, relative to the scene file's folder. Reports an error and
-// returns NULL if the node is not a name. The caller frees it.
+// Returns the path of a file named in the scene, relative to the folder of the file that names it. Reports an
+// error and returns NULL if the node is not a name. The caller frees it.
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node);
 
 // Reads a transform, or a list of them that are applied in order, into an Affine that has an inverse.

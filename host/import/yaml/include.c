@@ -1,0 +1,300 @@
+#include "host/import/yaml/include.h"
+#include "host/base/array.h"
+#include "host/base/file.h"
+#include "host/base/hash.h"
+#include "host/base/memory.h"
+#include "host/import/yaml/yaml.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+// Bounds the depth of files that include each other.
+enum { FILES_MAX = 100 };
+
+typedef struct {
+    dev_t device;
+    ino_t index;
+    bool is_open; // its own includes are being read
+} KnownFile;
+
+typedef struct {
+    YamlReader *reader;
+    Source *last; // of the files so far
+    size_t base;  // of the next file's offsets
+    KnownFile files[1 + FILES_MAX];
+    size_t file_count;
+    bool is_full; // more than FILES_MAX were named
+} Includes;
+
+// The keys of a scene that an included file may have. Collections are joined; other values count only where
+// the scene has none.
+enum { SECTION_COUNT = 7 };
+static const struct {
+    const char *name;
+    bool is_joined;
+    YamlKind kind;
+    const char *must; // be
+} sections[SECTION_COUNT] = {
+    {"camera", false, YAML_MAPPING, NULL},          {"background", false, YAML_MAPPING, NULL},
+    {"ambient", false, YAML_SCALAR, NULL},          {"lights", true, YAML_SEQUENCE, "a list"},
+    {"materials", true, YAML_MAPPING, "a mapping"}, {"define", true, YAML_MAPPING, "a mapping"},
+    {"objects", true, YAML_SEQUENCE, "a list"},
+};
+
+// A mapping to which files are added.
+typedef struct {
+    uint32_t root, last;            // child
+    uint32_t values[SECTION_COUNT]; // 0: it has none
+    uint32_t joined[SECTION_COUNT]; // the last child that came from a file; 0: none did
+} Joined;
+
+static YamlNode *node_at(const Includes *includes, uint32_t index)
+{
+    return &includes->reader->tree.nodes.items[index];
+}
+
+// Returns the index of the section that a key names, or SECTION_COUNT.
+static size_t section_of(const Includes *includes, uint32_t key)
+{
+    size_t i = 0;
+    if (node_at(includes, key)->kind != YAML_SCALAR) return SECTION_COUNT;
+    const char *name = yaml_text(&includes->reader->tree, node_at(includes, key));
+    while (i < SECTION_COUNT && strcmp(sections[i].name, name) != 0)
+        i++;
+    return i;
+}
+
+static Joined joined_open(const Includes *includes, uint32_t root)
+{
+    Joined joined = {.root = root};
+    for (uint32_t key = node_at(includes, root)->first; key > 0;) {
+        const uint32_t value = node_at(includes, key)->next;
+        const size_t section = section_of(includes, key);
+        if (section < SECTION_COUNT && joined.values[section] == 0) joined.values[section] = value;
+        joined.last = value;
+        key = node_at(includes, value)->next;
+    }
+    return joined;
+}
+
+// Appends the pair of a key to the mapping.
+static void pair_append(const Includes *includes, Joined *joined, uint32_t key)
+{
+    YamlNode *root = node_at(includes, joined->root);
+    const uint32_t value = node_at(includes, key)->next;
+    *(joined->last > 0 ? &node_at(includes, joined->last)->next : &root->first) = key;
+    node_at(includes, value)->next = 0;
+    root->child_count += 2;
+    joined->last = value;
+}
+
+// Returns the last child of a collection, which has children.
+static uint32_t last_child(const Includes *includes, uint32_t node)
+{
+    uint32_t last = node_at(includes, node)->first;
+    for (uint32_t child = last; child > 0; child = node_at(includes, child)->next)
+        last = child;
+    return last;
+}
+
+// Adds the children of an included collection to that of the mapping: behind those of earlier files, and
+// before its own.
+static void children_join(const Includes *includes, Joined *joined, size_t section, uint32_t from)
+{
+    if (node_at(includes, from)->child_count == 0) return;
+    yaml_children_unshare(&includes->reader->tree, from);
+    YamlNode *to = node_at(includes, joined->values[section]);
+    const uint32_t last = last_child(includes, from);
+    uint32_t *link =
+        joined->joined[section] > 0 ? &node_at(includes, joined->joined[section])->next : &to->first;
+    node_at(includes, last)->next = *link;
+    *link = node_at(includes, from)->first;
+    to->child_count += node_at(includes, from)->child_count;
+    joined->joined[section] = last;
+}
+
+// Adds a pair of an included file to the mapping.
+static void pair_join(const Includes *includes, Joined *joined, size_t section, uint32_t key)
+{
+    YamlReader *reader = includes->reader;
+    const uint32_t value = node_at(includes, key)->next, own = joined->values[section];
+    if (sections[section].is_joined && node_at(includes, value)->kind != sections[section].kind) {
+        expected_report(reader, sections[section].name, sections[section].must, node_at(includes, value));
+    } else if (own == 0) {
+        joined->values[section] = value;
+        if (sections[section].is_joined && node_at(includes, value)->child_count > 0) {
+            yaml_children_unshare(&reader->tree, value);
+            joined->joined[section] = last_child(includes, value);
+        }
+        pair_append(includes, joined, key);
+    } else if (sections[section].is_joined && node_at(includes, own)->kind == sections[section].kind) {
+        children_join(includes, joined, section, value);
+    }
+}
+
+// Adds the pairs of an included file's mapping.
+static void file_join(const Includes *includes, Joined *joined, uint32_t root)
+{
+    YamlReader *reader = includes->reader;
+    bool seen[SECTION_COUNT] = {false};
+    for (uint32_t key = node_at(includes, root)->first, next; key > 0; key = next) {
+        const size_t section = section_of(includes, key);
+        next = node_at(includes, node_at(includes, key)->next)->next;
+        if (section == SECTION_COUNT) { // unknown, which is reported with all others
+            pair_append(includes, joined, key);
+        } else if (seen[section]) {
+            report_error(&reader->report, node_at(includes, key)->offset, "'%s' is given twice",
+                         sections[section].name);
+        } else {
+            seen[section] = true;
+            pair_join(includes, joined, section, key);
+        }
+    }
+}
+
+// Adds the file's text to the sources and returns it.
+static Source *source_add(Includes *includes, const char *path, Text *text)
+{
+    Source *source = memory_allocate(1, sizeof *source);
+    text_append(text, "", 0); // allocates even an empty one
+    *source = (Source){memory_copy_text(path), text->items, text->count, includes->last->next};
+    includes->last->next = source;
+    includes->last = source;
+    array_push(includes->reader->included, source);
+    const IncludedFile file = {memory_copy_text(path), hash_bytes(HASH_START, source->bytes, source->length)};
+    array_push(includes->reader->scene->included, file);
+    return source;
+}
+
+// Reads the file's text to the tree and sets the index of its root. Messages point into the text.
+static bool text_parse(Includes *includes, Source *source, uint32_t *root)
+{
+    YamlReader *reader = includes->reader;
+    MessageList messages = {0};
+    const Source alone = {.file = source->file, .bytes = source->bytes, .length = source->length};
+    Report report = report_open(&alone, &messages);
+    *root = (uint32_t)reader->tree.nodes.count;
+    stage_begin(reader->options->stage, "reading", source->file, source->length);
+    const bool is_read = yaml_tree_read(&reader->tree, &report, includes->base, reader->options->stage);
+    includes->base += source->length + 1;
+    report_include(&reader->report, &report);
+    if (!is_read || node_at(includes, *root)->kind == YAML_MAPPING) return is_read;
+    return expected_report(reader, "scene", "a mapping", node_at(includes, *root));
+}
+
+static bool includes_read(Includes *includes, uint32_t root);
+
+// Reads a file that was not read before, and adds it.
+static bool file_read(Includes *includes, Joined *joined, const char *path, const YamlNode *node)
+{
+    YamlReader *reader = includes->reader;
+    Text text = {0};
+    MessageList problems = {0};
+    const size_t offset = node->offset; // the tree's nodes move
+    if (!text_read_file(&text, path, &problems)) {
+        report_error(&reader->report, offset, "%s", problems.items[0].text);
+        message_list_free(&problems);
+        return false;
+    }
+    KnownFile *known = &includes->files[includes->file_count - 1];
+    uint32_t root;
+    if (!text_parse(includes, source_add(includes, path, &text), &root)) return false;
+    known->is_open = true;
+    const bool all_read = includes_read(includes, root);
+    known->is_open = false;
+    if (all_read) file_join(includes, joined, root);
+    return all_read && reader->report.error_count == 0;
+}
+
+// Adds the file that a value of `include` names, unless it was added before.
+static bool file_include(Includes *includes, Joined *joined, const YamlNode *node)
+{
+    YamlReader *reader = includes->reader;
+    const char *name = "";
+    if (node->kind == YAML_SCALAR) name = yaml_text(&reader->tree, node);
+    if (!scene_is_yaml(name) || strcmp(name, "-") == 0)
+        return expected_report(reader, "include", "a YAML file (.yaml, .yml or .json)", node);
+    char *path = yaml_read_path(reader, "include", node);
+    const char *obstacle = file_obstacle(path);
+    struct stat status;
+    size_t known = 0;
+    bool is_read = !obstacle && stat(path, &status) == 0;
+    while (is_read && known < includes->file_count &&
+           (includes->files[known].device != status.st_dev || includes->files[known].index != status.st_ino))
+        known++;
+    if (!is_read) {
+        report_error(&reader->report, node->offset, "cannot read '%s': %s", path,
+                     obstacle ? obstacle : "it was removed");
+    } else if (known < includes->file_count) {
+        if (includes->files[known].is_open)
+            is_read = report_error(&reader->report, node->offset, "recursive include of '%s'", path);
+    } else if (reader->included.count == FILES_MAX) {
+        includes->is_full = true;
+        is_read = report_error(&reader->report, node->offset, "more than %d included files", FILES_MAX);
+    } else {
+        includes->files[includes->file_count++] =
+            (KnownFile){.device = status.st_dev, .index = status.st_ino};
+        is_read = file_read(includes, joined, path, node);
+    }
+    free(path);
+    return is_read;
+}
+
+// Removes the `include` of a mapping and returns its value's index, or 0 if it has none.
+static uint32_t include_remove(const Includes *includes, uint32_t root)
+{
+    YamlReader *reader = includes->reader;
+    uint32_t found = 0, *link = &node_at(includes, root)->first;
+    while (*link > 0) {
+        const YamlNode *key = node_at(includes, *link);
+        YamlNode *value = node_at(includes, key->next);
+        if (key->kind != YAML_SCALAR || strcmp(yaml_text(&reader->tree, key), "include") != 0) {
+            link = &value->next;
+            continue;
+        }
+        if (found > 0)
+            report_error(&reader->report, key->offset, "'%s' is given twice", "include");
+        else
+            found = key->next;
+        *link = value->next;
+        node_at(includes, root)->child_count -= 2;
+    }
+    return found;
+}
+
+// Adds the files that a mapping includes.
+static bool includes_read(Includes *includes, uint32_t root)
+{
+    const uint32_t include = include_remove(includes, root);
+    if (include == 0) return true;
+    const bool is_list = node_at(includes, include)->kind == YAML_SEQUENCE;
+    Joined joined = joined_open(includes, root);
+    bool all_read = true;
+    for (uint32_t file = is_list ? node_at(includes, include)->first : include; file > 0;) {
+        all_read &= file_include(includes, &joined, node_at(includes, file));
+        if (includes->is_full || report_is_full(&includes->reader->report)) return false;
+        file = is_list ? node_at(includes, file)->next : 0;
+    }
+    return all_read;
+}
+
+bool yaml_include(YamlReader *reader, Source *source)
+{
+    struct stat status;
+    Includes includes = {.reader = reader, .last = source, .base = source->length + 1};
+    if (reader->tree.nodes.items->kind != YAML_MAPPING) return true; // is reported with its keys
+    if (stat(source->file, &status) == 0)
+        includes.files[includes.file_count++] = (KnownFile){status.st_dev, status.st_ino, true};
+    return includes_read(&includes, 0) && reader->report.error_count == 0;
+}
+
+void yaml_included_free(YamlReader *reader)
+{
+    for (size_t i = 0; i < reader->included.count; i++) {
+        free((char *)reader->included.items[i]->file);
+        free((char *)reader->included.items[i]->bytes);
+        free(reader->included.items[i]);
+    }
+    free(reader->included.items);
+}
