@@ -265,7 +265,7 @@ static void test_number_of_files(void **state)
     (void)state;
     Text list = {0};
     for (int i = 0; i < 100; i++) {
-        char name[16];
+        char name[32];
         snprintf(name, sizeof name, "%d.yaml", i);
         file_write(name, "objects: []\n");
         text_appendf(&list, "%s, ", name);

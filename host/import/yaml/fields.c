@@ -156,6 +156,7 @@ bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
 
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name)
 {
+    if (mapping->kind != YAML_MAPPING) return mapping;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, mapping); key;
          key = yaml_next(&reader->tree, value)) {

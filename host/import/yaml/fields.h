@@ -72,7 +72,7 @@ struct Field {
 bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target, Form *form);
 
-// Returns the value of a key, or the mapping itself if the key is missing.
+// Returns the value of a key, or the node itself if the key is missing or the node is not a mapping.
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name);
 
 // Reports an error and returns false if a key is a list or a mapping.
