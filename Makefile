@@ -13,7 +13,7 @@ endif
 PKG_CONFIG ?= pkg-config
 OBJCOPY ?= objcopy
 
-packages := libfyaml jansson libpng libturbojpeg libexif OpenEXR assimp libsodium OpenCL
+packages := libfyaml jansson zlib libpng libturbojpeg libexif OpenEXR assimp libsodium OpenCL
 ifneq ($(filter-out clean uninstall,$(or $(MAKECMDGOALS),all)),)
 ifneq ($(shell $(PKG_CONFIG) --exists $(packages) && echo found),found)
 $(error Libraries are missing; tools/setup installs or lists them)
@@ -45,7 +45,7 @@ OURS     := -std=c11 -D_GNU_SOURCE -fPIC -fvisibility=hidden $(large_files) $(ar
             $(patsubst -I%,-isystem %,$(shell $(PKG_CONFIG) --cflags $(packages)) $(window_flags)) \
             -DHAS_WINDOW=$(or $(has_window),0) $(sanitize) $(reproducible)
 # Of OpenEXR only the library with the C interface.
-LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson libpng libturbojpeg libexif assimp libsodium OpenCL) \
+LIBS     := $(shell $(PKG_CONFIG) --libs libfyaml jansson zlib libpng libturbojpeg libexif assimp libsodium OpenCL) \
             $(shell $(PKG_CONFIG) --libs-only-L OpenEXR) \
             $(filter -lOpenEXRCore%,$(shell $(PKG_CONFIG) --libs-only-l OpenEXR)) \
             -lm -lpthread -Wl,--export-dynamic-symbol=abort -Wl,--export-dynamic-symbol=__assert_fail

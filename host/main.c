@@ -28,6 +28,7 @@ static const struct {
     {"certify", command_certify, "compare an image with a reference of quadruple precision"},
     {"verify", command_verify, "run the hard cases on a device"},
     {"golden", command_golden, "write or check the hashes of images at strict"},
+    {"report", command_report, "write an archive for a bug report"},
     {"cache", command_cache, "list, check or empty the kernel cache"},
 };
 

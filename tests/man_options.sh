@@ -7,7 +7,7 @@ GLINT=${GLINT:-build/glint}
 "$GLINT" --version >/dev/null
 
 failed=0
-subcommands='render view trace check devices diff bench accuracy certify verify golden cache'
+subcommands='render view trace check devices diff bench accuracy certify verify golden report cache'
 for subcommand in $subcommands; do
     last=$("$GLINT" "$subcommand" --help | tail -n 1)
     case $last in
@@ -54,7 +54,7 @@ offers() {
     }
 }
 glint() { "$GLINT" "$@"; }
-offers 'glint r' render
+offers 'glint ren' render
 offers 'glint LICEN' LICENSE
 offers 'glint render --si' --size
 offers 'glint scenes/demo.yaml --si' --size

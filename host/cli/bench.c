@@ -31,6 +31,7 @@ static const struct option long_options[] = {
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     VARIANT_LONG_OPTIONS,
     DRIVER_LONG_OPTIONS,
+    KEEP_KERNELS_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -47,7 +48,7 @@ static const char help_text[] =
     "      --launches        list the kernel launches of each row's last run\n"
     "      --precision LIST  of single, strict, double, certified (default: single)\n"
     "      --samples LIST    per pixel, one row each (default: 1)\n" //
-    HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_FORMAT HELP_HELP;
+    HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_KEEP_KERNELS HELP_FORMAT HELP_HELP;
 
 typedef struct {
     VariantOptions variants;

@@ -12,4 +12,5 @@ int command_accuracy(int argument_count, char **arguments);
 int command_certify(int argument_count, char **arguments);
 int command_verify(int argument_count, char **arguments);
 int command_golden(int argument_count, char **arguments);
+int command_report(int argument_count, char **arguments);
 int command_cache(int argument_count, char **arguments);

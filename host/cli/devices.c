@@ -18,6 +18,7 @@ enum { OPTION_JSON = OPTION_OWN, OPTION_PROBE };
 static const struct option long_options[] = {
     {"probe", no_argument, NULL, OPTION_PROBE},
     {"json", no_argument, NULL, OPTION_JSON},
+    KEEP_KERNELS_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -26,7 +27,7 @@ static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
                                 "Lists every OpenCL device of every platform; * marks the default. Then\n"
                                 "what the arithmetic of each really does, where that was measured.\n\n"
                                 "      --probe           measure it now\n" //
-    HELP_JSON HELP_HELP;
+    HELP_KEEP_KERNELS HELP_JSON HELP_HELP;
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
@@ -186,17 +187,23 @@ static bool passports_find(const DeviceList *list, bool probes)
 int command_devices(int argument_count, char **arguments)
 {
     bool as_json = false, probes = false;
+    const char *kernel_folder = NULL;
     optind = 1;
     for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
         if (option == 'h') return option_help(help_text);
         if (option == '?') return EXIT_USER;
         as_json = as_json || option == OPTION_JSON;
         probes = probes || option == OPTION_PROBE;
+        if (option != OPTION_KEEP_KERNELS) continue;
+        if (!option_folder("keep-kernels", optarg)) return EXIT_USER;
+        kernel_folder = optarg;
     }
     if (optind < argument_count) return option_usage_fault("devices", "takes no arguments");
 
     DeviceList list;
     device_list_open(&list);
+    for (size_t i = 0; i < list.count; i++)
+        list.items[i].kernel_folder = kernel_folder;
     MessageList messages = {0};
     const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
     const bool is_probed = passports_find(&list, probes);

@@ -5,12 +5,15 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include <errno.h>
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 const char *const lanes_choice_names[LANES_CHOICE_COUNT] = {"1", "4", "8", "16"};
 const uint32_t lanes_choice_values[LANES_CHOICE_COUNT] = {1, 4, 8, 16};
@@ -96,6 +99,17 @@ bool option_max_pixels(const char *value)
     if (!option_count("max-pixels", value, 1, UINT32_MAX, &largest)) return false;
     image_limit_pixels(largest);
     return true;
+}
+
+bool option_folder(const char *option, const char *path)
+{
+    if (mkdir(path, 0777) != 0 && errno != EEXIST) {
+        fprintf(stderr, "glint: --%s: cannot create the folder '%s': %s\n", option, path, strerror(errno));
+        return false;
+    }
+    if (access(path, W_OK | X_OK) == 0) return true;
+    fprintf(stderr, "glint: --%s: cannot write to '%s': %s\n", option, path, strerror(errno));
+    return false;
 }
 
 static bool perturb_read(const char *value, CommonOptions *common)
@@ -233,6 +247,10 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     case OPTION_BUILD_OPTIONS:
         common->build_options = value;
         return true;
+    case OPTION_KEEP_KERNELS:
+        *valid = option_folder("keep-kernels", value);
+        common->kernel_folder = value;
+        return true;
     case OPTION_PERTURB:
         *valid = perturb_read(value, common);
         return true;
@@ -327,6 +345,7 @@ static void driver_options_apply(DeviceList *list, const CommonOptions *common)
         list->items[i].build_options = common->build_options;
         list->items[i].work_group[0] = common->work_group[0];
         list->items[i].work_group[1] = common->work_group[1];
+        list->items[i].kernel_folder = common->kernel_folder;
     }
 }
 

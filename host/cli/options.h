@@ -23,6 +23,7 @@ typedef struct {
     uint32_t perturb_seed, perturb_scale; // 0 if not given
     const char *build_options;            // NULL if not given
     uint32_t work_group[2];               // 0 if not given
+    const char *kernel_folder;            // NULL if not given
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
     double frame; // of an animated scene
@@ -43,6 +44,7 @@ enum {
     OPTION_REFERENCE_DEVICE,
     OPTION_WORK_GROUP,
     OPTION_BUILD_OPTIONS,
+    OPTION_KEEP_KERNELS,
     OPTION_OWN
 };
 
@@ -73,6 +75,12 @@ enum {
     {"work-group", required_argument, NULL, OPTION_WORK_GROUP},                                              \
     {                                                                                                        \
         "build-options", required_argument, NULL, OPTION_BUILD_OPTIONS                                       \
+    }
+
+// The option of commands that examine drivers.
+#define KEEP_KERNELS_LONG_OPTION                                                                             \
+    {                                                                                                        \
+        "keep-kernels", required_argument, NULL, OPTION_KEEP_KERNELS                                         \
     }
 
 // The option of commands that render at `certified`.
@@ -109,6 +117,9 @@ enum {
     "fewer)\n"                                                                                               \
     "      --build-options OPTIONS\n"                                                                        \
     "                        passed to the driver's compiler after glint's, such as \"-cl-opt-disable\"\n"
+#define HELP_KEEP_KERNELS                                                                                    \
+    "      --keep-kernels FOLDER\n"                                                                          \
+    "                        write the text and the build log of each kernel that is built\n"
 #define HELP_REFERENCE                                                                                       \
     "      --reference-device D\n"                                                                           \
     "                        renders in double: references, and the pixels that certified re-renders\n"      \
@@ -145,6 +156,8 @@ bool option_choice(const char *option, const char *value, const char *const *nam
                    unsigned *result);
 // Reads E or E:METRIC. The default metric is the RMSE.
 bool option_error_budget(const char *option, const char *value, ErrorBudget *budget);
+// Creates the folder unless it exists. Returns false with a message if it cannot be written to.
+bool option_folder(const char *option, const char *path);
 // Reads the limit of the pixels of an image that is read, and sets it.
 bool option_max_pixels(const char *value);
 // Reads one value of a list into `item`; on a mistake prints what `option` expects and returns false.

@@ -30,6 +30,7 @@ static const struct option long_options[] = {
     FORMAT_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     DRIVER_LONG_OPTIONS,
+    KEEP_KERNELS_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -42,7 +43,7 @@ static const char help_text[] =
     "      --quick           a sixteenth of the random rays, and fewer pixels\n"
     "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
     "compiler\n" //
-    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_PERTURB HELP_FORMAT HELP_HELP;
+    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_KEEP_KERNELS HELP_PERTURB HELP_FORMAT HELP_HELP;
 
 static const ResultTable verify_table = {
     .command = "verify",

@@ -36,6 +36,9 @@ typedef struct {
     const char
         *build_options;   // of --build-options, after those of every program; outlive the device; or NULL
     size_t work_group[2]; // of --work-group, for kernels that trace rays; 0: glint chooses
+    // The folder that receives the text and the build log of each kernel that is built; outlives the device;
+    // or NULL.
+    const char *kernel_folder;
 } Device;
 
 typedef struct {

@@ -5,6 +5,7 @@
 #include "host/base/memory.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
+#include <errno.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -151,6 +152,36 @@ static void kernel_create(Build *build, const char *name)
     build_check(build, "clCreateKernel", status, build->kernel);
 }
 
+// Writes to a file of the device's kernel folder, unless the mode is "wx" and the file exists. A file that
+// cannot be written is only reported, since no result depends on it.
+static void kernel_file_write(const Device *device, uint64_t hash, const char *ending, const char *mode,
+                              const char *text)
+{
+    char *path = text_format("%s/%016" PRIx64 ".%s", device->kernel_folder, hash, ending);
+    FILE *file = fopen(path, mode);
+    bool written = file ? fputs(text, file) >= 0 : errno == EEXIST;
+    if (file && fclose(file) != 0) written = false;
+    if (!written) fprintf(stderr, "glint: warning: cannot write '%s': %s\n", path, strerror(errno));
+    free(path);
+}
+
+// Appends a build to the log of its kernel.
+static void build_log_keep(const Compute *compute, cl_program program, uint64_t hash, const char *options,
+                           cl_int status, double seconds)
+{
+    const Device *device = compute->device;
+    if (!device->kernel_folder) return;
+    Text entry = {0};
+    fault_note_call("clGetProgramBuildInfo");
+    char *log = build_log(compute, program);
+    fault_note_call(NULL);
+    text_appendf(&entry, "device: %s, %s\noptions: %s\nbuild: %s, %.3f s\n%s\n", device->name, device->driver,
+                 options, cl_status_name(status), seconds, log);
+    kernel_file_write(device, hash, "log", "a", text_c(&entry));
+    free(log);
+    text_free(&entry);
+}
+
 // Builds `text`, which a driver that has a cache builds again if `afresh`.
 static Build build_from_source(Compute *compute, const char *text, const ProgramRequest *request, bool afresh)
 {
@@ -162,10 +193,16 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     Text options = {0};
     program_options_append(&options, compute->device, request->options);
     if (afresh) append_unused_option(&options);
+    const uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
+    // before the build, which may crash
+    if (compute->device->kernel_folder) kernel_file_write(compute->device, hash, "cl", "wx", text);
+    const double start = clock_seconds();
     fault_note_call("clBuildProgram");
     status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
+    const bool is_built = build_check(&build, "clBuildProgram", status, true);
+    build_log_keep(compute, build.program, hash, text_c(&options), status, clock_seconds() - start);
     text_free(&options);
-    if (build_check(&build, "clBuildProgram", status, true)) kernel_create(&build, request->kernel);
+    if (is_built) kernel_create(&build, request->kernel);
     return build;
 }
 

@@ -1,0 +1,501 @@
+// glint report runs the commands that a bug report needs, each in a separate process, and writes one archive.
+#include "host/api/version.h"
+#include "host/base/archive.h"
+#include "host/base/array.h"
+#include "host/base/clock.h"
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/cli/commands.h"
+#include "host/cli/options.h"
+#include "host/cli/progress.h"
+#include "host/cli/report_scrub.h"
+#include "host/cli/variants.h"
+#include <assimp/version.h>
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <ftw.h>
+#include <getopt.h>
+#include <jansson.h>
+#include <libfyaml.h>
+#include <openexr_base.h>
+#include <png.h>
+#include <signal.h>
+#include <sodium.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/utsname.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <zlib.h>
+
+static const struct option long_options[] = {
+    {"output", required_argument, NULL, 'o'},
+    {"device", required_argument, NULL, OPTION_DEVICE},
+    {"precision", required_argument, NULL, OPTION_PRECISION},
+    {"lanes", required_argument, NULL, OPTION_LANES},
+    {"work-group", required_argument, NULL, OPTION_WORK_GROUP},
+    {"build-options", required_argument, NULL, OPTION_BUILD_OPTIONS},
+    {"seconds", required_argument, NULL, OPTION_SECONDS},
+    {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+static const char help_text[] =
+    "usage: glint report [CASE...] [OPTIONS]\n\n"
+    "Writes an archive for a bug report: what glint devices, its passports, glint verify --quick and a small "
+    "glint bench\nprint, the text and build log of every kernel, and versions. All kernels are built, which "
+    "takes minutes. A step that\nfails or crashes is named in index.txt. Names of the user, the host and "
+    "folders are left out. With CASE, glint verify\nruns only these cases.\n\n"
+    "  -o, --output FILE     the archive (default: glint-report.tar.gz)\n"
+    "      --precision P     single, strict or double (default: all for verify, single for bench)\n"
+    "      --work-group WxH  work-items of a group (default: as glint render)\n"
+    "      --build-options OPTIONS\n"
+    "                        passed to the driver's compiler after glint's\n"
+    "      --seconds MAX     time limit of each step (default: 1800)\n" //
+    HELP_DEVICE HELP_LANES HELP_HELP;
+
+static const char scene_text[] = "# A shape of each type that glint bench times for glint report.\n"
+                                 "camera: {position: [0, 2, -6], look_at: [0, 0.5, 0], fov: 50}\n"
+                                 "lights: [{point: {position: [3, 5, -4]}}]\n"
+                                 "objects:\n"
+                                 "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                                 "  - sphere: {center: [-1, 1, 0], radius: 1, material: {reflection: 0.4}}\n"
+                                 "  - triangle: {vertices: [[1, 0, 0], [2, 0, 1], [1.5, 1.5, 0.5]]}\n";
+
+enum { PASSED_MAX = 12, ARGUMENTS_MAX = 40 };
+static const double step_seconds_max = 1800;
+
+typedef struct {
+    const char *output;
+    char *passed[PASSED_MAX]; // options for verify and bench
+    size_t passed_count;
+    char *const *cases;
+    size_t case_count;
+    double seconds;
+} ReportChoice;
+
+// A command that the report runs in its folder. It prints to the file `name`.`prints`.
+typedef struct {
+    const char *name, *prints;
+    const char *arguments[12];
+    bool has_options, has_cases; // whether the user's options and cases follow
+} Step;
+
+#define KEEP_KERNELS "--keep-kernels", "kernels"
+static const Step steps[] = {
+    {"devices", "json", {"devices", "--json"}, false, false},
+    {"passports", "json", {"devices", "--probe", "--json", KEEP_KERNELS}, false, false},
+    {"verify", "txt", {"verify", "--quick", "--output", "verify.json", KEEP_KERNELS}, true, true},
+    {"bench",
+     "txt",
+     {"bench", "scene.yaml", "--size", "160x120", "--seconds", "2", "--output", "bench.json", KEEP_KERNELS},
+     true,
+     false},
+};
+enum { STEP_COUNT = sizeof steps / sizeof *steps };
+
+typedef struct {
+    double seconds;
+    char *failure; // NULL if the step has succeeded
+} StepResult;
+
+// What the files of the archive are, by their names or, below kernels/, by their endings.
+static const struct {
+    const char *name, *meaning;
+} meanings[] = {
+    {"index.txt", "this list"},
+    {"versions.txt",
+     "versions of glint, of its libraries and of the system, and variables that OpenCL reads"},
+    {"devices.json", "the OpenCL devices: glint devices --json"},
+    {"devices.log", "messages of this command"},
+    {"passports.json", "the devices and what their arithmetic really does: glint devices --probe --json"},
+    {"passports.log", "messages of this command"},
+    {"verify.json", "the hard cases: glint verify --quick --json"},
+    {"verify.txt", "the hard cases as text, up to a crash if there was one"},
+    {"verify.log", "messages of this command"},
+    {"scene.yaml", "the scene of glint bench"},
+    {"bench.json", "times of scene.yaml: glint bench --json"},
+    {"bench.txt", "these times as text"},
+    {"bench.log", "messages of this command"},
+    {".cl", "the text of a kernel, named by its hash"},
+    {".log", "options, status and log of each build of this kernel"},
+};
+
+static bool option_take(ReportChoice *choice, int option, int index, char *value)
+{
+    CommonOptions checked = {0};
+    bool valid = true;
+    if (option == 'o') {
+        choice->output = value;
+    } else if (option == OPTION_SECONDS) {
+        valid = option_positive("seconds", value, &choice->seconds);
+    } else {
+        option_common(&checked, option, value, &valid);
+        if (checked.precision == PRECISION_CERTIFIED) {
+            option_usage_fault("report",
+                               "--precision certified is only for images; choose single, strict or double");
+            return false;
+        }
+        if (choice->passed_count == PASSED_MAX) {
+            option_usage_fault("report", "too many options");
+            return false;
+        }
+        choice->passed[choice->passed_count++] = text_format("--%s=%s", long_options[index].name, value);
+    }
+    return valid;
+}
+
+static int folder_entry_remove(const char *path, const struct stat *status, int type, struct FTW *walk)
+{
+    (void)status, (void)type, (void)walk;
+    remove(path);
+    return 0;
+}
+
+static void folder_remove(const char *path)
+{
+    enum { OPEN_FOLDERS_MAX = 16 };
+    nftw(path, folder_entry_remove, OPEN_FOLDERS_MAX, FTW_DEPTH | FTW_PHYS);
+}
+
+static bool file_write(const char *folder, const char *name, const char *text)
+{
+    char *path = text_format("%s/%s", folder, name);
+    FILE *file = fopen(path, "w");
+    bool written = file && fputs(text, file) >= 0;
+    if (file && fclose(file) != 0) written = false;
+    free(path);
+    return written;
+}
+
+// Creates the folder in which the steps run. The caller removes and frees it. Returns NULL with a message on
+// failure.
+static char *folder_create(void)
+{
+    const char *parent = getenv("TMPDIR");
+    char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
+    if (!mkdtemp(folder)) {
+        fprintf(stderr, "glint report: cannot create the folder '%s': %s\n", folder, strerror(errno));
+        free(folder);
+        return NULL;
+    }
+    if (file_write(folder, "scene.yaml", scene_text)) return folder;
+    fprintf(stderr, "glint report: cannot write to '%s': %s\n", folder, strerror(errno));
+    folder_remove(folder);
+    free(folder);
+    return NULL;
+}
+
+// Gives the steps empty kernel caches, so that every kernel is built and has a log, and their temporary files
+// the folder.
+static void variables_set(const char *folder)
+{
+    static const char *const variables[] = {"XDG_CACHE_HOME", "POCL_CACHE_DIR", "TMPDIR"};
+    for (size_t i = 0; i < sizeof variables / sizeof *variables; i++)
+        setenv(variables[i], folder, true);
+}
+
+// Waits for a step's process. Returns false if it had to be stopped, at the time limit or by an interrupt.
+static bool process_wait(pid_t process, double seconds, Progress *progress, double fraction, int *status)
+{
+    static const struct timespec pause = {.tv_nsec = 20000000};
+    const double limit = clock_seconds() + seconds;
+    bool is_stopped = false;
+    while (waitpid(process, status, WNOHANG) == 0) {
+        if (!is_stopped && (progress_interrupted() || clock_seconds() > limit)) {
+            is_stopped = true;
+            kill(process, SIGKILL);
+        }
+        progress_show(progress, fraction);
+        nanosleep(&pause, NULL);
+    }
+    return !is_stopped;
+}
+
+// Returns why the process failed, or NULL. A failed check is a result.
+static char *status_failure(int status)
+{
+    if (WIFSIGNALED(status)) return text_format("ended by a signal: %s", strsignal(WTERMSIG(status)));
+    const int code = WEXITSTATUS(status);
+    return code == EXIT_DONE || code == EXIT_CHECK ? NULL : text_format("exit status %d", code);
+}
+
+// Starts a step. Returns 0 or an error number.
+static int step_start(const Step *step, const ReportChoice *choice, const char *folder, pid_t *process)
+{
+    char *arguments[ARGUMENTS_MAX] = {"glint"};
+    size_t count = 1;
+    for (size_t i = 0; step->arguments[i]; i++)
+        arguments[count++] = (char *)step->arguments[i];
+    for (size_t i = 0; step->has_options && i < choice->passed_count; i++)
+        arguments[count++] = choice->passed[i];
+    for (size_t i = 0; step->has_cases && i < choice->case_count && count + 1 < ARGUMENTS_MAX; i++)
+        arguments[count++] = choice->cases[i];
+    posix_spawn_file_actions_t actions;
+    int error = posix_spawn_file_actions_init(&actions);
+    if (error) return error;
+    char *output = text_format("%s/%s.%s", folder, step->name, step->prints),
+         *messages = text_format("%s/%s.log", folder, step->name);
+    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output, O_WRONLY | O_CREAT, 0600);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, messages, O_WRONLY | O_CREAT, 0600);
+    posix_spawn_file_actions_addchdir_np(&actions, folder);
+    error = posix_spawn(process, "/proc/self/exe", &actions, NULL, arguments, environ);
+    posix_spawn_file_actions_destroy(&actions);
+    free(output);
+    free(messages);
+    return error;
+}
+
+static StepResult step_run(const Step *step, const ReportChoice *choice, const char *folder,
+                           Progress *progress, double fraction)
+{
+    progress_step(progress, fraction, "%s", step->name);
+    const double start = clock_seconds();
+    StepResult result = {0};
+    pid_t process;
+    int status;
+    const int error = step_start(step, choice, folder, &process);
+    if (error)
+        result.failure = text_format("not started: %s", strerror(error));
+    else if (!process_wait(process, choice->seconds, progress, fraction, &status))
+        result.failure = text_format("stopped after %s", text_duration(choice->seconds).text);
+    else
+        result.failure = status_failure(status);
+    result.seconds = clock_seconds() - start;
+    return result;
+}
+
+// Appends a library's version.
+static void version_append(Text *text, const char *name, const char *version)
+{
+    text_appendf(text, "%-20s %s\n", name, version ? version : "unknown");
+}
+
+static void libraries_append(Text *text)
+{
+    int major = 0, minor = 0, patch = 0;
+    const char *extra;
+    exr_get_library_version(&major, &minor, &patch, &extra);
+    char *openexr = text_format("%d.%d.%d", major, minor, patch);
+    char *assimp = text_format("%u.%u.%u", aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch());
+    version_append(text, "assimp", assimp);
+    version_append(text, "jansson", jansson_version_str());
+    version_append(text, "libfyaml", fy_library_version());
+    version_append(text, "libpng", png_get_libpng_ver(NULL));
+    version_append(text, "libsodium", sodium_version_string());
+    version_append(text, "OpenEXR", openexr);
+    version_append(text, "zlib", zlibVersion());
+    free(openexr);
+    free(assimp);
+}
+
+// Appends the name of the system's release, as os-release(5) gives it.
+static void release_append(Text *text)
+{
+    Text file = {0};
+    MessageList ignored = {0};
+    static const char key[] = "PRETTY_NAME=\"";
+    const char *name = text_read_file(&file, "/etc/os-release", &ignored) ? strstr(text_c(&file), key) : NULL;
+    if (name) {
+        name += sizeof key - 1;
+        text_appendf(text, "%-20s %.*s\n", "release", (int)strcspn(name, "\"\n"), name);
+    }
+    message_list_free(&ignored);
+    text_free(&file);
+}
+
+// Appends the variables that change what OpenCL does. POCL_REMOTE0_PARAMETERS and the like have addresses.
+static void variables_append(Text *text, const Scrubber *scrubber)
+{
+    static const char *const prefixes[] = {"CL_",     "CUDA_", "GALLIUM_", "GLINT_",  "GPU_",
+                                           "HIP_",    "LP_",   "MESA_",    "NEO",     "OCL",
+                                           "OPENCL_", "POCL_", "ROCR_",    "RUSTICL_"};
+    for (char **variable = environ; *variable; variable++)
+        for (size_t i = 0; i < sizeof prefixes / sizeof *prefixes; i++)
+            if (strncmp(*variable, prefixes[i], strlen(prefixes[i])) == 0 && !strstr(*variable, "REMOTE")) {
+                const Text line = {.items = *variable, .count = strlen(*variable)};
+                Text scrubbed = scrub(scrubber, &line);
+                text_appendf(text, "%s\n", text_c(&scrubbed));
+                text_free(&scrubbed);
+            }
+}
+
+static Text versions_text(const Scrubber *scrubber)
+{
+    Text text = {0};
+    struct utsname host = {0};
+    uname(&host);
+    version_append(&text, "glint", glint_version());
+    version_append(&text, "commit", glint_commit());
+    version_append(&text, "compiler", glint_compiler());
+    libraries_append(&text);
+    release_append(&text);
+    version_append(&text, "kernel", host.sysname);
+    version_append(&text, "kernel release", host.release);
+    version_append(&text, "machine", host.machine);
+    text_appendf(&text, "%-20s %ld\n\n", "processors", sysconf(_SC_NPROCESSORS_ONLN));
+    variables_append(&text, scrubber);
+    return text;
+}
+
+static const char *meaning_of(const char *name)
+{
+    const bool is_kernel = strchr(name, '/') != NULL;
+    const char *key = is_kernel ? strrchr(name, '.') : name;
+    for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
+        if (strcmp(meanings[i].name, key) == 0) return meanings[i].meaning;
+    return "";
+}
+
+typedef struct {
+    Text tar, list; // `list` has a line per file
+    size_t count;
+    time_t now;
+} Archive;
+
+static void file_add(Archive *archive, const char *name, const Text *contents)
+{
+    archive_add(&archive->tar, name, contents, archive->now);
+    text_appendf(&archive->list, "  %-29s %s\n", name, meaning_of(name));
+    archive->count++;
+}
+
+// Adds a file of the folder unless it is empty or does not exist. Kernels are glint's text and have no names.
+static void folder_file_add(Archive *archive, const char *folder, const char *name, const Scrubber *scrubber)
+{
+    char *path = text_format("%s/%s", folder, name);
+    Text contents = {0};
+    MessageList ignored = {0};
+    const char *ending = strrchr(name, '.');
+    if (text_read_file(&contents, path, &ignored) && contents.count > 0) {
+        Text scrubbed = strcmp(ending, ".cl") == 0 ? contents : scrub(scrubber, &contents);
+        file_add(archive, name, &scrubbed);
+        if (scrubbed.items != contents.items) text_free(&scrubbed);
+    }
+    message_list_free(&ignored);
+    text_free(&contents);
+    free(path);
+}
+
+static int is_kernel_file(const struct dirent *entry)
+{
+    return entry->d_name[0] != '.';
+}
+
+static void kernels_add(Archive *archive, const char *folder, const Scrubber *scrubber)
+{
+    char *path = text_format("%s/kernels", folder);
+    struct dirent **entries;
+    const int count = scandir(path, &entries, is_kernel_file, alphasort);
+    for (int i = 0; i < count; i++) {
+        char *name = text_format("kernels/%s", entries[i]->d_name);
+        folder_file_add(archive, folder, name, scrubber);
+        free(name);
+        free(entries[i]);
+    }
+    if (count >= 0) free(entries);
+    free(path);
+}
+
+static Text index_text(const Archive *archive, const StepResult *results)
+{
+    Text text = {0};
+    char date[32] = "";
+    struct tm utc;
+    if (gmtime_r(&archive->now, &utc)) strftime(date, sizeof date, "%Y-%m-%d %H:%M UTC", &utc);
+    text_appendf(&text,
+                 "Report of glint %s, %s. Folders are replaced by ~ or PATH, and the names of the user and "
+                 "the host by USER\nand HOST.\n\nSteps\n\n",
+                 glint_version(), date);
+    for (size_t i = 0; i < STEP_COUNT; i++)
+        text_appendf(&text, "  %-10s %s%s, %.1f s\n", steps[i].name, results[i].failure ? "FAILED: " : "done",
+                     results[i].failure ? results[i].failure : "", results[i].seconds);
+    text_appendf(&text, "\nFiles\n\n  %-29s %s\n%s", "index.txt", meaning_of("index.txt"),
+                 text_c(&archive->list));
+    return text;
+}
+
+// Writes the files of the folder into the archive. The index comes first.
+static bool archive_files(Archive *archive, const char *folder, const StepResult *results,
+                          const Scrubber *scrubber, OutputFile *output, MessageList *messages)
+{
+    for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
+        if (strchr(meanings[i].name, '.') != meanings[i].name)
+            folder_file_add(archive, folder, meanings[i].name, scrubber);
+    kernels_add(archive, folder, scrubber);
+    Text index = index_text(archive, results), tar = {0};
+    archive_add(&tar, "index.txt", &index, archive->now);
+    archive->count++;
+    text_append(&tar, text_c(&archive->tar), archive->tar.count);
+    const bool is_written = archive_write(&tar, output, messages) && output_commit(output, messages);
+    text_free(&tar);
+    text_free(&index);
+    return is_written;
+}
+
+// Runs the steps and writes the archive. Returns the exit status.
+static int report_make(const ReportChoice *choice, const char *folder, OutputFile *output)
+{
+    Progress progress;
+    StepResult results[STEP_COUNT] = {0};
+    Archive archive = {.now = time(NULL)};
+    Scrubber scrubber = scrubber_open(folder);
+    Text versions = versions_text(&scrubber);
+    file_add(&archive, "versions.txt", &versions);
+    variables_set(folder);
+    progress_open(&progress, false);
+    for (size_t i = 0; i < STEP_COUNT && !progress_interrupted(); i++)
+        results[i] = step_run(&steps[i], choice, folder, &progress, (double)i / STEP_COUNT);
+    progress_close(&progress);
+    int status = EXIT_INTERRUPTED;
+    if (!progress_interrupted()) {
+        MessageList messages = {0};
+        for (size_t i = 0; i < STEP_COUNT; i++)
+            if (results[i].failure)
+                message_warning(&messages, "the step %s failed: %s", steps[i].name, results[i].failure);
+        status =
+            archive_files(&archive, folder, results, &scrubber, output, &messages) ? EXIT_DONE : EXIT_USER;
+        messages_print(&messages, NULL);
+        if (status == EXIT_DONE) printf("%s: %zu files\n", choice->output, archive.count);
+    }
+    for (size_t i = 0; i < STEP_COUNT; i++)
+        free(results[i].failure);
+    text_free(&archive.tar);
+    text_free(&archive.list);
+    text_free(&versions);
+    scrubber_close(&scrubber);
+    return status;
+}
+
+int command_report(int argument_count, char **arguments)
+{
+    ReportChoice choice = {.output = "glint-report.tar.gz", .seconds = step_seconds_max};
+    int option, index = 0, status = OPTIONS_READ;
+    while (status == OPTIONS_READ &&
+           (option = getopt_long(argument_count, arguments, "ho:", long_options, &index)) != -1)
+        status = option == 'h'                                 ? option_help(help_text)
+                 : option == '?'                               ? EXIT_USER
+                 : option_take(&choice, option, index, optarg) ? OPTIONS_READ
+                                                               : EXIT_USER;
+    choice.cases = arguments + optind;
+    choice.case_count = (size_t)(argument_count - optind);
+    OutputFile output;
+    MessageList messages = {0};
+    if (status == OPTIONS_READ && !output_open(&output, choice.output, &messages)) status = EXIT_USER;
+    messages_print(&messages, NULL);
+    if (status == OPTIONS_READ) {
+        char *folder = folder_create();
+        status = folder ? report_make(&choice, folder, &output) : EXIT_MACHINE;
+        if (folder) folder_remove(folder);
+        free(folder);
+        if (status != EXIT_DONE) output_abandon(&output);
+    }
+    for (size_t i = 0; i < choice.passed_count; i++)
+        free(choice.passed[i]);
+    return status;
+}

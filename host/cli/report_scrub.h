@@ -1,0 +1,24 @@
+// Removes from text what would tell who wrote a bug report and where: folders, and the names of user and
+// host.
+#pragma once
+
+#include "host/base/text.h"
+
+enum { SCRUB_WORDS_MAX = 8 };
+
+// The words that are replaced. A path is replaced wherever it stands, a name only as a whole word.
+typedef struct {
+    struct {
+        char *word;
+        const char *replacement;
+        bool is_path;
+    } words[SCRUB_WORDS_MAX];
+    size_t count;
+} Scrubber;
+
+// Finds the words: the folder and the home folders, and the names of the user and the host.
+Scrubber scrubber_open(const char *folder);
+void scrubber_close(Scrubber *scrubber);
+// Returns the text with these words replaced, and with PATH instead of every other absolute path. The name of
+// a file is kept if it has an ending and is at least three levels deep. The caller frees the text.
+Text scrub(const Scrubber *scrubber, const Text *text);

@@ -1,0 +1,129 @@
+#!/usr/bin/env -S python3 -B
+"""glint report: what its archive holds, what it leaves out, and that it is written where a driver crashes, hangs or rejects kernels.
+
+run_tests: sanitize-long-only"""
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import tarfile
+import time
+import unittest
+
+from glint import IS_SANITIZED, PROGRAM, TestCase, main, need_device, shim_build
+
+need_device()
+SMALL = "report S1 --precision single --lanes 1 -o r.tar.gz"
+STEPS = ["devices", "passports", "verify", "bench"]
+# The driver fails in clBuildProgram, by a crash or by not returning.
+SHIM = """
+#include <stdlib.h>
+#include <unistd.h>
+int clBuildProgram(void)
+{
+    if (getenv("HANGS")) for (;;) pause();
+    *(volatile int *)NULL = 0;
+    return 0;
+}
+"""
+
+
+class Report(TestCase):
+    def setUp(self):
+        super().setUp()
+        for folder in "home", "temporary":
+            os.mkdir(folder)
+        self.env = {"HOME": os.path.abspath("home"), "TMPDIR": os.path.abspath("temporary"), "USER": "annuser",
+                    "LOGNAME": "annuser", "CL_EXAMPLE": os.path.abspath("home/x"), "EXAMPLE": "not for others"}
+
+    def report(self, command=SMALL, **env):
+        """Standard error of the command, and the files of its archive. Nothing else is left."""
+        process = self.glint(command, env=self.env | env)
+        files = {}
+        with tarfile.open("r.tar.gz") as archive:
+            for member in archive:
+                self.assertEqual((member.uid, member.gid, member.uname, member.gname, member.mode), (0, 0, "", "", 0o644))
+                files[member.name] = archive.extractfile(member).read().decode()
+        self.assertEqual(process.stdout, f"r.tar.gz: {len(files)} files\n")
+        self.assertEqual(os.listdir("temporary") + os.listdir("home"), [])
+        listed = re.findall(r"(?m)^  (\S+\.\w+) +\S.*$", files["index.txt"])
+        self.assertEqual(listed, list(files))
+        here, host = os.getcwd(), socket.gethostname()
+        for name, text in files.items():
+            self.assertNotIn(here, text, name)
+            self.assertNotIn("annuser", text, name)
+            self.assertNotIn(f'"{host}"', text, name)
+            self.assertTrue(name.endswith(".cl") or not re.search(r"(?m)(^|[\s\"=(])/\w", text), name)
+        return process.stderr, files
+
+    def failures(self, files):
+        found = re.findall(r"(?m)^  (\w+) +(?:done|FAILED: (.*)), [0-9.]+ s$", files["index.txt"])
+        self.assertEqual([step for step, _ in found], STEPS)
+        return [(step, failure) for step, failure in found if failure]
+
+    def test_archive(self):
+        errors, files = self.report()
+        self.assertEqual((errors, self.failures(files)), ("", []))
+        devices, passports, verify, bench = (json.loads(files[f"{step}.json"]) for step in STEPS)
+        self.assertEqual(devices["devices"][0]["name"], passports["devices"][0]["name"])
+        self.assertTrue(passports["devices"][0]["passports"])
+        precision, = verify["precisions"]
+        self.assertEqual([(case["name"], case["passed"]) for case in precision["cases"]], [("S1", True)])
+        self.assertIn("S1", files["verify.txt"])
+        run, = bench["runs"]
+        self.assertEqual((run["scene"], run["lanes"], run["size"]), ("scene.yaml", 1, [160, 120]))
+        self.assertEqual(bench["host"]["name"], "HOST")
+        for kernel in precision["trace_kernel"], run["kernel_hash"]:
+            self.assertTrue("kernel void" in files[f"kernels/{kernel}.cl"], kernel)
+        kernels = [name for name in files if name.endswith(".cl")]
+        self.assertTrue(any("passport" in files[name] for name in kernels))
+        for name in kernels:
+            self.assertRegex(files[name[:-2] + "log"], r"^device: .*\noptions: -cl-std.*\nbuild: CL_SUCCESS, [0-9.]+ s\n")
+        self.assertRegex(files["versions.txt"], r"(?m)^zlib +1\.")
+        self.assertIn("\nCL_EXAMPLE=~/x\n", files["versions.txt"])
+        self.assertFalse([name for name, text in files.items() if "not for others" in text])
+
+    def test_rejected_kernels(self):
+        """The index names the steps that fail, and the logs say why."""
+        errors, files = self.report(f"{SMALL} --build-options=-Dget_global_id=unknown_word")
+        self.assertEqual([step for step, _ in self.failures(files)], ["verify", "bench"])
+        self.assertEqual(errors.count("warning: the step "), 2)
+        logs = "".join(text for name, text in files.items() if name.endswith(".log") and name.startswith("kernels/"))
+        self.assertRegex(logs, "build: CL_BUILD_PROGRAM_FAILURE")
+        self.assertIn("unknown_word", logs)
+        self.assertIn("clBuildProgram", files["verify.log"])
+
+    @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
+    def test_crashes_and_hangs(self):
+        shim = {"LD_PRELOAD": shim_build("shim.so", SHIM)}
+        _, files = self.report(**shim)
+        self.assertEqual([step for step, _ in self.failures(files)], STEPS[1:])
+        self.assertIn("clBuildProgram", files["passports.log"])
+        self.assertTrue(any(name.endswith(".cl") and name[:-2] + "log" not in files for name in files))
+        _, files = self.report(f"{SMALL} --seconds 1", **shim, HANGS="1")
+        self.assertEqual(self.failures(files), [(step, "stopped after 1 second") for step in STEPS[1:]])
+
+    @unittest.skipIf(IS_SANITIZED, "preloads a library before the sanitizer's")
+    def test_interrupt(self):
+        shim = {"LD_PRELOAD": shim_build("shim.so", SHIM), "HANGS": "1"}
+        command = [PROGRAM, *SMALL.split()]
+        with subprocess.Popen(command, env=os.environ | self.env | shim, stderr=subprocess.PIPE, text=True) as process:
+            while not any(name.endswith("passports.log") for _, _, names in os.walk("temporary") for name in names):
+                time.sleep(0.01)
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+        self.assertEqual(process.returncode, 130)
+        self.assertEqual((os.listdir("temporary"), os.path.exists("r.tar.gz")), ([], False))
+
+    def test_refused(self):
+        self.refuses(f"{SMALL} --seconds 0", "--seconds: expected a number above 0")
+        self.refuses(f"{SMALL} --lanes 3", "--lanes: expected 1")
+        self.refuses(f"{SMALL} --precision certified", "certified is only for images")
+        self.refuses("report -o none/r.tar.gz", "none")
+        self.refuses("verify S1 --keep-kernels none/kernels", "--keep-kernels: cannot create the folder 'none/kernels'")
+        self.assertEqual(sorted(os.listdir()), ["home", "temporary"])
+
+
+main()

@@ -1,0 +1,75 @@
+// What glint report leaves out of its files.
+#include "host/cli/report_scrub.h"
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/utsname.h>
+
+#include <cmocka.h>
+
+static void texts_are_scrubbed(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *text, *scrubbed;
+    } rows[] = {
+        {"in /home/ann/scenes/a.yaml", "in ~/scenes/a.yaml"},
+        {"/home/anna/x/a.cl:3:1: error", "PATH/a.cl:3:1: error"},
+        {"\"/home/ann\"", "\"~\""},
+        {"-I/home/ann/include -I/usr/include/CL/cl.h", "-I~/include -IPATH/cl.h"},
+        {"a\\n/var/log/x/y.log", "a\\nPATH/y.log"},
+        {"/work/here/verify.json", "./verify.json"},
+        {"/home/bob", "PATH"},
+        {"/home/bob.smith", "PATH"},
+        {"/usr/lib/pocl/libpocl.so.2", "PATH/libpocl.so.2"},
+        {"OCL_ICD_VENDORS=/etc/OpenCL/vendors/pocl.icd", "OCL_ICD_VENDORS=PATH/pocl.icd"},
+        {"annuser@box", "USER@box"},
+        {"annuser-2 annusers annuser_x annuser", "annuser-2 annusers annuser_x USER"},
+        {"a / b, 3/4, and/or, https://glint.example/x, // x",
+         "a / b, 3/4, and/or, https://glint.example/x, // x"},
+        {"kernels/0123.cl", "kernels/0123.cl"},
+        {"", ""},
+    };
+    setenv("HOME", "/home/ann", true);
+    setenv("USER", "annuser", true);
+    setenv("LOGNAME", "annuser", true);
+    Scrubber scrubber = scrubber_open("/work/here");
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+        Text text = {0};
+        text_append(&text, rows[i].text, strlen(rows[i].text));
+        Text scrubbed = scrub(&scrubber, &text);
+        assert_string_equal(text_c(&scrubbed), rows[i].scrubbed);
+        text_free(&scrubbed);
+        text_free(&text);
+    }
+    scrubber_close(&scrubber);
+}
+
+static void host_is_scrubbed(void **state)
+{
+    (void)state;
+    struct utsname host;
+    assert_int_equal(uname(&host), 0);
+    if (strlen(host.nodename) < 2 || strcmp(host.nodename, "localhost") == 0) skip();
+    Scrubber scrubber = scrubber_open("/work/here");
+    Text text = {0};
+    text_appendf(&text, "\"name\": \"%s\", 3.1+%s", host.nodename, host.nodename);
+    Text scrubbed = scrub(&scrubber, &text);
+    char *expected = text_format("\"name\": \"HOST\", 3.1+%s", host.nodename);
+    assert_string_equal(text_c(&scrubbed), expected);
+    free(expected);
+    text_free(&scrubbed);
+    text_free(&text);
+    scrubber_close(&scrubber);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(texts_are_scrubbed),
+        cmocka_unit_test(host_is_scrubbed),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
