@@ -26,7 +26,7 @@ static Scene scene_set(const char *path, const char *const *overrides, size_t co
 {
     MessageList messages = {0};
     Scene scene;
-    const SceneOptions options = {.overrides = overrides, .override_count = count};
+    const SceneOptions options = {.overrides = overrides, .override_count = count, .override_name = "--set"};
     const bool is_read = scene_load(&scene, path, &options, &messages);
     message_list_print(&messages, stderr);
     assert_true(is_read);
@@ -38,7 +38,7 @@ static void check_messages(const char *path, const char *const *overrides, size_
 {
     MessageList messages = {0};
     Scene scene;
-    const SceneOptions options = {.overrides = overrides, .override_count = count};
+    const SceneOptions options = {.overrides = overrides, .override_count = count, .override_name = "--set"};
     assert_false(scene_load(&scene, path, &options, &messages));
     for (size_t i = 0; i < messages.count; i++) { // without the lines of the source
         free(messages.items[i].source_line);

@@ -31,8 +31,8 @@ static inline Pair two_sum(real a, real b)
 
 #else
 
-// a b without error, if that is neither tiny nor huge, from parts of 12 bits, whose products are exact (Dekker, A floating-point technique for
-// extending the available precision, Numerische Mathematik 18, 1971).
+// a b without error, if that is neither tiny nor huge, from parts of 12 bits, whose products are exact
+// (Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18, 1971).
 static inline Pair moderate_product(real a, real b)
 {
     const integer high_bits = (integer)(~0xfff);
