@@ -9,36 +9,28 @@
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_scrub.h"
+#include "host/cli/report_versions.h"
 #include "host/cli/variants.h"
-#include <assimp/version.h>
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
 #include <getopt.h>
-#include <jansson.h>
-#include <libfyaml.h>
-#include <openexr_base.h>
-#include <png.h>
 #include <signal.h>
-#include <sodium.h>
 #include <spawn.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <sys/utsname.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <zlib.h>
 
 static const struct option long_options[] = {
     {"output", required_argument, NULL, 'o'},
     {"device", required_argument, NULL, OPTION_DEVICE},
     {"precision", required_argument, NULL, OPTION_PRECISION},
     {"lanes", required_argument, NULL, OPTION_LANES},
-    {"work-group", required_argument, NULL, OPTION_WORK_GROUP},
-    {"build-options", required_argument, NULL, OPTION_BUILD_OPTIONS},
+    DRIVER_LONG_OPTIONS,
     {"seconds", required_argument, NULL, OPTION_SECONDS},
     {"help", no_argument, NULL, 'h'},
     {0},
@@ -52,13 +44,10 @@ static const char help_text[] =
     "folders are left out. With CASE, glint verify\nruns only these cases.\n\n"
     "  -o, --output FILE     the archive (default: glint-report.tar.gz)\n"
     "      --precision P     single, strict or double (default: all for verify, single for bench)\n"
-    "      --work-group WxH  work-items of a group (default: as glint render)\n"
-    "      --build-options OPTIONS\n"
-    "                        passed to the driver's compiler after glint's\n"
     "      --seconds MAX     time limit of each step (default: 1800)\n" //
-    HELP_DEVICE HELP_LANES HELP_HELP;
+    HELP_DEVICE HELP_LANES HELP_DRIVER HELP_HELP;
 
-static const char scene_text[] = "# A shape of each type that glint bench times for glint report.\n"
+static const char scene_text[] = "# What glint bench times for glint report.\n"
                                  "camera: {position: [0, 2, -6], look_at: [0, 0.5, 0], fov: 50}\n"
                                  "lights: [{point: {position: [3, 5, -4]}}]\n"
                                  "objects:\n"
@@ -270,79 +259,6 @@ static StepResult step_run(const Step *step, const ReportChoice *choice, const c
     return result;
 }
 
-// Appends a library's version.
-static void version_append(Text *text, const char *name, const char *version)
-{
-    text_appendf(text, "%-20s %s\n", name, version ? version : "unknown");
-}
-
-static void libraries_append(Text *text)
-{
-    int major = 0, minor = 0, patch = 0;
-    const char *extra;
-    exr_get_library_version(&major, &minor, &patch, &extra);
-    char *openexr = text_format("%d.%d.%d", major, minor, patch);
-    char *assimp = text_format("%u.%u.%u", aiGetVersionMajor(), aiGetVersionMinor(), aiGetVersionPatch());
-    version_append(text, "assimp", assimp);
-    version_append(text, "jansson", jansson_version_str());
-    version_append(text, "libfyaml", fy_library_version());
-    version_append(text, "libpng", png_get_libpng_ver(NULL));
-    version_append(text, "libsodium", sodium_version_string());
-    version_append(text, "OpenEXR", openexr);
-    version_append(text, "zlib", zlibVersion());
-    free(openexr);
-    free(assimp);
-}
-
-// Appends the name of the system's release, as os-release(5) gives it.
-static void release_append(Text *text)
-{
-    Text file = {0};
-    MessageList ignored = {0};
-    static const char key[] = "PRETTY_NAME=\"";
-    const char *name = text_read_file(&file, "/etc/os-release", &ignored) ? strstr(text_c(&file), key) : NULL;
-    if (name) {
-        name += sizeof key - 1;
-        text_appendf(text, "%-20s %.*s\n", "release", (int)strcspn(name, "\"\n"), name);
-    }
-    message_list_free(&ignored);
-    text_free(&file);
-}
-
-// Appends the variables that change what OpenCL does. POCL_REMOTE0_PARAMETERS and the like have addresses.
-static void variables_append(Text *text, const Scrubber *scrubber)
-{
-    static const char *const prefixes[] = {"CL_",     "CUDA_", "GALLIUM_", "GLINT_",  "GPU_",
-                                           "HIP_",    "LP_",   "MESA_",    "NEO",     "OCL",
-                                           "OPENCL_", "POCL_", "ROCR_",    "RUSTICL_"};
-    for (char **variable = environ; *variable; variable++)
-        for (size_t i = 0; i < sizeof prefixes / sizeof *prefixes; i++)
-            if (strncmp(*variable, prefixes[i], strlen(prefixes[i])) == 0 && !strstr(*variable, "REMOTE")) {
-                const Text line = {.items = *variable, .count = strlen(*variable)};
-                Text scrubbed = scrub(scrubber, &line);
-                text_appendf(text, "%s\n", text_c(&scrubbed));
-                text_free(&scrubbed);
-            }
-}
-
-static Text versions_text(const Scrubber *scrubber)
-{
-    Text text = {0};
-    struct utsname host = {0};
-    uname(&host);
-    version_append(&text, "glint", glint_version());
-    version_append(&text, "commit", glint_commit());
-    version_append(&text, "compiler", glint_compiler());
-    libraries_append(&text);
-    release_append(&text);
-    version_append(&text, "kernel", host.sysname);
-    version_append(&text, "kernel release", host.release);
-    version_append(&text, "machine", host.machine);
-    text_appendf(&text, "%-20s %ld\n\n", "processors", sysconf(_SC_NPROCESSORS_ONLN));
-    variables_append(&text, scrubber);
-    return text;
-}
-
 static const char *meaning_of(const char *name)
 {
     const bool is_kernel = strchr(name, '/') != NULL;
@@ -445,7 +361,7 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     StepResult results[STEP_COUNT] = {0};
     Archive archive = {.now = time(NULL)};
     Scrubber scrubber = scrubber_open(folder);
-    Text versions = versions_text(&scrubber);
+    Text versions = report_versions(&scrubber);
     file_add(&archive, "versions.txt", &versions);
     variables_set(folder);
     progress_open(&progress, false);

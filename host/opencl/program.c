@@ -152,21 +152,23 @@ static void kernel_create(Build *build, const char *name)
     build_check(build, "clCreateKernel", status, build->kernel);
 }
 
-// Writes to a file of the device's kernel folder, unless the mode is "wx" and the file exists. A file that
-// cannot be written is only reported, since no result depends on it.
-static void kernel_file_write(const Device *device, uint64_t hash, const char *ending, const char *mode,
-                              const char *text)
+// Writes `contents` to a file of the device's kernel folder that is named by the hash of the kernel's text,
+// unless the mode is "wx" and the file exists. A file that cannot be written is only reported, since no
+// result depends on it.
+static void kernel_file_write(const Device *device, const char *text, const char *ending, const char *mode,
+                              const char *contents)
 {
+    const uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
     char *path = text_format("%s/%016" PRIx64 ".%s", device->kernel_folder, hash, ending);
     FILE *file = fopen(path, mode);
-    bool written = file ? fputs(text, file) >= 0 : errno == EEXIST;
+    bool written = file ? fputs(contents, file) >= 0 : errno == EEXIST;
     if (file && fclose(file) != 0) written = false;
     if (!written) fprintf(stderr, "glint: warning: cannot write '%s': %s\n", path, strerror(errno));
     free(path);
 }
 
 // Appends a build to the log of its kernel.
-static void build_log_keep(const Compute *compute, cl_program program, uint64_t hash, const char *options,
+static void build_log_keep(const Compute *compute, cl_program program, const char *text, const char *options,
                            cl_int status, double seconds)
 {
     const Device *device = compute->device;
@@ -177,7 +179,7 @@ static void build_log_keep(const Compute *compute, cl_program program, uint64_t 
     fault_note_call(NULL);
     text_appendf(&entry, "device: %s, %s\noptions: %s\nbuild: %s, %.3f s\n%s\n", device->name, device->driver,
                  options, cl_status_name(status), seconds, log);
-    kernel_file_write(device, hash, "log", "a", text_c(&entry));
+    kernel_file_write(device, text, "log", "a", text_c(&entry));
     free(log);
     text_free(&entry);
 }
@@ -193,14 +195,13 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     Text options = {0};
     program_options_append(&options, compute->device, request->options);
     if (afresh) append_unused_option(&options);
-    const uint64_t hash = hash_bytes(HASH_START, text, strlen(text));
     // before the build, which may crash
-    if (compute->device->kernel_folder) kernel_file_write(compute->device, hash, "cl", "wx", text);
+    if (compute->device->kernel_folder) kernel_file_write(compute->device, text, "cl", "wx", text);
     const double start = clock_seconds();
     fault_note_call("clBuildProgram");
     status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
     const bool is_built = build_check(&build, "clBuildProgram", status, true);
-    build_log_keep(compute, build.program, hash, text_c(&options), status, clock_seconds() - start);
+    build_log_keep(compute, build.program, text, text_c(&options), status, clock_seconds() - start);
     text_free(&options);
     if (is_built) kernel_create(&build, request->kernel);
     return build;
