@@ -5,7 +5,7 @@ VERSION := 0.2.0
 MAKEFLAGS += --no-builtin-rules
 
 BUILD  ?= build
-# What only runs the tests is built like that in every folder.
+# The tests' own objects are built alike in every folder.
 ifeq ($(origin CFLAGS),undefined)
 CFLAGS := $(if $(filter %-sanitize,$(BUILD)),-O1 -g1,-O2 -g)
 $(BUILD)/tests/%.o: private CFLAGS := -O1 -g1

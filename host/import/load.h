@@ -13,7 +13,7 @@ typedef struct {
     size_t override_count;
     const char *override_name; // of their source in messages
     double frame;              // of an animated YAML scene
-    // Called with each mesh and image that the file names, before it is read; NULL: not wanted.
+    // Called with each mesh, image and scene that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);
     void *context;
     Stage *stage; // shows what is being read; NULL: not wanted

@@ -105,8 +105,8 @@ static inline uint32_t material_any_texture(const Material *material)
 // The cutout for images by whose alpha other programs blend.
 #define CUTOUT_OF_BLENDED 0.5
 
-// The side of an image in texels: a position in float, 24 bits, cannot resolve a texel of a longer one. The
-// texels of all images: with their coarser levels, a third more, kernels count them in 32 bits.
+// The largest side of an image: floats, with 24 bits, cannot place a point within a texel of a longer one.
+// The largest number of texels of all images: coarser levels add a third, and kernels count in 32 bits.
 enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
 typedef struct {
@@ -115,7 +115,7 @@ typedef struct {
     size_t offset;           // of its name in the scene's text
     Text bytes;              // of an image within another file, until it is decoded; else empty
     bool alpha_by_luminance; // where all pixels are opaque, the luminance is the alpha
-    Image image;             // finite, of 1 or 3 channels or more
+    Image image;             // decoded; its colors are finite
 } SceneTexture;
 
 // Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),

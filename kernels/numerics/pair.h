@@ -53,7 +53,7 @@ static inline real pair_round_to_odd(Pair sum)
     return real_from_bits(lanes_select(moves, bits + step, bits));
 }
 
-// Inlined in hundreds of places, it doubles the time of Intel's compiler.
+// Inlined in hundreds of places, it made a cold start with Intel's compiler take 26 s instead of 5.
 __attribute__((noinline)) static real real_fma(real a, real b, real c)
 {
     const real one = (real)(1), up = (real)(0x1p64f), down = (real)(0x1p-64f);
@@ -63,8 +63,8 @@ __attribute__((noinline)) static real real_fma(real a, real b, real c)
     mask a_is_less = fabs(a) < fabs(b);
     real less = lanes_select(a_is_less, a, b) * lanes_select(is_small, up, one);
     real greater = lanes_select(a_is_less, b, a) * lanes_select(is_large, down, one);
-    // of a c that would vanish next to a large product, the sign alone decides, where the product is in the
-    // middle between two reals
+    // where a c that would vanish next to a large product decides, the product is halfway between two reals,
+    // and the sign of c is enough
     real large_c = lanes_select(c_size > (real)(0), copysign(fmax(c_size * down, (real)(0x1p-60f)), c), c);
     real scaled_c = lanes_select(is_large, large_c, c * lanes_select(is_small, up, one));
     real back = lanes_select(is_small, down, lanes_select(is_large, up, one));
