@@ -11,7 +11,9 @@
 
 #include <cmocka.h>
 
-enum { WIDTH = 64, HEIGHT = 48, BLURRED_COUNT = 12, OPEN_AT_MOST = 10 };
+enum { PIXELS_MAX = 64 * 48, BLURRED_COUNT = 12, OPEN_AT_MOST = 10 };
+
+static unsigned width = 48, height = 36; // of the images
 
 // In units of roundoff: an error that needs no excuse, and the blur whose effect is one. Surfaces put the
 // rays that leave them up to 40 u of the size of their numbers away.
@@ -155,16 +157,16 @@ static double sensitivity(const Scene *scene, const ReferenceRay *ray, const Tri
 static void compare(const Trial *trial, const Scene *scene, const Color *expected, Precision precision)
 {
     if (!probe_has(precision)) return;
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
+    RenderSettings settings = film_settings(width, height, precision);
     settings.bounce_count = trial->bounce_count;
     Film film = film_render(&probe_compute, scene, &settings, 0);
     const double u = unit_roundoff(precision);
     size_t wrong = 0, open = 0;
-    for (unsigned i = 0; i < WIDTH * HEIGHT; i++) {
+    for (unsigned i = 0; i < width * height; i++) {
         Color seen = {film.color[3 * i], film.color[3 * i + 1], film.color[3 * i + 2]};
         double error = largest_difference(seen, expected[i]);
         if (error <= PLAIN_ERROR * u) continue;
-        ReferenceRay ray = reference_camera_ray(&scene->camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
+        ReferenceRay ray = reference_camera_ray(&scene->camera, width, height, i % width, i / width);
         double excuse = sensitivity(scene, &ray, trial, u, expected[i]);
         // Here the result depends on the last bits.
         open += excuse > 0x1p-7;
@@ -172,7 +174,7 @@ static void compare(const Trial *trial, const Scene *scene, const Color *expecte
         if (wrong++ == 0)
             print_message(
                 "%s, %s: pixel %u,%u is off by %g, of which %g is excused: %g %g %g, not %g %g %g\n",
-                trial->name, precision_names[precision], i % WIDTH, i / WIDTH, error, excuse, seen.x, seen.y,
+                trial->name, precision_names[precision], i % width, i / width, error, excuse, seen.x, seen.y,
                 seen.z, expected[i].x, expected[i].y, expected[i].z);
     }
     film_free(&film);
@@ -184,10 +186,10 @@ static void shows_what_the_reference_shows(void **state)
 {
     const Trial *trial = *state;
     Scene scene = scene_of_text("bounces.yaml", trial->text);
-    static Color expected[WIDTH * HEIGHT];
+    static Color expected[PIXELS_MAX];
     const ReferencePath path = {.bounce_count = trial->bounce_count};
-    for (unsigned i = 0; i < WIDTH * HEIGHT; i++) {
-        ReferenceRay ray = reference_camera_ray(&scene.camera, WIDTH, HEIGHT, i % WIDTH, i / WIDTH);
+    for (unsigned i = 0; i < width * height; i++) {
+        ReferenceRay ray = reference_camera_ray(&scene.camera, width, height, i % width, i / width);
         expected[i] = reference_path_color(&scene, &ray, &path);
     }
     for (Precision precision = PRECISION_SINGLE; precision < ARITHMETIC_COUNT; precision++)
@@ -197,6 +199,10 @@ static void shows_what_the_reference_shows(void **state)
 
 int main(void)
 {
+    if (tests_are_long()) {
+        width = 64;
+        height = 48;
+    }
     struct CMUnitTest tests[TRIAL_COUNT];
     for (size_t i = 0; i < TRIAL_COUNT; i++) {
         tests[i] =
