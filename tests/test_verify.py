@@ -74,10 +74,8 @@ class Verify(VerifyTestCase):
                 self.assertEqual(report["tier"], TIERS[precision])
 
     def test_lanes_and_features_of_kernels_do_not_change_bits(self):
-        cases, precision = ["S5", "C7"], "single"
-        if not IS_SANITIZED:
-            # rays alone: test_variants has the images of the short test
-            cases, precision = ["S5", "C7", "R4"], "strict"
+        # rays alone: test_variants has the images of the short test
+        cases, precision = ["S5", "C7", "R4"], "strict"
         if IS_LONG:
             cases += ["S2", "C6", "T1", "P2", "R2", "R6"]
         hashes = self.hashes(cases, f"--precision {precision} --lanes 1")
@@ -86,7 +84,7 @@ class Verify(VerifyTestCase):
         self.assertEqual(self.hashes(lean, f"--precision {precision} --lean"), self.hashes(lean, f"--precision {precision}"))
 
     def test_report(self):
-        report = self.json("verify P4 --precision single --lanes 1 --json")
+        report = self.json("verify P4 --precision strict --lanes 1 --json")
         self.assertEqual((report["schema"], report["precisions"][0]["lanes"]), (3, 1))
         self.assertTrue(report["reference_bits"] and report["glint"] and report["device"]["platform_version"])
         self.assertNotIn("perturb", report)
