@@ -19,7 +19,7 @@ const uint32_t *tested_lanes(const Device *device)
 {
     static uint32_t few[] = {1, 4, 0};
     static const uint32_t all[] = {1, 4, 8, 16, 0};
-    if (device_lanes(device, false) > 1) few[1] = device_lanes(device, false);
+    if (device_lanes(device, false, 0) > 1) few[1] = device_lanes(device, false, 0);
     return tests_are_long() ? all : few;
 }
 

@@ -46,7 +46,7 @@ static inline int probe_close(void **state)
 static inline Precision probe_same_bits_from(void)
 {
     const Passport *passport = arithmetic_passport(&probe_compute, PRECISION_SINGLE,
-                                                   device_lanes(probe_compute.device, false), false);
+                                                   device_lanes(probe_compute.device, false, 0), false);
     const bool is_exact = passport && passport->quotients.wrong_count + passport->roots.wrong_count == 0;
     return is_exact ? PRECISION_SINGLE : PRECISION_STRICT;
 }

@@ -144,12 +144,17 @@ static void test_lanes(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         device.native_float_width = cases[i][0];
         device.native_double_width = cases[i][0] / 2;
-        assert_int_equal(device_lanes(&device, false), cases[i][1]);
+        assert_int_equal(device_lanes(&device, false, 0), cases[i][1]);
         device.native_double_width = cases[i][0];
-        assert_int_equal(device_lanes(&device, true), cases[i][1]);
+        assert_int_equal(device_lanes(&device, true, 0), cases[i][1]);
+        const unsigned widest = cases[i][1] > 1 ? cases[i][1] : 16;
+        assert_int_equal(device_lanes(&device, true, 16), widest);
+        assert_int_equal(device_lanes(&device, false, 4), 4);
+        assert_int_equal(device_lanes(&device, false, 1), 1);
     }
     device.type = CL_DEVICE_TYPE_GPU;
-    assert_int_equal(device_lanes(&device, false), 1);
+    assert_int_equal(device_lanes(&device, false, 0), 1);
+    assert_int_equal(device_lanes(&device, false, 16), 16);
 }
 
 static void test_selector(void **state)

@@ -330,9 +330,8 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
         .comparisons = memory_allocate_zeroed(set->count, sizeof *against.comparisons),
     };
     for (size_t i = 0; i < set->count; i++)
-        if (set->rows[i].key.lanes == 0)
-            set->rows[i].key.lanes =
-                device_lanes(device, set->variants[i].settings.precision == PRECISION_DOUBLE);
+        set->rows[i].key.lanes = device_lanes(device, set->variants[i].settings.precision == PRECISION_DOUBLE,
+                                              set->rows[i].key.lanes);
     Progress progress;
     progress_open(&progress, !report_has_text(&options->report));
     int status = pairs_run(&against, &progress);

@@ -80,8 +80,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
 {
     MessageList messages = {0};
     const RenderSettings *settings = &variant->settings;
-    row->key.lanes = settings->lanes ? settings->lanes
-                                     : device_lanes(compute->device, settings->precision == PRECISION_DOUBLE);
+    row->key.lanes = device_lanes(compute->device, settings->precision == PRECISION_DOUBLE, settings->lanes);
     if ((!timing_builds || builds_measure(compute, variant, row, &messages)) &&
         rays_count(compute, variant, row, &messages))
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);

@@ -31,7 +31,7 @@ static void devices_append(Text *key, Renderer *const *renderers, size_t count, 
         const Device *reference = renderer_report(renderers[i])->reference_device;
         if (!reference) continue;
         rank_set_device(&own, reference);
-        model_append(key, &own, device_lanes(reference, true));
+        model_append(key, &own, device_lanes(reference, true, 0));
     }
     for (size_t i = 0; ranks && i < ranks->count; i++)
         if (ranks->items[i].lanes[PASS_ALL] > 0) // otherwise it cannot render

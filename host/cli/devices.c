@@ -56,7 +56,7 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_text(json, "driver", device->driver);
         json_int64(json, "units", device->compute_units);
         json_int64(json, "clock_mhz", device->clock_mhz);
-        json_int64(json, "lanes", device_lanes(device, false));
+        json_int64(json, "lanes", device_lanes(device, false, 0));
         json_int64(json, "native_float_width", device->native_float_width);
         json_int64(json, "native_double_width", device->native_double_width);
         json_bool(json, "fp64", device->fp64);
@@ -112,7 +112,7 @@ static void row_fill(Row *row, const Device *device, bool is_chosen)
     text_appendf(cell++, "%s", device_type_name(device->type));
     text_appendf(cell++, "%u", device->compute_units);
     text_appendf(cell++, "%u", device->clock_mhz);
-    text_appendf(cell++, "%u", device_lanes(device, false));
+    text_appendf(cell++, "%u", device_lanes(device, false, 0));
     text_appendf(cell++, "%s", device->fp64 ? "yes" : "no");
     text_appendf(cell++, "%s", device->fma_in_hardware ? "yes" : "no");
     text_appendf(cell++, "%s", device->correctly_rounded ? "exact" : "loose");

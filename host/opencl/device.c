@@ -319,11 +319,16 @@ bool device_usable(const Device *device, const char **why)
     return missing == NULL;
 }
 
-unsigned device_lanes(const Device *device, bool is_double)
+unsigned device_lanes(const Device *device, bool is_double, unsigned requested)
 {
-    if (!(device->type & CL_DEVICE_TYPE_CPU)) return 1;
-    unsigned width = is_double ? device->native_double_width : device->native_float_width;
-    return width >= 16 ? 16 : width >= 8 ? 8 : width >= 4 ? 4 : 1;
+    const unsigned width = !(device->type & CL_DEVICE_TYPE_CPU) ? 1
+                           : is_double                          ? device->native_double_width
+                                                                : device->native_float_width,
+                   widest = width >= 16  ? 16
+                            : width >= 8 ? 8
+                            : width >= 4 ? 4
+                                         : 1;
+    return requested == 0 || (widest > 1 && requested > widest) ? widest : requested;
 }
 
 const char *device_fp64_hint(const Device *device)

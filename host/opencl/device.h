@@ -82,9 +82,12 @@ const char *device_selector(const char *option);
 // *why, which may be NULL, to what is missing.
 bool device_usable(const Device *device, const char **why);
 
-// Returns the default number of rays per work-item: on a CPU the native vector width of float, or of double
-// where `is_double`, rounded down to 1, 4, 8 or 16, elsewhere 1.
-unsigned device_lanes(const Device *device, bool is_double);
+// Returns the number of rays per work-item, 1, 4, 8 or 16. If 0 are requested: on a CPU the native vector
+// width of float, or of double where `is_double`, rounded down, elsewhere 1. Otherwise as many as requested,
+// but no more than fit the vectors of a CPU that has them: PoCL 4 and newer put every function whose vectors
+// are wider into one body, which takes minutes to compile, and no scene was faster with two vectors per
+// value.
+unsigned device_lanes(const Device *device, bool is_double, unsigned requested);
 
 // Returns what may give the device 64-bit floating point, to be appended to a message that it has none,
 // otherwise "".

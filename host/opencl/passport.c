@@ -140,7 +140,7 @@ bool passports_measure(Compute *compute)
     for (PassportMode mode = 0; mode < PASSPORT_MODE_COUNT; mode++) {
         const bool is_double = mode == PASSPORT_DOUBLE;
         if (is_double && !compute->device->fp64) continue;
-        if (!measure_and_keep(compute, mode, device_lanes(compute->device, is_double), true, false))
+        if (!measure_and_keep(compute, mode, device_lanes(compute->device, is_double, 0), true, false))
             return false;
     }
     return true;
@@ -150,7 +150,7 @@ void passports_recall(const Device *device)
 {
     for (PassportMode mode = 0; mode < PASSPORT_MODE_COUNT; mode++) {
         Passport passport;
-        const uint32_t lanes = device_lanes(device, mode == PASSPORT_DOUBLE);
+        const uint32_t lanes = device_lanes(device, mode == PASSPORT_DOUBLE, 0);
         if (mode == PASSPORT_DOUBLE && !device->fp64) continue;
         if (passport_load(&passport, device, mode, lanes)) passport_keep(device, &passport);
     }

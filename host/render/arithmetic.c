@@ -33,8 +33,7 @@ bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageL
         const PassportMode mode = needs[precision].modes[i];
         Compute *runs = mode == PASSPORT_DOUBLE ? compute_in_double(compute) : compute;
         const Device *device = runs->device;
-        const uint32_t lanes =
-            settings->lanes ? settings->lanes : device_lanes(device, mode == PASSPORT_DOUBLE);
+        const uint32_t lanes = device_lanes(device, mode == PASSPORT_DOUBLE, settings->lanes);
         const Passport *passport =
             passport_acquire(runs, mode, lanes, needs[precision].relies, settings->no_cache);
         if (!passport) return false;
@@ -58,7 +57,7 @@ bool arithmetic_refuses(const Device *device, Precision precision, Text *why)
         const Passport *passport = passport_at(device, k);
         for (unsigned i = 0; i < needs[precision].mode_count; i++)
             if (passport->mode == needs[precision].modes[i] &&
-                passport->lanes == device_lanes(device, passport->mode == PASSPORT_DOUBLE) &&
+                passport->lanes == device_lanes(device, passport->mode == PASSPORT_DOUBLE, 0) &&
                 passport_refuses(passport, why))
                 return true;
     }

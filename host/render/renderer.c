@@ -233,7 +233,7 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     report->build_from_cache = true;
     report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
-    report->lanes = settings->lanes ? settings->lanes : device_lanes(compute->device, report->is_double);
+    report->lanes = device_lanes(compute->device, report->is_double, settings->lanes);
     renderer->passport =
         arithmetic_passport(compute, renderer->settings.precision, report->lanes, settings->no_cache);
     if (earlier) renderer_kernels_take(renderer, earlier);

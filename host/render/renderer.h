@@ -24,7 +24,7 @@ typedef struct {
     // traces all.
     double min_contribution;
     Precision precision;
-    uint32_t lanes; // rays per work-item: 1, 4, 8 or 16, or 0 for device_lanes
+    uint32_t lanes; // rays per work-item: 1, 4, 8 or 16, or 0: see device_lanes
     BvhChoice bvh;
     InstanceChoice instances;
     bool counting; // counts the image's rays, not those of AOVs, by type in a slower build
