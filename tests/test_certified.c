@@ -271,7 +271,7 @@ typedef struct {
     uint64_t repeated, undecided;
 } Answer;
 
-// Each takes kernels of its own, so scenes share them; the injected errors depend on the operands, too.
+// Each takes separate kernels, so scenes share them; the injected errors also depend on the operands.
 enum { PERTURB_SEEDS = 7 };
 
 // The same kernels for all scenes of a family, with the BVH and without it.
@@ -438,17 +438,23 @@ static void hard_cases_are_decided(void **state)
 
 enum { SMALL_SIDE = 15 }; // odd: the image has a pixel in its center
 
-// Renders a small image at certified. Its decided pixels must have the reference's decisions and colors.
-// Returns the number of undecided samples and frees the scene.
-static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what, double number)
+// Returns settings of a small image at certified, for which one program serves all scenes.
+static RenderSettings small_settings(uint32_t bounce_count)
+{
+    RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);
+    settings.bounce_count = bounce_count;
+    settings.extra_features = FEATURE_ALL;
+    return settings;
+}
+
+// Renders a small image. Its decided pixels must have the reference's decisions and colors. Returns the
+// number of undecided samples and frees the scene.
+static size_t check_image(Scene *scene, const RenderSettings *settings, const char *what, double number)
 {
     CertifySample reference;
     assert_true(certify_sample_open(&reference, scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
-                                    (ReferencePath){.bounce_count = bounce_count}, NULL));
-    RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);
-    settings.bounce_count = bounce_count;
-    settings.extra_features = FEATURE_ALL; // one program for all
-    Film film = image_render(scene, &settings);
+                                    (ReferencePath){.bounce_count = settings->bounce_count}, NULL));
+    Film film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(&reference, &film);
     if (errors.wrong_decided > 0)
         fail_msg("%s, %g: of the pixels not undecided %zu are wrong, at most %zu of them in color", what,
@@ -458,6 +464,12 @@ static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what,
     certify_sample_close(&reference);
     scene_free(scene);
     return undecided;
+}
+
+static size_t check_small(Scene *scene, uint32_t bounce_count, const char *what, double number)
+{
+    const RenderSettings settings = small_settings(bounce_count);
+    return check_image(scene, &settings, what, number);
 }
 
 // A scene seen along -z from a point, `half_tangent` up and down.
@@ -579,6 +591,39 @@ static void skimming_rays_are_decided(void **state)
         array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{-3.5, -0.5, 0}, normal}}));
         assert_true(check_small(&scene, 0, "a plane that rays skim", digits) < 2 * SMALL_SIDE);
     }
+}
+
+// Planets and infinite cylinders in views so narrow that every ray skims their horizon, on devices whose
+// quotients and roots err as much as OpenCL permits.
+static void horizons_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    const int count = tests_are_long() ? 1000 : 100;
+    RenderSettings settings = small_settings(0);
+    settings.extra_features = family_features[PLANETS];
+    settings.perturb_seed = 3;
+    settings.lanes = 1; // built sooner
+    size_t undecided = 0;
+    random_state.state = 1;
+    for (int i = 0; i < count; i++) {
+        const bool is_planet = i % 2 == 0;
+        const double radius = random_power(&random_state, 4, 7), height = random_between(&random_state, 1, 5),
+                     away = sqrt(height * (2 * radius + height));
+        Scene scene = scene_seen_from((Vector3){0, 0, 0}, random_power(&random_state, -5.5, -3.5));
+        // within the image, but on no ray
+        const double above = away * scene.camera.half_tangent * random_between(&random_state, -0.9, 0.9);
+        const Vector3 center = {0, -radius - above, -away};
+        Object object = {.kind = SHAPE_SPHERE, .as.sphere = {center, radius}};
+        if (!is_planet)
+            object = (Object){.kind = SHAPE_CYLINDER,
+                              .as.cylinder = {.from = center, .axis = {1, 0, 0}, .radius = radius}};
+        array_push(scene.objects, object);
+        if (tests_are_long()) settings.perturb_seed = 1 + (uint32_t)i * PERTURB_SEEDS / (uint32_t)count;
+        undecided +=
+            check_image(&scene, &settings, is_planet ? "a planet's horizon" : "a cylinder's horizon", radius);
+    }
+    assert_int_equal(undecided, 0);
 }
 
 // Bubbles with walls of glass, some of them thinner than the distance at which rays through them start off a
@@ -718,8 +763,9 @@ int main(int argc, char **argv)
         cmocka_unit_test(planets_are_decided),          cmocka_unit_test(mirrors_glass_and_spots_are_decided),
         cmocka_unit_test(hard_cases_are_decided),       cmocka_unit_test(lights_on_surfaces_are_decided),
         cmocka_unit_test(checkers_far_out_are_decided), cmocka_unit_test(faint_paths_are_decided),
-        cmocka_unit_test(skimming_rays_are_decided),    cmocka_unit_test(thin_walls_are_decided),
-        cmocka_unit_test(needles_have_an_area),         cmocka_unit_test(mixed_sizes_are_decided)};
+        cmocka_unit_test(skimming_rays_are_decided),    cmocka_unit_test(horizons_are_decided),
+        cmocka_unit_test(thin_walls_are_decided),       cmocka_unit_test(needles_have_an_area),
+        cmocka_unit_test(mixed_sizes_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, painters_close);
 }

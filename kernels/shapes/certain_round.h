@@ -171,8 +171,9 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         real room = lanes_select(difference > zero, one - wanted, one + wanted);
         real tilt = divide_or(difference, room, zero);
         tilted_slope = h - quadratic->h;
-        tilted =
-            height - point.rho + divide_or(real_fma(tilt, along_unit, point.rho), one + fabs(tilt), zero);
+        // not height - rho + n . x, whose roundings of rho would exceed the height above a planet
+        real tilted_rho = fabs(tilt) * point.rho * (real)(1 + 32 * UNIT_ROUNDOFF);
+        tilted = height + divide_or(real_fma(tilt, along_unit, -tilted_rho), one + fabs(tilt), zero);
         slope = real_fma(part, q_length, -quadratic->h);
     }
     return height_is_positive(height, slope, slope_error, t1, from, to, ends) |
