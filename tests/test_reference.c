@@ -388,6 +388,38 @@ static void finds_the_nearest(void **state)
 }
 
 // A point off the surface along the exact normal is as far from it as it was moved, and the normal is there.
+// A shape of a millionth seen from 1, where the roots of the whole ray would be off by 1e-27.
+static void finds_small_shapes_exactly(void **state)
+{
+    (void)state;
+    enum { SHAPES = 4 };
+    Random random = {1};
+    size_t found = 0;
+    for (int i = 0; i < 1000; i++) {
+        const Vector3 at = {0.1, -0.3, -1}, axis = random_unit_vector(&random);
+        const double size = 1e-6;
+        const Vector3 half = vector_scale(axis, size);
+        const Object objects[SHAPES] = {
+            sphere(at, size),
+            cylinder(at, vector_scale(axis, 2 * size), size, true, true),
+            {.kind = SHAPE_CONE,
+             .as.cone = {at, vector_scale(axis, size), {0, 7 * size}, 0, true, true, false}},
+            {.kind = SHAPE_PARABOLOID,
+             .as.paraboloid = {
+                 .apex = at, .axis = axis, .focal_length = size, .height = size, .finite = true}}};
+        const Object *object = &objects[i % SHAPES];
+        const Vector3 aim = vector_add(vector_add(at, half), vector_scale(random_unit_vector(&random), size));
+        const ReferenceRay ray = reference_ray_rounded((Vector3){0, 0, 0}, aim);
+        const ReferenceHit hit = reference_hit_object(object, &ray);
+        if (!hit.found) continue;
+        found++;
+        const ReferenceSurface surface = reference_surface(object, reference_point(&ray, hit.t));
+        const double off = (double)reference_surface_distance(&surface);
+        if (off > 1e-31) fail_msg("shape %d: %g off the surface", i % SHAPES, off);
+    }
+    assert_true(found > 300);
+}
+
 static void measures_distances(void **state)
 {
     (void)state;
@@ -470,14 +502,23 @@ static void nonfinite_colors_are_errors(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(knows_spheres),     cmocka_unit_test(sees_only_insides),
-        cmocka_unit_test(knows_flat_shapes), cmocka_unit_test(knows_cylinders),
-        cmocka_unit_test(knows_cones),       cmocka_unit_test(knows_tori),
-        cmocka_unit_test(shades_as_phong),   cmocka_unit_test(casts_shadows),
-        cmocka_unit_test(lays_checkers),     cmocka_unit_test(aims_cameras),
-        cmocka_unit_test(rounds_cameras),    cmocka_unit_test(rounds_every_number),
-        cmocka_unit_test(finds_the_nearest), cmocka_unit_test(measures_distances),
-        cmocka_unit_test(knows_highlights),  cmocka_unit_test(nonfinite_colors_are_errors),
+        cmocka_unit_test(knows_spheres),
+        cmocka_unit_test(sees_only_insides),
+        cmocka_unit_test(knows_flat_shapes),
+        cmocka_unit_test(knows_cylinders),
+        cmocka_unit_test(knows_cones),
+        cmocka_unit_test(knows_tori),
+        cmocka_unit_test(shades_as_phong),
+        cmocka_unit_test(casts_shadows),
+        cmocka_unit_test(lays_checkers),
+        cmocka_unit_test(aims_cameras),
+        cmocka_unit_test(rounds_cameras),
+        cmocka_unit_test(rounds_every_number),
+        cmocka_unit_test(finds_the_nearest),
+        cmocka_unit_test(finds_small_shapes_exactly),
+        cmocka_unit_test(measures_distances),
+        cmocka_unit_test(knows_highlights),
+        cmocka_unit_test(nonfinite_colors_are_errors),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -87,11 +87,25 @@ ReferenceHit reference_miss(void)
     return (ReferenceHit){.object = UINT32_MAX, .margin = UNBOUNDED};
 }
 
-ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
+static ReferenceHit hit_from(const Object *object, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_miss();
     shapes[object->kind]->hit(object, ray, &hit);
     return hit;
+}
+
+ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
+{
+    const ReferenceHit hit = hit_from(object, ray);
+    if (!hit.found || quad_absolute(hit.t) * quad3_length(ray->direction) <= 1024 * hit.curvature_radius)
+        return hit;
+    // Roots lose the square of how many times farther than large the shape is, so they are searched again
+    // from the hit.
+    const ReferenceRay nearby = {reference_point(ray, hit.t), ray->direction, ray->tmin - hit.t,
+                                 ray->tmax - hit.t};
+    ReferenceHit again = hit_from(object, &nearby);
+    again.t += hit.t;
+    return again;
 }
 
 void reference_hit_take(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray)
