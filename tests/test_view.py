@@ -77,7 +77,8 @@ def display_open(width=320, height=360):
     """
     read, write_end = os.pipe()
     folder = os.environ["VIEW_FOLDER"]
-    command = ["Xvfb", "-noreset", "-displayfd", str(write_end), "-screen", "0", f"{width}x{height}x24", "-fbdir", folder]
+    command = ["Xvfb", "-noreset", "-nocursor", "-displayfd", str(write_end), "-screen", "0", f"{width}x{height}x24",
+               "-fbdir", folder]
     process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     os.close(write_end)
     with os.fdopen(read) as file:
