@@ -81,7 +81,7 @@ ELSEWHERE = {
     "glint bench": ("glint", *(f"device.{name}" for name in ("name", "board", "pci", "uuid", "platform", "driver", "type", "units", "clock_mhz", "passports")),
                     "runs[].launches[]."),
     "glint bench --against": ("glint", "date", "host", "build", "device", *(f"runs[].{name}" for name in (
-        "scene", "precision", "lanes", "bvh", "size", "samples", "bounces", "comparison", "frame_ms", "frame_samples_ms"))),
+        "scene", "variant", "precision", "lanes", "bvh", "size", "samples", "bounces", "comparison", "frame_ms", "frame_samples_ms"))),
     "glint accuracy": ("glint", "device", *(f"scenes[].variants[].{name}" for name in (
         "frame_ms", "kernel_ms", "clock", "rays", "mrays_per_s"))),
     "glint certify": ("glint", "device"),
@@ -290,6 +290,10 @@ MEANINGS = {
     "calibration": "object; of a fixed workload on the host, before each round",
     "calibration.rounds": "count; iterations of that workload",
     "calibration.{samples_ms,processor_samples_ms}": "number; its wall time, and that of all processors together",
+    "runs[].variant": "text; the options of `--variant`; only with that",
+    "runs[].to_first": "object; frame time over that of the scene's first row, of the rounds that both ran; only with `--variant`",
+    "runs[].to_first.ratio": "number; estimated",
+    "runs[].to_first.{low,high}": "number or null; of its confidence interval; null: too few repeats",
     "scene_hash": "hash; of the contents of the scene's files; rows of reports match by it",
     "{frame_samples_ms,kernel_samples_ms,processor_samples_ms}": "number; of every run, in order",
     "comparison": "figure; frame time, new over old; only with `--compare` or `--against`",

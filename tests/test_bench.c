@@ -139,7 +139,7 @@ static void test_runs_that_scatter(void **state)
 static BenchRow row_make(void)
 {
     BenchRow row = {
-        .key = {"scenes/a.yaml", "single", "auto", 16, 40, 30, 4, 5, 0xabcdef0123456789},
+        .key = {"scenes/a.yaml", "single", "auto", NULL, 16, 40, 30, 4, 5, 0xabcdef0123456789},
         .times = times_make(30, 1),
         .rays = {1200, 900, 100, 200, 1500},
     };
@@ -218,8 +218,8 @@ static void test_baseline(void **state)
     assert_true(processor.frame->count == 2 && processor.calibration->count == 2);
     assert_near(processor.frame->items[1], 0.008, 1e-12);
     assert_near(processor.calibration->items[1], 0.0025, 1e-12);
-    BenchKey others[6];
-    for (int i = 0; i < 6; i++)
+    BenchKey others[7];
+    for (int i = 0; i < 7; i++)
         others[i] = row.key;
     others[0].lanes = 8;
     others[1].samples = 1;
@@ -227,7 +227,8 @@ static void test_baseline(void **state)
     others[3].scene_hash++;
     others[4].precision = "double";
     others[5].height = 31;
-    for (int i = 0; i < 6; i++)
+    others[6].variant = "--work-group 4x4";
+    for (int i = 0; i < 7; i++)
         assert_false(baseline_find(baseline, &others[i], &wall, &processor));
     baseline_close(baseline);
     bench_row_free(&row);

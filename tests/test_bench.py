@@ -158,6 +158,41 @@ for line in worker.stdout:
         changed = self.json(f"bench sphere.yaml --set camera.fov=61 {tiny}")["runs"]
         self.assertNotEqual(rows[0]["scene_hash"], changed[0]["scene_hash"])
 
+    def test_variants(self):
+        """Each variant has its rows, with its options; the later ones are compared with the first, round by round."""
+        variants = "", "--work-group 4x2", "--build-options '-DUNUSED=1 -DOTHER=2'", "--samples 1,2 --bounces 0"
+        options = " ".join(f'--variant "{variant}"' for variant in variants)
+        command = f"bench sphere.yaml --size 32x24 --seconds 0.4 --lanes 1 {options}"
+        runs = self.json(f"{command} --launches --json")["runs"]
+        self.assertEqual([run["variant"] for run in runs], [*variants, variants[-1]])
+        self.assertEqual([(run["samples"], run["bounces"], run["lanes"]) for run in runs],
+                         [(1, 5, 1)] * 3 + [(1, 0, 1), (2, 0, 1)])
+        self.assertEqual(["-DUNUSED=1 -DOTHER=2" in run["build_options"] for run in runs], [False, False, True, False, False])
+        self.assertEqual([[4, 2] in [launch["local"] for launch in run["launches"]] for run in runs],
+                         [False, True, False, False, False])
+        self.assertEqual(["to_first" in run for run in runs], [False] + [True] * 4)
+        self.assertEqual(len({len(run["frame_samples_ms"]) for run in runs}), 1, "the runs are interleaved")
+        for run in runs:
+            self.assertFigure(run["build_ms"]["cold"])
+        for run in runs[1:]:
+            times, first = run["frame_samples_ms"], runs[0]["frame_samples_ms"]
+            ratios = [mine / other for mine, other in zip(times, first)]
+            self.assertTrue(min(ratios) <= run["to_first"]["ratio"] <= max(ratios), run["to_first"])
+        out = self.glint(command).stdout
+        self.assertRegex(out, r"(?m)^    \(no options\)$")
+        self.assertRegex(out, r"(?m)^    --work-group 4x2: [0-9.]+( \([0-9.]+ to [0-9.]+\))? times the first row's frame time$")
+        names = {entry["name"] for entry in self.json(f"{command} --format benchmark")["benchmarks"]}
+        self.assertEqual(names, {f"sphere.yaml/32x24/single/1/auto/{end}" for end in
+                                 ("1/5", *(f"1/5/{variant}" for variant in variants[1:3]),
+                                  f"1/0/{variants[3]}", f"2/0/{variants[3]}")})
+
+    def test_variants_against_an_earlier_report(self):
+        """Rows of variants that have other options for the driver are other rows."""
+        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --lanes 1 --tolerance 1e6 --json"
+        write("report", self.glint(f"{command} --variant '--work-group 4x2'").stdout)
+        process = self.glint(f"{command} --compare report --variant '--work-group 2x2'", status=1)
+        self.assertIn("report has none of these rows", process.stderr)
+
     def test_refused(self):
         for arguments, word in (
             ("", "scene"),
@@ -168,6 +203,11 @@ for line in worker.stdout:
             ("sphere.yaml --tolerance -1", "--tolerance"),
             ("sphere.yaml --tolerance 0.9", "--tolerance"),
             ("sphere.yaml --samples 0", "--samples"),
+            ("sphere.yaml --variant '--lanes 1' --variant '--lanes 2'", 'the error is in --variant "--lanes 2"'),
+            ("sphere.yaml --variant '--device 0'", "glint bench --variant: unrecognized option '--device'"),
+            ("sphere.yaml --variant 'sphere.yaml'", '--variant: expected options, not "sphere.yaml"'),
+            ("sphere.yaml --variant '$(true)'", "--variant: cannot split"),
+            ("sphere.yaml --variant '--work-group 60000x2'", "--work-group: 60000x2 has 120000 work-items"),
         ):
             with self.subTest(arguments):
                 self.refuses(f"bench {arguments}", word)

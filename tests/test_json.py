@@ -158,7 +158,8 @@ class Json(TestCase):
         write("bench.json", json.dumps(baseline))
         self.check_members("glint bench", self.json(
             f"bench plain.yaml {SMALL} {QUICK} --samples 2,3 --json --compare bench.json", status=4),
-            json.loads(bench.stdout))
+            json.loads(bench.stdout),
+            self.json(f"bench plain.yaml {SMALL} --samples 2 {QUICK} --json --variant '' --variant '--work-group 4x4'"))
         self.check_members("glint bench --against", self.json(
             f"bench plain.yaml {SMALL} {QUICK} --json --against {PROGRAM}", status=4))
 

@@ -11,13 +11,15 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
+#include <wordexp.h>
 
 enum {
     OPTION_COMPARE = OPTION_BEYOND_VARIANTS,
     OPTION_AGAINST,
     OPTION_WORKER,
     OPTION_TOLERANCE,
-    OPTION_LAUNCHES
+    OPTION_LAUNCHES,
+    OPTION_VARIANT
 };
 
 static const struct option long_options[] = {
@@ -27,12 +29,24 @@ static const struct option long_options[] = {
     {"worker", no_argument, NULL, OPTION_WORKER},
     {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
     {"launches", no_argument, NULL, OPTION_LAUNCHES},
+    {"variant", required_argument, NULL, OPTION_VARIANT},
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     VARIANT_LONG_OPTIONS,
     DRIVER_LONG_OPTIONS,
     KEEP_KERNELS_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},
+    {0},
+};
+
+// The options that --variant takes.
+static const struct option variant_long_options[] = {
+    {"precision", required_argument, NULL, OPTION_PRECISION},
+    {"lanes", required_argument, NULL, OPTION_LANES},
+    {"bvh", required_argument, NULL, OPTION_BVH},
+    {"samples", required_argument, NULL, OPTION_SAMPLES},
+    {"bounces", required_argument, NULL, OPTION_BOUNCES},
+    DRIVER_LONG_OPTIONS,
     {0},
 };
 
@@ -46,9 +60,18 @@ static const char help_text[] =
     "with --compare)\n"
     "      --worker          answer another glint's --against\n"
     "      --launches        list the kernel launches of each row's last run\n"
+    "      --variant OPTIONS\n"
+    "                        rows with these options, such as \"--lanes 8 --work-group 8x8\", compared with "
+    "the "
+    "first row;\n"
+    "                        any of --precision, --lanes, --bvh, --samples, --bounces, --work-group and "
+    "--build-options;\n"
+    "                        may be repeated\n"
     "      --precision LIST  of single, strict, double, certified (default: single)\n"
     "      --samples LIST    per pixel, one row each (default: 1)\n" //
     HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_KEEP_KERNELS HELP_FORMAT HELP_HELP;
+
+enum { VARIANTS_MAX = 32 };
 
 typedef struct {
     VariantOptions variants;
@@ -56,6 +79,11 @@ typedef struct {
     const char *baseline, *against;
     ReportOptions report;
     bool launches, is_worker;
+    // Each --variant's text, its words and the options that they set.
+    const char *variant_texts[VARIANTS_MAX];
+    wordexp_t variant_words[VARIANTS_MAX];
+    VariantOptions variant_options[VARIANTS_MAX];
+    size_t variant_count;
 } BenchOptions;
 
 typedef struct {
@@ -87,9 +115,78 @@ static bool option_take(BenchOptions *options, int option, const char *value)
     case OPTION_LAUNCHES:
         options->launches = true;
         return true;
+    case OPTION_VARIANT:
+        if (options->variant_count == VARIANTS_MAX) {
+            fprintf(stderr, "glint: --variant: may be given at most %d times\n", VARIANTS_MAX);
+            return false;
+        }
+        options->variant_texts[options->variant_count++] = value;
+        return true;
     default:
         return false;
     }
+}
+
+// Reads a variant's options from its text, which is split into words as a shell does.
+static bool variant_read(BenchOptions *options, size_t index)
+{
+    const char *text = options->variant_texts[index];
+    VariantOptions *variant = &options->variant_options[index];
+    wordexp_t *words = &options->variant_words[index];
+    *variant = options->variants;
+    variant->name = text;
+    words->we_offs = 1; // for the name that heads getopt's messages
+    if (wordexp(text, words, WRDE_DOOFFS | WRDE_NOCMD | WRDE_UNDEF) != 0) {
+        *words = (wordexp_t){0};
+        fprintf(stderr, "glint: --variant: cannot split \"%s\" into words; quote special characters\n", text);
+        return false;
+    }
+    static char name[] = "glint bench --variant";
+    words->we_wordv[0] = name;
+    const int count = (int)words->we_wordc + 1;
+    optind = 0; // restarts getopt
+    bool is_valid = true;
+    for (int option;
+         is_valid && (option = getopt_long(count, words->we_wordv, "", variant_long_options, NULL)) != -1;)
+        if (option == '?')
+            is_valid = false;
+        else
+            variant_option(variant, option, optarg, &is_valid);
+    if (is_valid && optind < count) {
+        fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", words->we_wordv[optind]);
+        is_valid = false;
+    }
+    if (!is_valid) fprintf(stderr, "glint: the error is in --variant \"%s\"\n", text);
+    return is_valid;
+}
+
+// Reads the variants, which start from the options of all rows. Restores `optind`.
+static bool variants_read(BenchOptions *options)
+{
+    const int first_scene = optind;
+    for (size_t i = 0; i < options->variant_count; i++)
+        if (!variant_read(options, i)) return false;
+    options->variants.variants = options->variant_options;
+    options->variants.variant_count = options->variant_count;
+    optind = first_scene;
+    return true;
+}
+
+// Returns whether the device allows the work-groups of all variants, and prints an error if not.
+static bool work_groups_are_allowed(const Bench *bench)
+{
+    for (size_t i = 0; i < bench->set.count; i++) {
+        const Device device = variant_device(bench->open.compute.device, &bench->set.variants[i]);
+        if (bench->set.variants[i].work_group[0] > 0 && !work_group_is_allowed(&device)) return false;
+    }
+    return true;
+}
+
+static bool is_any_certified(const VariantSet *set)
+{
+    for (size_t i = 0; i < set->count; i++)
+        if (set->variants[i].settings.precision == PRECISION_CERTIFIED) return true;
+    return false;
 }
 
 static const double against_tolerance = 1.02, baseline_tolerance = 1.1, against_seconds = 30;
@@ -209,10 +306,11 @@ static int scenes_bench(Bench *bench, int argument_count, char **arguments)
     messages_print(&messages, NULL);
     int status = EXIT_USER;
     if ((!options->baseline || baseline) && device_open(&bench->open, common)) {
-        const bool is_certified = options->variants.precisions >> PRECISION_CERTIFIED & 1;
         const char *selector = common->reference_device;
-        if (!is_certified || reference_open(&bench->open.compute, &bench->open.devices, selector) ||
-            !selector)
+        if (!work_groups_are_allowed(bench))
+            status = EXIT_USER;
+        else if (!is_any_certified(&bench->set) ||
+                 reference_open(&bench->open.compute, &bench->open.devices, selector) || !selector)
             status = bench_run(bench, baseline);
         variant_set_close(&bench->set);
         status = device_close(&bench->open, status);
@@ -239,9 +337,11 @@ int command_bench(int argument_count, char **arguments)
     if (!report_options_check(&bench.options.report, &bench_table)) return EXIT_USER;
 
     int status = EXIT_USER;
-    if (variant_set_open(&bench.set, &options->variants, arguments + optind,
-                         (size_t)(argument_count - optind)))
+    if (variants_read(&bench.options) && variant_set_open(&bench.set, &options->variants, arguments + optind,
+                                                          (size_t)(argument_count - optind)))
         status = scenes_bench(&bench, argument_count, arguments);
     variant_set_close(&bench.set);
+    for (size_t i = 0; i < bench.options.variant_count; i++)
+        wordfree(&bench.options.variant_words[i]);
     return status;
 }

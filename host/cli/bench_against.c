@@ -305,9 +305,10 @@ static void against_print_text(const Against *against, const Device *device)
     passports_remark(device, stdout);
     for (size_t i = 0; i < against->set->count; i++) {
         const BenchKey *key = &against->set->rows[i].key;
-        printf("%s, %ux%u, %s, %u lane%s, BVH %s, %u sample%s, %u bounce%s: %zu pair%s\n", key->scene,
+        printf("%s, %ux%u, %s, %u lane%s, BVH %s, %u sample%s, %u bounce%s%s%s: %zu pair%s\n", key->scene,
                key->width, key->height, key->precision, key->lanes, text_plural(key->lanes), key->bvh,
                key->samples, text_plural(key->samples), key->bounces, text_plural(key->bounces),
+               key->variant && key->variant[0] ? ", " : "", key->variant ? key->variant : "",
                against->ratios[i].count, text_plural(against->ratios[i].count));
         comparison_print(&against->comparisons[i], stdout);
     }

@@ -78,6 +78,7 @@ const ResultTable bench_table = {
                 {"BVH", "bvh"},
                 {"samples", "samples"},
                 {"bounces", "bounces"},
+                {"variant", "variant"},
                 {"frame ms", "frame_ms.median"},
                 {"least", "frame_ms.min"},
                 {"most", "frame_ms.max"},
@@ -86,9 +87,11 @@ const ResultTable bench_table = {
                 {"processor ms", "processor_ms"},
                 {"runs", "frame_ms.runs"},
                 {"Mrays/s", "mrays_per_s"},
+                {"build ms", "build_ms.cold"},
+                {"to first", "to_first.ratio"},
                 {"verdict", "comparison.verdict"},
                 {"new over old", "comparison.ratio"}},
-    .name_count = 7,
+    .name_count = 8,
     .verdicts = {"comparison.verdict"},
     .failed = "slower",
     .times = "frame_samples_ms",
@@ -125,12 +128,42 @@ static void launches_print(FILE *stream, const RenderReport *report)
     }
 }
 
+static const double first_tolerance = 1.02;
+
+// Compares the row of a variant with the first row of its scene. Returns false if there is nothing to
+// compare.
+static bool first_compare(const BenchReport *report, size_t i, Comparison *comparison)
+{
+    const BenchRow *row = &report->rows[i], *first = row;
+    while (first > report->rows && first[-1].key.scene == row->key.scene)
+        first--;
+    if (!row->key.variant || first == row || first->failure || row->failure) return false;
+    *comparison =
+        comparison_of_rounds(&row->times.frame, &first->times.frame, report->count, first_tolerance);
+    return true;
+}
+
+static void variant_print(const BenchReport *report, size_t i, FILE *stream)
+{
+    const char *variant = report->rows[i].key.variant;
+    Comparison comparison;
+    if (!variant) return;
+    fprintf(stream, "    %s", variant[0] ? variant : "(no options)");
+    if (first_compare(report, i, &comparison)) {
+        fprintf(stream, ": %.3f", comparison.ratio);
+        if (isfinite(comparison.high)) fprintf(stream, " (%.3f to %.3f)", comparison.low, comparison.high);
+        fputs(" times the first row's frame time", stream);
+    }
+    fputc('\n', stream);
+}
+
 static void row_print(const BenchReport *report, size_t i, FILE *stream)
 {
     const BenchRow *row = &report->rows[i];
     fprintf(stream, "  %-6s %5u  %-4s", row->key.precision, row->key.lanes, row->key.bvh);
     if (row->failure) {
         fprintf(stream, "  not available: %s\n", row->failure);
+        variant_print(report, i, stream);
         return;
     }
     const char *doubt = bench_doubt(&row->times);
@@ -140,6 +173,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     milliseconds_print(stream, 6, row->build_cold);
     milliseconds_print(stream, 5, row->build_cached);
     fprintf(stream, " %7.1f  %016" PRIx64 "\n", bench_rays_per_second(row) / 1e6, row->kernel_hash);
+    variant_print(report, i, stream);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);
     if (report->lists_launches && report->reports[i]) launches_print(stream, report->reports[i]);
@@ -272,6 +306,7 @@ void key_json(Json *json, const BenchKey *key)
     size_json(json, key->width, key->height);
     json_int64(json, "samples", key->samples);
     json_int64(json, "bounces", key->bounces);
+    if (key->variant) json_text(json, "variant", key->variant);
 }
 
 static void results_json(Json *json, const BenchReport *report, size_t i)
@@ -290,6 +325,14 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     json_end(json);
     rays_json(json, row);
     json_bool(json, "traverses_bvh", row->traverses_bvh);
+    Comparison to_first;
+    if (first_compare(report, i, &to_first)) {
+        json_begin_object(json, "to_first");
+        json_number(json, "ratio", to_first.ratio);
+        json_number(json, "low", to_first.low);
+        json_number(json, "high", to_first.high);
+        json_end(json);
+    }
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 

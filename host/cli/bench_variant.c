@@ -2,6 +2,7 @@
 
 #include "host/base/clock.h"
 #include "host/base/memory.h"
+#include "host/opencl/passport.h"
 #include <string.h>
 
 enum { BUILD_TEST_SIDE = 64 };
@@ -76,8 +77,39 @@ static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, 
     return true;
 }
 
-void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing_builds)
+Device variant_device(const Device *device, const Variant *variant)
 {
+    Device own = *device;
+    if (variant->build_options) own.build_options = variant->build_options;
+    for (size_t i = 0; i < 2 && variant->work_group[0] > 0; i++)
+        own.work_group[i] = variant->work_group[i];
+    return own;
+}
+
+// Returns the Compute that the variant renders with. Its passports are those of the build options.
+static Compute *variant_compute(Compute *compute, Variant *variant)
+{
+    variant->compute = compute;
+    if (!variant->build_options && variant->work_group[0] == 0) return compute;
+    variant->own_device = variant_device(compute->device, variant);
+    variant->own_device.passports = device_passports_open();
+    variant->own = *compute;
+    variant->own.device = &variant->own_device;
+    return &variant->own;
+}
+
+// Copies a failure of the variant's Compute to the command's, which owns what both share.
+static void variant_copy_failure(Variant *variant)
+{
+    if (!variant->own.context || !compute_ok(variant->compute)) return;
+    variant->compute->failure = variant->own.failure;
+    if (variant->compute->unmap_failure.call[0] == '\0')
+        variant->compute->unmap_failure = variant->own.unmap_failure;
+}
+
+void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_builds)
+{
+    Compute *compute = variant_compute(shared, variant);
     MessageList messages = {0};
     const RenderSettings *settings = &variant->settings;
     row->key.lanes = device_lanes(compute->device, settings->precision == PRECISION_DOUBLE, settings->lanes);
@@ -92,6 +124,7 @@ void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing
             memory_copy_text(messages.count > 0 ? messages.items[messages.count - 1].text : "unknown");
     }
     message_list_free(&messages);
+    variant_copy_failure(variant);
 }
 
 enum { PAGE_BYTES = 4096 };
@@ -114,7 +147,9 @@ bool variant_run(Variant *variant, BenchTimes *times)
     renderer_report_restart(variant->renderer);
     const RenderReport *report = renderer_report(variant->renderer);
     double end_seconds = 0, processor_start_seconds = clock_processor_seconds();
-    if (!renderer_render(variant->renderer, 0, band_read, &end_seconds)) return false;
+    const bool is_whole = renderer_render(variant->renderer, 0, band_read, &end_seconds);
+    variant_copy_failure(variant);
+    if (!is_whole) return false;
     for (size_t i = 0; times && i < report->launches.count; i++)
         bench_add_launch(times, &report->launches.items[i].time);
     if (times)
@@ -126,5 +161,6 @@ bool variant_run(Variant *variant, BenchTimes *times)
 void variant_close(Variant *variant)
 {
     renderer_close(variant->renderer);
+    if (variant->own.context) device_passports_close(variant->own_device.passports);
     *variant = (Variant){0};
 }

@@ -7,12 +7,22 @@
 typedef struct {
     const Scene *scene;
     RenderSettings settings;
+    // Options of --variant for the driver: NULL and 0 if not given.
+    const char *build_options;
+    uint32_t work_group[2];
+    Compute *compute; // the command's
+    // With such options: copies of the device and of `compute` that have them and share the context and
+    // queue.
+    Device own_device;
+    Compute own;
     Renderer *renderer; // NULL if it is not open or not available on the device
 } Variant;
 
+// Returns a copy of the device with the variant's options for the driver.
+Device variant_device(const Device *device, const Variant *variant);
 // Prepares the runs: counts the rays and, if requested, times the builds. If the device does not support the
 // variant, sets the row's failure.
-void variant_open(Compute *compute, Variant *variant, BenchRow *row, bool timing_builds);
+void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_builds);
 // Runs the variant once and adds its times to `times`, which is NULL for a warm-up. Returns false if the user
 // interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);

@@ -135,12 +135,13 @@ static size_t column_count(const ResultTable *table)
     return count;
 }
 
-// Appends the row's name, which is its first columns with `between` between them.
+// Appends the row's name, which is its first columns, of those that have a value, with `between` between
+// them.
 static void name_append(Text *text, const Row *row, const ResultTable *table, const char *between)
 {
     for (size_t i = 0; i < table->name_count; i++) {
         Text value = column_text(row, &table->columns[i]);
-        text_appendf(text, "%s%s", i > 0 ? between : "", text_c(&value));
+        if (value.count > 0 || i == 0) text_appendf(text, "%s%s", i > 0 ? between : "", text_c(&value));
         text_free(&value);
     }
 }

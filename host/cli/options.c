@@ -349,9 +349,9 @@ static void driver_options_apply(DeviceList *list, const CommonOptions *common)
     }
 }
 
-// Returns whether the device allows its work-group, and prints an error if not. Pixels of a list and rays are
-// launched in one dimension, so the first side must allow all of a group's work-items.
-static bool work_group_is_allowed(const Device *device)
+// Pixels of a list and rays are launched in one dimension, so the first side must allow all of a group's
+// work-items.
+bool work_group_is_allowed(const Device *device)
 {
     const size_t *group = device->work_group, *longest = device->longest_group_sides;
     const size_t items = group[0] * group[1], allowed = device->largest_work_group;

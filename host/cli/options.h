@@ -199,6 +199,8 @@ typedef struct {
 
 // Chooses a device. Returns NULL with a message if there is none. The list must be closed either way.
 const Device *device_find(DeviceList *devices, const char *selector);
+// Returns whether the device allows its work-group, and prints an error if not.
+bool work_group_is_allowed(const Device *device);
 // Chooses a device, opens it and applies --work-group and --build-options. Returns false with a message if no
 // device matches or it does not allow the work-group; there is nothing to close then. device_close reports a
 // device that fails, now or later.

@@ -62,15 +62,21 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
     }
 }
 
-static void variant_add(VariantSet *set, const char *path, uint64_t scene_hash, size_t scene_index,
-                        const RenderSettings *settings)
+static void variant_add(VariantSet *set, const VariantOptions *options, const char *path, uint64_t scene_hash,
+                        size_t scene_index, const RenderSettings *settings)
 {
-    set->variants[set->count] = (Variant){.scene = &set->scenes[scene_index], .settings = *settings};
+    Variant *variant = &set->variants[set->count];
+    *variant = (Variant){.scene = &set->scenes[scene_index], .settings = *settings};
+    if (options->name) {
+        variant->build_options = options->common.build_options;
+        memcpy(variant->work_group, options->common.work_group, sizeof variant->work_group);
+    }
     set->scene_indices[set->count] = scene_index;
     set->rows[set->count++] = (BenchRow){.key = {
                                              .scene = path,
                                              .precision = precision_names[settings->precision],
                                              .bvh = bvh_choice_names[settings->bvh],
+                                             .variant = options->name,
                                              .lanes = settings->lanes,
                                              .width = settings->width,
                                              .height = settings->height,
@@ -123,14 +129,16 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
                     settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
                     settings.bvh = (BvhChoice)bvh;
                     settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
-                    variant_add(set, path, hash, scene_index, &settings);
+                    variant_add(set, options, path, hash, scene_index, &settings);
                 }
 }
 
 bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count)
 {
-    const size_t largest = count * PRECISION_COUNT * LANES_CHOICE_COUNT * BVH_CHOICE_COUNT *
-                           (options->sample_choices > 0 ? options->sample_choices : 1);
+    const VariantOptions *choices = options->variant_count > 0 ? options->variants : options;
+    const size_t choice_count = options->variant_count > 0 ? options->variant_count : 1;
+    const size_t largest =
+        count * choice_count * PRECISION_COUNT * LANES_CHOICE_COUNT * BVH_CHOICE_COUNT * SAMPLE_CHOICES_MAX;
     *set = (VariantSet){
         .scenes = memory_allocate_zeroed(count, sizeof *set->scenes),
         .scene_count = count,
@@ -140,7 +148,8 @@ bool variant_set_open(VariantSet *set, const VariantOptions *options, char *cons
     };
     for (size_t i = 0; i < count; i++) {
         if (!scene_open(&set->scenes[i], paths[i], &options->common)) return false;
-        scene_add_variants(set, options, paths[i], i);
+        for (size_t k = 0; k < choice_count; k++)
+            scene_add_variants(set, &choices[k], paths[i], i);
     }
     set->row_count = set->count;
     return true;

@@ -9,7 +9,7 @@
 
 enum { SAMPLE_CHOICES_MAX = 16 };
 
-typedef struct {
+typedef struct VariantOptions {
     CommonOptions common;
     unsigned precisions, lanes, bvhs; // sets; empty lanes mean the device's default
     uint32_t width, height;           // 0 for the default
@@ -17,6 +17,10 @@ typedef struct {
     size_t sample_choices; // 0 for one sample
     uint32_t bounce_count;
     double seconds; // 0 for the default
+    // The options of each --variant, which replace these, and in them its text; or none.
+    const struct VariantOptions *variants;
+    size_t variant_count;
+    const char *name;
 } VariantOptions;
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else

@@ -12,6 +12,7 @@
 
 typedef struct {
     const char *scene_hash, *precision, *bvh;
+    const char *variant; // "" if the report has none
     uint32_t lanes, width, height, samples, bounces;
     Series frame, processor;
 } BaselineRow;
@@ -68,6 +69,7 @@ static void rows_read(Baseline *baseline, const json_t *runs)
             .scene_hash = text_of(json_object_get(run, "scene_hash")),
             .precision = text_of(json_object_get(run, "precision")),
             .bvh = text_of(json_object_get(run, "bvh")),
+            .variant = text_of(json_object_get(run, "variant")),
             .lanes = count_of(json_object_get(run, "lanes")),
             .width = count_of(json_array_get(size, 0)),
             .height = count_of(json_array_get(size, 1)),
@@ -157,9 +159,9 @@ bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *w
     for (size_t i = 0; i < baseline->count; i++) {
         const BaselineRow *row = &baseline->items[i];
         if (strcmp(row->scene_hash, hash) != 0 || strcmp(row->precision, key->precision) != 0 ||
-            strcmp(row->bvh, key->bvh) != 0 || row->lanes != key->lanes || row->width != key->width ||
-            row->height != key->height || row->samples != key->samples || row->bounces != key->bounces ||
-            row->frame.count == 0)
+            strcmp(row->bvh, key->bvh) != 0 || strcmp(row->variant, key->variant ? key->variant : "") != 0 ||
+            row->lanes != key->lanes || row->width != key->width || row->height != key->height ||
+            row->samples != key->samples || row->bounces != key->bounces || row->frame.count == 0)
             continue;
         *wall = (ReportTimes){&row->frame, &baseline->calibration.wall};
         *processor = (ReportTimes){&row->processor, &baseline->calibration.processor};

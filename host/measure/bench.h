@@ -43,6 +43,7 @@ bool bench_converged(const BenchTimes *times, size_t enough);
 // different reports match by the hash.
 typedef struct {
     const char *scene, *precision, *bvh;
+    const char *variant; // the options of --variant, or NULL
     uint32_t lanes, width, height, samples, bounces;
     uint64_t scene_hash;
 } BenchKey;
