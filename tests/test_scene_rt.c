@@ -194,11 +194,44 @@ static void test_lenient_skips_what_it_does_not_know(void **state)
     text_free(&messages);
 }
 
+// Blanks next to commas, a brightness above 1, checkers and the names of textures.
+static void test_lenient_reads_dialects(void **state)
+{
+    (void)state;
+    const char *const text = "A 0.2 255, 255,255\nC 0 ,0, -5 0,0 , 1 60\nL 1,2,\t3 1.5 255,0,0\n"
+                             "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n";
+    Text messages = scene_messages("s.rt", text, true);
+    assert_string_equal(text_c(&messages), "3:10: warning: 'ratio' is above 1; used unchanged\n"
+                                           "4:31: warning: skipped 'cb:8'\n"
+                                           "5:22: warning: skipped 'earth.xpm'\n");
+    text_free(&messages);
+    Text source = {0};
+    text_appendf(&source, "%s", text);
+    MessageList list = {0};
+    Scene scene;
+    assert_true(scene_read_text(&scene, "s.rt", &source, true, &list));
+    message_list_free(&list);
+    text_free(&source);
+    assert_vector(scene.camera.position, 0, 0, -5);
+    assert_vector(scene.lights.items[0].position, 1, 2, 3);
+    assert_vector(scene.lights.items[0].color, 1.5, 0, 0);
+    assert_vector(scene.objects.items[0].as.sphere.center, 1, 2, 3);
+    assert_number(scene.materials.items[0].specular, 0.5);
+    scene_free(&scene);
+}
+
 static void test_lenient_keeps_other_errors(void **state)
 {
     (void)state;
-    Text messages = scene_messages("s.rt", LIT "sp 0,0,0 -2 255,0,0\n", true);
-    assert_string_equal(text_c(&messages), "3:10: error: 'diameter' must be greater than 0\n");
+    Text messages = scene_messages("s.rt",
+                                   LIT "sp 0,0,0 -2 255,0,0\nsp 0, ,0 2 255,0,0\nsp 0, 0 2 255,0,0\n"
+                                       "L 0,0,0 -1\n",
+                                   true);
+    assert_string_equal(text_c(&messages),
+                        "3:10: error: 'diameter' must be greater than 0\n"
+                        "4:7: error: 'center' must be a number, not nothing\n"
+                        "5:4: error: 'center' must be three numbers with commas between, not '0, 0'\n"
+                        "6:9: error: 'ratio' must be 0 or more\n");
     text_free(&messages);
 }
 
@@ -233,6 +266,7 @@ int main(void)
         cmocka_unit_test(test_color_before_sizes),
         cmocka_unit_test(test_first_of_several_old_cameras),
         cmocka_unit_test(test_lenient_skips_what_it_does_not_know),
+        cmocka_unit_test(test_lenient_reads_dialects),
         cmocka_unit_test(test_lenient_keeps_other_errors),
         cmocka_unit_test(test_many_warnings_are_counted),
     };

@@ -105,10 +105,31 @@ static size_t comma_count(Word word)
     return count;
 }
 
+// Returns whether the next word belongs to this one, because the blank between them is next to a comma.
+static bool word_continues(const Line *line, Word word)
+{
+    const Word next = line_peek(line);
+    return next.length > 0 && (word.text[word.length - 1] == ',' || next.text[0] == ',');
+}
+
+// Extends a word by the words that belong to it.
+static void word_extend(Line *line, Word *word)
+{
+    while (word_continues(line, *word)) {
+        const Word next = line_word(line);
+        word->length = next.offset + next.length - word->offset;
+    }
+}
+
 bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value)
 {
     Word word;
     if (!line_field(line, name, &word)) return false;
+    if (line->joins_blanks)
+        word_extend(line, &word);
+    else if (word_continues(line, word))
+        return report_error(line->report, word.offset, "'%s' has a blank next to a comma: --lenient reads it",
+                            name);
     if (comma_count(word) != 2)
         return report_error(line->report, word.offset,
                             "'%s' must be three numbers with commas between, not '%.*s'", name,
@@ -119,7 +140,12 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3
         size_t end = start;
         while (end < word.length && word.text[end] != ',')
             end++;
-        if (!number_read_field(line->report, word.offset + start, name, word.text + start, end - start, range,
+        size_t length = end - start;
+        for (; length > 0 && is_blank(word.text[start]); length--)
+            start++;
+        while (length > 0 && is_blank(word.text[start + length - 1]))
+            length--;
+        if (!number_read_field(line->report, word.offset + start, name, word.text + start, length, range,
                                &values[i]))
             return false;
         start = end + 1;

@@ -13,6 +13,7 @@ typedef struct {
     Report *report;
     size_t start, at, end; // of the line; read position; its newline or comment
     size_t next;           // start of the next line
+    bool joins_blanks;     // vectors may have blanks next to their commas
 } Line;
 
 // Moves before the first line of the report's source. Reports an error and returns false if it contains a

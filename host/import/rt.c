@@ -43,10 +43,13 @@ static bool read_axis(Line *line, const char *name, Vector3 *axis)
     return !vector_is_zero(*axis);
 }
 
-// Requires the end of the line; with --lenient the rest (such as textures) is skipped.
+// Requires the end of the line. With --lenient the rest, such as textures, is skipped.
 static bool element_end(RtReader *reader)
 {
-    if (!reader->lenient) return line_end(&reader->line);
+    const Word first = line_peek(&reader->line);
+    if (!reader->lenient && first.length > 0)
+        return report_error(&reader->report, first.offset, "unexpected '%.*s': --lenient skips it",
+                            word_shown(first), first.text);
     for (Word word; (word = line_word(&reader->line)).length;)
         report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
     return true;
@@ -75,6 +78,16 @@ static bool read_material(RtReader *reader, Material *material)
     return read_color(&reader->line, &material->color) && read_finish(reader, material);
 }
 
+// Reads the brightness of a light, which is at most 1 unless --lenient is given.
+static bool read_ratio(RtReader *reader, double *ratio)
+{
+    const size_t offset = line_peek(&reader->line).offset;
+    const Range *range = reader->lenient ? &range_not_negative : &range_unit;
+    if (!line_number(&reader->line, "ratio", range, ratio)) return false;
+    if (*ratio > 1) report_warning(&reader->report, offset, "'ratio' is above 1; used unchanged");
+    return true;
+}
+
 static bool read_ambient(RtReader *reader)
 {
     double ratio;
@@ -82,8 +95,7 @@ static bool read_ambient(RtReader *reader)
     if (reader->has_ambient)
         return report_error(&reader->report, reader->line.start, "a second ambient light");
     reader->has_ambient = true;
-    if (!line_number(&reader->line, "ratio", &range_unit, &ratio) || !read_color(&reader->line, &color) ||
-        !element_end(reader))
+    if (!read_ratio(reader, &ratio) || !read_color(&reader->line, &color) || !element_end(reader))
         return false;
     reader->scene->ambient = vector_scale(color, ratio);
     return true;
@@ -133,8 +145,7 @@ static bool read_light(RtReader *reader)
     Line *line = &reader->line;
     Light light = {.kind = LIGHT_POINT, .color = {1, 1, 1}};
     double ratio;
-    if (!line_comma_vector(line, "position", NULL, &light.position) ||
-        !line_number(line, "ratio", &range_unit, &ratio) ||
+    if (!line_comma_vector(line, "position", NULL, &light.position) || !read_ratio(reader, &ratio) ||
         (line_peek(line).length && !read_color(line, &light.color)) || !element_end(reader))
         return false;
     light.color = vector_scale(light.color, ratio);
@@ -292,7 +303,8 @@ static void element_read(RtReader *reader)
         report_warning(&reader->report, name.offset, "skipped unknown element '%.*s'", word_shown(name),
                        name.text);
     else
-        report_error(&reader->report, name.offset, "unknown element '%.*s'", word_shown(name), name.text);
+        report_error(&reader->report, name.offset, "unknown element '%.*s': --lenient skips it",
+                     word_shown(name), name.text);
 }
 
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
@@ -302,6 +314,7 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
         .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
     Places places = places_open(source, NULL);
     if (line_open(&reader.line, &reader.report)) {
+        reader.line.joins_blanks = reader.lenient;
         while (!report_is_full(&reader.report) && line_next(&reader.line, '#')) {
             element_read(&reader);
             places_note(&places, scene, reader.line.start);
