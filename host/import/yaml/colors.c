@@ -58,6 +58,17 @@ static bool name_read(const char *name, uint32_t *rgb)
     return false;
 }
 
+static bool srgb_read(const char *text, uint32_t *rgb)
+{
+    return text[0] == '#' ? hex_read(text + 1, rgb) : name_read(text, rgb);
+}
+
+bool is_color_text(const char *text)
+{
+    uint32_t rgb;
+    return srgb_read(text, &rgb);
+}
+
 static bool not_a_color_report(YamlReader *reader, const Field *field, const YamlNode *node)
 {
     const char *expected = "a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red", *names[NAMED_COUNT];
@@ -114,7 +125,7 @@ static bool color_read(YamlReader *reader, const Field *field, const YamlNode *n
     if (node->kind == YAML_MAPPING) return not_a_color_report(reader, field, node);
     const char *text = yaml_text(&reader->tree, node);
     uint32_t rgb;
-    if (text[0] == '#' ? hex_read(text + 1, &rgb) : name_read(text, &rgb)) {
+    if (srgb_read(text, &rgb)) {
         *color = color_of_srgb(rgb);
         return true;
     }

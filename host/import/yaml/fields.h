@@ -91,6 +91,8 @@ FieldReader read_node, read_number, read_vector, read_direction, read_boolean;
 // numbers that look like values from 0 to 255 are an error: those above 1 of a surface's color, and those
 // above 31 of a strength, such as a light's.
 FieldReader read_color, read_strength;
+// Returns whether a color may be written as the text: a name or "#rrggbb".
+bool is_color_text(const char *text);
 
 // Reads a list of exactly `count` values of `size` bytes, each by `read`; `what` as in "three numbers".
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,

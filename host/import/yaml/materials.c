@@ -302,6 +302,13 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node)
 
 static void unknown_material_report(YamlReader *reader, const YamlNode *node)
 {
+    const char *text = yaml_text(&reader->tree, node);
+    if (is_color_text(text)) {
+        const char *quote = text[0] == '#' ? "'" : "";
+        report_error(&reader->report, node->offset,
+                     "unknown material '%s'; for the color write {color: %s%s%s}", text, quote, text, quote);
+        return;
+    }
     const char *known[NAMES_COMPARED] = {NULL};
     size_t known_count = 0;
     for (; known_count < NAMES_COMPARED && known_count < reader->names.count; known_count++)
