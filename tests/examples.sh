@@ -34,6 +34,23 @@ sed -n '/^```yaml$/,/^```$/p' $guide | sed '/^```/d' >"$scratch/first.yaml"
 printf 'objects:\n  # a comment\n  - sphere: {center: [0, 1, 0], radius: 1, materal: red}\ncamera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n' >"$scratch/bad.yaml"
 
 check "$guide: its scene renders" "$GLINT" render "$scratch/first.yaml" --size 96x54 --quiet -o "$scratch/first.png"
+
+cookbook=docs/cookbook.md
+tools/cookbook "$scratch/cookbook"
+sed -i 's/model\.glb/scenes\/meshes\/bunny.obj/' "$scratch/cookbook/model.yaml" # a user's model
+scenes=$(ls "$scratch/cookbook"/*.yaml)
+check "$cookbook: each heading and the stage have a scene" test "$(echo "$scenes" | wc -l)" -eq "$(grep -c '^## \|^# stage' $cookbook)"
+for scene in $scenes; do
+    name=$(basename "$scene")
+    check "$cookbook: $name is read without a message" diff /dev/null <("$GLINT" check "$scene" 2>&1 >"$scratch/counts")
+    check "$cookbook: $name has objects" grep -q '^  objects  *[1-9]' "$scratch/counts"
+    # each needs kernels that no other test has
+    ! is_long || is_sanitized || check "$cookbook: $name renders" "$GLINT" render "$scene" --size 32x18 --quiet -o "$scene.png"
+done
+check "$cookbook: its last frames render" "$GLINT" render "$scratch/cookbook/turntable.yaml" --frames 46-47 --size 32x18 --quiet \
+    -o "$scratch/cookbook/frame-%02d.png"
+check "$cookbook: frame 47 is written" test -s "$scratch/cookbook/frame-47.png"
+
 exact $guide 'glint trace scenes/article.yaml --rays rays.txt'
 exact $guide 'glint check scenes/article.yaml'
 # it builds sixteen kernels
