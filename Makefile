@@ -328,7 +328,7 @@ installed_files = $(foreach program,$1,docs/$(program).1:$(MANDIR)/man1/$(progra
     tools/completions/glint.zsh:$(ZSHDIR)/_glint \
     tools/completions/glint.fish:$(FISHDIR)/glint.fish \
     $(foreach file,$(wildcard scenes/*.* scenes/*/*),$(file):$(DATADIR)/glint/$(file)) \
-    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE docs/measurements/README.md $(wildcard docs/*.md docs/*.schema.json docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
+    $(foreach file,README.md SECURITY.md CHANGELOG.md LICENSE docs/measurements/README.md $(wildcard docs/*.md docs/ci/* docs/*.schema.json docs/*.png docs/*.gif docs/*.svg),$(file):$(DOCDIR)/$(file)) \
     $(if $(filter glint-view,$1),$(BUILD)/glint-view.desktop:$(DATADIR)/applications/glint-view.desktop \
         tools/desktop/glint-view.svg:$(DATADIR)/icons/hicolor/scalable/apps/glint-view.svg \
         tools/desktop/glint-view.metainfo.xml:$(DATADIR)/metainfo/alt.glint.glint_view.metainfo.xml)
@@ -368,7 +368,7 @@ wheel: $(shared_library)
 uninstall: every := glint glint-view glint-mpi
 uninstall:
 	rm -f $(every:%=$(DESTDIR)$(BINDIR)/%) $(foreach pair,$(call installed_files,$(every)),$(DESTDIR)$(lastword $(subst :, ,$(pair))))
-	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) $(addprefix $(DESTDIR)$(DOCDIR),/docs/measurements /docs /); do \
+	for folder in $(addprefix $(DESTDIR)$(DATADIR)/glint,/scenes/meshes /scenes/images /scenes /) $(addprefix $(DESTDIR)$(DOCDIR),/docs/measurements /docs/ci /docs /); do \
 	    [ ! -d $$folder ] || rmdir --ignore-fail-on-non-empty $$folder || exit; \
 	done
 
