@@ -30,11 +30,11 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
 }
 
 // Returns a capacity of at least `count`. There are few different capacities, so that few kernels are built:
-// most scenes get `usual`, which is doubled for the others. A kernel with every feature built in serves many
-// scenes and gets twice as much from the start.
+// most scenes get `usual`, which is doubled for the others. A kernel with features that its scene does not
+// need serves many scenes and gets twice as much from the start.
 static uint32_t capacity_for(const Renderer *renderer, uint32_t count, uint32_t usual)
 {
-    if (renderer->settings.extra_features == FEATURE_ALL) usual *= 2;
+    if (renderer->settings.extra_features) usual *= 2;
     while (usual < count)
         usual *= 2;
     return usual;
