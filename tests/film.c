@@ -17,10 +17,15 @@ bool tests_are_long(void)
 
 const uint32_t *tested_lanes(const Device *device)
 {
-    static uint32_t few[] = {1, 4, 0};
-    static const uint32_t all[] = {1, 4, 8, 16, 0};
-    if (device_lanes(device, false, 0) > 1) few[1] = device_lanes(device, false, 0);
-    return tests_are_long() ? all : few;
+    static uint32_t lanes[LANES_MAX];
+    const unsigned usual = device_lanes(device, false, 0), few = usual > 1 ? usual : 4;
+    size_t count = 0;
+    for (unsigned requested = 1; requested <= LANES_MAX; requested *= requested == 1 ? 4 : 2) {
+        const bool is_tested = requested == 1 || requested == few || tests_are_long();
+        if (is_tested && device_lanes(device, false, requested) == requested) lanes[count++] = requested;
+    }
+    lanes[count] = 0;
+    return lanes;
 }
 
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision)

@@ -8,7 +8,7 @@
 bool tests_are_long(void);
 
 // Returns the lanes to compare, up to a 0: 1 and the device's default, which most other tests use, or 4 if
-// that is 1; in long tests 1, 4, 8 and 16.
+// that is 1; in long tests those of 1, 4, 8 and 16 that the device runs.
 const uint32_t *tested_lanes(const Device *device);
 
 // Returns settings for the whole image, one sample per pixel, with the defaults of glint render except for

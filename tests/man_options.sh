@@ -68,7 +68,7 @@ offers 'glint render --aov no' normal
 offers 'glint render --timing LICEN' LICENSE
 if command -v fish >/dev/null; then
     offered=$(PATH=$(dirname "$(realpath "$GLINT")"):$PATH fish -c '. tools/completions/glint.fish; complete -C "glint render --la"')
-    [ "$offered" = "--lanes	rays per work-item: 1, 4, 8 or 16 (default: the device's vector width)" ] || {
+    [ "$offered" = "--lanes	rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)" ] || {
         echo "fish offers '$offered'"
         failed=1
     }

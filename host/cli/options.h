@@ -97,8 +97,7 @@ enum {
     "      --device LIST     all, or several: each an index, part of the name, place on the PCI bus, cpu\n"  \
     "                        or gpu, with commas between (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
 #define HELP_LANES                                                                                           \
-    "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default: the device's vectors, a CPU's "     \
-    "limit)\n"
+    "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)\n"
 #define HELP_BOUNCES                                                                                         \
     "      --bounces N       reflections and refractions of a ray: at most N, up to 255 (default: 5)\n"
 #define HELP_MIN_CONTRIBUTION                                                                                \

@@ -321,14 +321,13 @@ bool device_usable(const Device *device, const char **why)
 
 unsigned device_lanes(const Device *device, bool is_double, unsigned requested)
 {
-    const unsigned width = !(device->type & CL_DEVICE_TYPE_CPU) ? 1
-                           : is_double                          ? device->native_double_width
-                                                                : device->native_float_width,
-                   widest = width >= 16  ? 16
-                            : width >= 8 ? 8
-                            : width >= 4 ? 4
-                                         : 1;
-    return requested == 0 || (widest > 1 && requested > widest) ? widest : requested;
+    const bool is_cpu = device->type & CL_DEVICE_TYPE_CPU;
+    const unsigned width = is_double ? device->native_double_width : device->native_float_width;
+    const bool is_limit = requested == 0 || (is_cpu && width > 1);
+    unsigned lanes = requested ? requested : is_cpu ? 16 : 1;
+    while (is_limit && lanes > 1 && lanes > width)
+        lanes = lanes == 4 ? 1 : lanes / 2;
+    return lanes;
 }
 
 const char *device_fp64_hint(const Device *device)

@@ -84,9 +84,9 @@ bool device_usable(const Device *device, const char **why);
 
 // Returns the number of rays per work-item, 1, 4, 8 or 16. If 0 are requested: on a CPU the native vector
 // width of float, or of double where `is_double`, rounded down, elsewhere 1. Otherwise as many as requested,
-// but no more than fit the vectors of a CPU that has them: PoCL 4 and newer put every function whose vectors
-// are wider into one body, which takes minutes to compile, and no scene was faster with two vectors per
-// value.
+// but no more than fit the vectors of a CPU that has them. PoCL 4 and newer inline every function whose
+// vectors are wider: kernels took minutes to compile, and in one version had wrong hits. No scene was faster
+// with two vectors per value.
 unsigned device_lanes(const Device *device, bool is_double, unsigned requested);
 
 // Returns what may give the device 64-bit floating point, to be appended to a message that it has none,
