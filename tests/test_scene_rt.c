@@ -137,7 +137,7 @@ static void test_axes_are_made_unit(void **state)
 {
     (void)state;
     assert_messages("s.rt", LIT "pl 0,0,0 0,0.5,0 255,0,0\n",
-                    "3:10: warning: 'normal' is not of unit length: made so\n");
+                    "3:10: warning: 'normal' is not a unit vector; normalized\n");
     assert_messages("s.rt", LIT "pl 0,0,0 0.577,0.577,0.577 255,0,0\n", "");
     Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,0.5,0 1 4 255,0,0\n");
     assert_vector(scene.objects.items[0].as.cylinder.from, 0, -2, 0);
@@ -199,11 +199,13 @@ static void test_lenient_reads_dialects(void **state)
 {
     (void)state;
     const char *const text = "A 0.2 255, 255,255\nC 0 ,0, -5 0,0 , 1 60\nL 1,2,\t3 1.5 255,0,0\n"
-                             "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n";
+                             "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n"
+                             "cy 0,0,0 0,1,0 255 , 0 , 0 1 2\n";
     Text messages = scene_messages("s.rt", text, true);
     assert_string_equal(text_c(&messages), "3:10: warning: 'ratio' is above 1; used unchanged\n"
                                            "4:31: warning: skipped 'cb:8'\n"
-                                           "5:22: warning: skipped 'earth.xpm'\n");
+                                           "5:22: warning: skipped 'earth.xpm'\n"
+                                           "6:16: warning: the color stands before the sizes\n");
     text_free(&messages);
     Text source = {0};
     text_appendf(&source, "%s", text);
@@ -243,7 +245,7 @@ static void test_many_warnings_are_counted(void **state)
     for (int i = 0; i < 30; i++)
         text_appendf(&text, "pl 0,0,0 0,0.5,0 255,0,0\n");
     Text messages = scene_messages("s.rt", text_c(&text), false);
-    assert_non_null(strstr(text_c(&messages), "22:10: warning: 'normal' is not of unit length: made so\n"
+    assert_non_null(strstr(text_c(&messages), "22:10: warning: 'normal' is not a unit vector; normalized\n"
                                               "warning: s.rt: 10 more warnings\n"));
     text_free(&messages);
     text_free(&text);

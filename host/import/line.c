@@ -121,15 +121,24 @@ static void word_extend(Line *line, Word *word)
     }
 }
 
+Word line_peek_vector(const Line *line)
+{
+    Line copy = *line;
+    Word word = line_word(&copy);
+    if (word.length > 0 && line->joins_blanks) word_extend(&copy, &word);
+    return word;
+}
+
 bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value)
 {
     Word word;
     if (!line_field(line, name, &word)) return false;
-    if (line->joins_blanks)
-        word_extend(line, &word);
-    else if (word_continues(line, word))
-        return report_error(line->report, word.offset, "'%s' has a blank next to a comma: --lenient reads it",
-                            name);
+    const bool has_blanks = word_continues(line, word);
+    word_extend(line, &word);
+    if (has_blanks && !line->joins_blanks && comma_count(word) == 2)
+        return report_error(line->report, word.offset,
+                            "'%s' has blanks next to commas, '%.*s'; --lenient reads them", name,
+                            word_shown(word), word.text);
     if (comma_count(word) != 2)
         return report_error(line->report, word.offset,
                             "'%s' must be three numbers with commas between, not '%.*s'", name,

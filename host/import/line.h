@@ -26,6 +26,7 @@ bool line_next(Line *line, char comment);
 // Returns the next word, empty at the end of the line. Words are separated by spaces, tabs and carriage
 // returns.
 Word line_peek(const Line *line);
+Word line_peek_vector(const Line *line); // as line_comma_vector reads it
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
 bool words_equal(Word a, Word b);

@@ -30,7 +30,7 @@ static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
     size_t offset = line_peek(line).offset;
     if (!line_comma_vector(line, name, &range_axis, axis)) return false;
     if (!vector_is_zero(*axis) && fabs(vector_length(*axis) - 1) > tolerated)
-        report_warning(line->report, offset, "'%s' is not of unit length: made so", name);
+        report_warning(line->report, offset, "'%s' is not a unit vector; normalized", name);
     *axis = vector_normalize(*axis);
     return true;
 }
@@ -48,7 +48,7 @@ static bool element_end(RtReader *reader)
 {
     const Word first = line_peek(&reader->line);
     if (!reader->lenient && first.length > 0)
-        return report_error(&reader->report, first.offset, "unexpected '%.*s': --lenient skips it",
+        return report_error(&reader->report, first.offset, "unexpected '%.*s'; --lenient skips it",
                             word_shown(first), first.text);
     for (Word word; (word = line_word(&reader->line)).length;)
         report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
@@ -203,7 +203,7 @@ static bool read_cylinder(RtReader *reader)
     Vector3 center, axis;
     double diameter, height;
     if (!line_comma_vector(line, "center", NULL, &center) || !read_axis(line, "axis", &axis)) return false;
-    Word third = line_peek(line);
+    const Word third = line_peek_vector(line);
     bool color_first = word_has_comma(third);
     if (color_first) {
         report_warning(&reader->report, third.offset, "the color stands before the sizes");
@@ -303,7 +303,7 @@ static void element_read(RtReader *reader)
         report_warning(&reader->report, name.offset, "skipped unknown element '%.*s'", word_shown(name),
                        name.text);
     else
-        report_error(&reader->report, name.offset, "unknown element '%.*s': --lenient skips it",
+        report_error(&reader->report, name.offset, "unknown element '%.*s'; --lenient skips it",
                      word_shown(name), name.text);
 }
 
