@@ -271,7 +271,7 @@ typedef struct {
     uint64_t repeated, undecided;
 } Answer;
 
-// Each takes separate kernels, so scenes share them; the injected errors also depend on the operands.
+// Each seed needs separate kernels, so scenes share a few seeds. The errors also depend on the operands.
 enum { PERTURB_SEEDS = 7 };
 
 // The same kernels for all scenes of a family, with the BVH and without it.
@@ -453,7 +453,8 @@ static void hard_cases_are_decided(void **state)
 
 enum { SMALL_SIDE = 15 }; // odd: the image has a pixel in its center
 
-// Returns settings of a small image at certified, for which one program serves all scenes.
+// Returns settings of a small image at certified, with the same features for all, so that one program serves
+// them.
 static RenderSettings small_settings(uint32_t bounce_count)
 {
     RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);

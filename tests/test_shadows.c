@@ -75,7 +75,7 @@ static void darkens_an_eclipse_in_meters(void **state)
     (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_CYLINDERS | FEATURE_CONES |                  \
      FEATURE_TRIANGLES | FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS)
 
-// Compares the image with the reference, except for pixels at an edge. At single, so the colors of an image
+// Compares the image with the reference, except for pixels at an edge. At `single`, also compares an image
 // with injected errors.
 static void compare_with_reference(const Scene *scene, RenderSettings settings, double error,
                                    const char *what)

@@ -99,12 +99,12 @@ ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
     const ReferenceHit hit = hit_from(object, ray);
     if (!hit.found || quad_absolute(hit.t) * quad3_length(ray->direction) <= 1024 * hit.curvature_radius)
         return hit;
-    // Roots lose the square of how many times farther than large the shape is, so they are searched again
-    // from the hit.
+    // The relative error of the roots grows with the square of the distance over the radius, so a distant hit
+    // is computed again with itself as the ray's origin.
     const ReferenceRay nearby = {reference_point(ray, hit.t), ray->direction, ray->tmin - hit.t,
                                  ray->tmax - hit.t};
     ReferenceHit again = hit_from(object, &nearby);
-    again.t += hit.t;
+    if (again.found) again.t += hit.t;
     return again;
 }
 

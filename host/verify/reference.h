@@ -40,7 +40,8 @@ Object reference_round_object(const Object *object);
 // An object relative to an eye, which is subtracted in double.
 Object reference_object_from(const Object *object, Vector3 eye);
 
-// The nearest hit of one object (`object` of the hit is 0).
+// The nearest hit of one object (`object` of the hit is 0). Misses of round shapes farther away than 2^40
+// radii are decided by roots that have cancelled, and are not reliable.
 ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray);
 // Takes the hit of an object if it is the nearest so far, and its margin in any case; equal distances go to
 // the object taken first. Begins with the hit of no object, reference_miss.

@@ -171,8 +171,9 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         real room = lanes_select(difference > zero, one - wanted, one + wanted);
         real tilt = divide_or(difference, room, zero);
         tilted_slope = h - quadratic->h;
-        // not height - rho + n . x, whose roundings of rho would exceed the height above a planet
-        real tilted_rho = fabs(tilt) * point.rho * (real)(1 + 32 * UNIT_ROUNDOFF);
+        // Not height - rho + n . x: at a planet's radius the rounding of rho exceeds the height. `along_unit`
+        // is off by 17 u rho, rho by 9 u, the sum and the quotient add up to 15 u.
+        real tilted_rho = fabs(tilt) * point.rho * (real)(1 + 64 * UNIT_ROUNDOFF);
         tilted = height + divide_or(real_fma(tilt, along_unit, -tilted_rho), one + fabs(tilt), zero);
         slope = real_fma(part, q_length, -quadratic->h);
     }
