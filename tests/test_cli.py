@@ -1,6 +1,8 @@
 #!/usr/bin/env -S python3 -B
 """The command line as a user meets it: every option, every message about a wrong one, the exit status, what is printed
-where, and that a failure leaves an earlier image as it was."""
+where, and that a failure leaves an earlier image as it was.
+
+run_tests: sanitized"""
 import glob
 import itertools
 import math

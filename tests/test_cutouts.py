@@ -1,6 +1,8 @@
 #!/usr/bin/env -S python3 -B
 """Cutouts: rays pass where the alpha of an image is low, for camera rays, shadows, mirrors and explicit rays, as if the holes
-were cut into the shape; and what formats of meshes make of alpha."""
+were cut into the shape; and what formats of meshes make of alpha.
+
+run_tests: sanitize-long-only"""
 import math
 import struct
 import zlib

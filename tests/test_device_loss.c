@@ -1,5 +1,6 @@
 // Two devices render one image, and one or both fail, at each call of the first band in turn. The image is
 // whole if one device is left, and the failure is reported.
+// run_tests: sanitized
 #include "tests/failing/calls.h"
 #include "tests/failing/work.h"
 #include <pthread.h>

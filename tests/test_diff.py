@@ -1,5 +1,7 @@
 #!/usr/bin/env -S python3 -B
-"""glint diff: exit status, what it refuses, its report as text and JSON, its heat map."""
+"""glint diff: exit status, what it refuses, its report as text and JSON, its heat map.
+
+run_tests: sanitized"""
 import struct
 
 from glint import ROOT, SPHERE, TestCase, main, write

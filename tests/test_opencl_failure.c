@@ -1,6 +1,7 @@
 // Every OpenCL call of a render and a trace fails once: glint reports that call, releases everything, and the
 // next render on the same device is right.
 // run_tests: first
+// run_tests: sanitized
 #include "host/base/memory.h"
 #include "tests/failing/calls.h"
 #include "tests/failing/work.h"

@@ -3,7 +3,8 @@
 specification permits. Here with --quick at single, and a few at the other precisions. GLINT_LONG_TESTS=1 runs all in full at
 every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few.
 
-run_tests: first"""
+run_tests: first
+run_tests: sanitize-long-only"""
 import json
 import re
 import unittest
