@@ -11,6 +11,7 @@ import os
 import re
 import shlex
 import subprocess
+import sys
 import tarfile
 import tempfile
 import urllib.request
@@ -98,7 +99,10 @@ class Recipes(TestCase):
 
         def shell(command, **variables):
             environment = {**os.environ, **variables, "PATH": f"{bin_folder.name}:{os.environ['PATH']}"}
-            return subprocess.run(["sh", "-e", "-c", command], env=environment, capture_output=True).returncode
+            process = subprocess.run(["sh", "-e", "-c", command], env=environment, capture_output=True, text=True)
+            if process.returncode != 0:
+                print(f"{command}: {process.stderr}", file=sys.stderr)
+            return process.returncode
 
         return shell
 
