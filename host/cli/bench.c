@@ -6,12 +6,12 @@
 #include "host/cli/commands.h"
 #include "host/cli/variants.h"
 #include "host/measure/baseline.h"
+#include <ctype.h>
 #include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
-#include <wordexp.h>
 
 enum {
     OPTION_COMPARE = OPTION_BEYOND_VARIANTS,
@@ -79,9 +79,9 @@ typedef struct {
     const char *baseline, *against;
     ReportOptions report;
     bool launches, is_worker;
-    // Each --variant's text, its words and the options that they set.
+    // Each --variant's text, the memory of its words and the options that they set.
     const char *variant_texts[VARIANTS_MAX];
-    wordexp_t variant_words[VARIANTS_MAX];
+    char *variant_words[VARIANTS_MAX];
     VariantOptions variant_options[VARIANTS_MAX];
     size_t variant_count;
 } BenchOptions;
@@ -127,36 +127,58 @@ static bool option_take(BenchOptions *options, int option, const char *value)
     }
 }
 
-// Reads a variant's options from its text, which is split into words as a shell does.
+// Splits a text in place at its blanks outside of quotes, and removes the quotes, ' or ". Adds each word to
+// `words`. Returns false if a quote is not closed.
+static bool words_split(char *text, char **words, int *count)
+{
+    char quote = '\0', *end = text; // of the words so far
+    bool is_within = false;
+    for (const char *at = text; *at != '\0'; at++) {
+        const bool is_blank = !quote && isspace((unsigned char)*at);
+        if (!is_blank && !is_within) words[(*count)++] = end;
+        if (is_blank && is_within) *end++ = '\0';
+        is_within = !is_blank;
+        if (is_blank) continue;
+        if (*at == quote)
+            quote = '\0';
+        else if (!quote && (*at == '\'' || *at == '"'))
+            quote = *at;
+        else
+            *end++ = *at;
+    }
+    *end = '\0';
+    return !quote;
+}
+
+// Reads a variant's options from its words, of which the first heads getopt's messages.
+static bool words_read(VariantOptions *variant, char **words, int count)
+{
+    optind = 0; // restarts getopt
+    for (int option; (option = getopt_long(count, words, "", variant_long_options, NULL)) != -1;) {
+        bool is_valid = option != '?';
+        if (is_valid) variant_option(variant, option, optarg, &is_valid);
+        if (!is_valid) return false;
+    }
+    if (optind < count) fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", words[optind]);
+    return optind == count;
+}
+
 static bool variant_read(BenchOptions *options, size_t index)
 {
+    static char name[] = "glint bench --variant";
     const char *text = options->variant_texts[index];
     VariantOptions *variant = &options->variant_options[index];
-    wordexp_t *words = &options->variant_words[index];
     *variant = options->variants;
     variant->name = text;
-    words->we_offs = 1; // for the name that heads getopt's messages
-    if (wordexp(text, words, WRDE_DOOFFS | WRDE_NOCMD | WRDE_UNDEF) != 0) {
-        *words = (wordexp_t){0};
-        fprintf(stderr, "glint: --variant: cannot split \"%s\" into words; quote special characters\n", text);
-        return false;
-    }
-    static char name[] = "glint bench --variant";
-    words->we_wordv[0] = name;
-    const int count = (int)words->we_wordc + 1;
-    optind = 0; // restarts getopt
-    bool is_valid = true;
-    for (int option;
-         is_valid && (option = getopt_long(count, words->we_wordv, "", variant_long_options, NULL)) != -1;)
-        if (option == '?')
-            is_valid = false;
-        else
-            variant_option(variant, option, optarg, &is_valid);
-    if (is_valid && optind < count) {
-        fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", words->we_wordv[optind]);
-        is_valid = false;
-    }
+    options->variant_words[index] = memory_copy_text(text);
+    char **words = memory_allocate_zeroed(strlen(text) / 2 + 3, sizeof *words);
+    words[0] = name;
+    int count = 1;
+    const bool is_split = words_split(options->variant_words[index], words, &count);
+    if (!is_split) fputs("glint: --variant: a quote is not closed\n", stderr);
+    const bool is_valid = is_split && words_read(variant, words, count);
     if (!is_valid) fprintf(stderr, "glint: the error is in --variant \"%s\"\n", text);
+    free(words);
     return is_valid;
 }
 
@@ -342,6 +364,6 @@ int command_bench(int argument_count, char **arguments)
         status = scenes_bench(&bench, argument_count, arguments);
     variant_set_close(&bench.set);
     for (size_t i = 0; i < bench.options.variant_count; i++)
-        wordfree(&bench.options.variant_words[i]);
+        free(bench.options.variant_words[i]);
     return status;
 }
