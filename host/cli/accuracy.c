@@ -390,7 +390,7 @@ int command_accuracy(int argument_count, char **arguments)
     const AccuracyOptions *options = &accuracy.options;
     const size_t scene_count = (size_t)(argument_count - optind);
     status = EXIT_USER;
-    bool opened = variant_set_open(&accuracy.set, &options->variants, arguments + optind, scene_count) &&
+    bool opened = variant_set_open(&accuracy.set, &options->variants, 1, arguments + optind, scene_count) &&
                   (!options->reference_path || reference_read(&accuracy)) &&
                   device_open(&accuracy.open, &options->variants.common);
     if (opened) status = accuracy_run(&accuracy);

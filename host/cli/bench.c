@@ -188,8 +188,6 @@ static bool variants_read(BenchOptions *options)
     const int first_scene = optind;
     for (size_t i = 0; i < options->variant_count; i++)
         if (!variant_read(options, i)) return false;
-    options->variants.variants = options->variant_options;
-    options->variants.variant_count = options->variant_count;
     optind = first_scene;
     return true;
 }
@@ -359,8 +357,12 @@ int command_bench(int argument_count, char **arguments)
     if (!report_options_check(&bench.options.report, &bench_table)) return EXIT_USER;
 
     int status = EXIT_USER;
-    if (variants_read(&bench.options) && variant_set_open(&bench.set, &options->variants, arguments + optind,
-                                                          (size_t)(argument_count - optind)))
+    const VariantOptions *choices =
+        options->variant_count > 0 ? options->variant_options : &options->variants;
+    const size_t choice_count = options->variant_count > 0 ? options->variant_count : 1;
+    if (variants_read(&bench.options) &&
+        variant_set_open(&bench.set, choices, choice_count, arguments + optind,
+                         (size_t)(argument_count - optind)))
         status = scenes_bench(&bench, argument_count, arguments);
     variant_set_close(&bench.set);
     for (size_t i = 0; i < bench.options.variant_count; i++)

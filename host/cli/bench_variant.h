@@ -6,6 +6,7 @@
 
 typedef struct {
     const Scene *scene;
+    size_t choice; // the number of its --variant, from 0
     RenderSettings settings;
     // Options of --variant for the driver: NULL and 0 if not given.
     const char *build_options;

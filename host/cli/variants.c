@@ -62,11 +62,11 @@ bool variant_option(VariantOptions *options, int option, const char *value, bool
     }
 }
 
-static void variant_add(VariantSet *set, const VariantOptions *options, const char *path, uint64_t scene_hash,
-                        size_t scene_index, const RenderSettings *settings)
+static void variant_add(VariantSet *set, const VariantOptions *options, size_t choice, const char *path,
+                        uint64_t scene_hash, size_t scene_index, const RenderSettings *settings)
 {
     Variant *variant = &set->variants[set->count];
-    *variant = (Variant){.scene = &set->scenes[scene_index], .settings = *settings};
+    *variant = (Variant){.scene = &set->scenes[scene_index], .choice = choice, .settings = *settings};
     if (options->name) {
         variant->build_options = options->common.build_options;
         memcpy(variant->work_group, options->common.work_group, sizeof variant->work_group);
@@ -107,9 +107,10 @@ static uint64_t scene_files_hash(const Scene *scene)
     return hash;
 }
 
-static void scene_add_variants(VariantSet *set, const VariantOptions *options, const char *path,
-                               size_t scene_index)
+static void scene_add_variants(VariantSet *set, const VariantOptions *choices, size_t choice,
+                               const char *path, size_t scene_index)
 {
+    const VariantOptions *options = &choices[choice];
     uint32_t width = options->width, height = options->height;
     scene_choose_image_size(&set->scenes[scene_index], &width, &height);
     RenderSettings settings = settings_whole(&options->common, width, height);
@@ -129,14 +130,13 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *options, c
                     settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
                     settings.bvh = (BvhChoice)bvh;
                     settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
-                    variant_add(set, options, path, hash, scene_index, &settings);
+                    variant_add(set, options, choice, path, hash, scene_index, &settings);
                 }
 }
 
-bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count)
+bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t choice_count, char *const *paths,
+                      size_t count)
 {
-    const VariantOptions *choices = options->variant_count > 0 ? options->variants : options;
-    const size_t choice_count = options->variant_count > 0 ? options->variant_count : 1;
     const size_t largest =
         count * choice_count * PRECISION_COUNT * LANES_CHOICE_COUNT * BVH_CHOICE_COUNT * SAMPLE_CHOICES_MAX;
     *set = (VariantSet){
@@ -147,9 +147,9 @@ bool variant_set_open(VariantSet *set, const VariantOptions *options, char *cons
         .scene_indices = memory_allocate_zeroed(largest, sizeof *set->scene_indices),
     };
     for (size_t i = 0; i < count; i++) {
-        if (!scene_open(&set->scenes[i], paths[i], &options->common)) return false;
+        if (!scene_open(&set->scenes[i], paths[i], &choices[0].common)) return false;
         for (size_t k = 0; k < choice_count; k++)
-            scene_add_variants(set, &choices[k], paths[i], i);
+            scene_add_variants(set, choices, k, paths[i], i);
     }
     set->row_count = set->count;
     return true;

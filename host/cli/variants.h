@@ -9,18 +9,15 @@
 
 enum { SAMPLE_CHOICES_MAX = 16 };
 
-typedef struct VariantOptions {
+typedef struct {
     CommonOptions common;
     unsigned precisions, lanes, bvhs; // sets; empty lanes mean the device's default
     uint32_t width, height;           // 0 for the default
     uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0 for one sample
     uint32_t bounce_count;
-    double seconds; // 0 for the default
-    // The options of each --variant, which replace these, and in them its text; or none.
-    const struct VariantOptions *variants;
-    size_t variant_count;
-    const char *name;
+    double seconds;   // 0 for the default
+    const char *name; // the text of --variant, or NULL
 } VariantOptions;
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
@@ -69,13 +66,15 @@ typedef struct {
     Calibration calibration;       // runs before each round of a benchmark
 } VariantSet;
 
-// Reads the scenes. Returns false with a message if one cannot be read; the set must still be closed.
-bool variant_set_open(VariantSet *set, const VariantOptions *options, char *const *paths, size_t count);
+// Reads the scenes. The choices are the options of each --variant, or those of a command without any. Returns
+// false with a message if a scene cannot be read; the set must still be closed.
+bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t choice_count, char *const *paths,
+                      size_t count);
 // Returns the variants of one scene as a set that shares them, for variant_set_measure. It must not be
 // closed.
 VariantSet variant_set_part(const VariantSet *set, size_t first, size_t count);
-// Opens each variant and warms it up. `progress` may be NULL. Returns false if the user interrupted or the
-// device failed.
+// Opens each variant and warms it up. `progress` may be NULL. Returns false if the user interrupted
+// or the device failed.
 bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress);
 // Runs every variant once. Returns false if the user interrupted or the device failed.
 bool variant_set_round(VariantSet *set, bool warm_up);
