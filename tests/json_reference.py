@@ -291,7 +291,7 @@ MEANINGS = {
     "calibration.rounds": "count; iterations of that workload",
     "calibration.{samples_ms,processor_samples_ms}": "number; its wall time, and that of all processors together",
     "runs[].variant": "text; the options of `--variant`; only with that",
-    "runs[].to_first": "object; frame time over that of the scene's first row, of the rounds that both ran; only with `--variant`",
+    "runs[].to_first": "figure; frame time over that of the first variant's row, of the rounds that both ran; only with `--variant`, from its second on",
     "runs[].to_first.ratio": "number; estimated",
     "runs[].to_first.{low,high}": "number or null; of its confidence interval; null: too few repeats",
     "scene_hash": "hash; of the contents of the scene's files; rows of reports match by it",

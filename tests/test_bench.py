@@ -4,7 +4,10 @@ asked of the times themselves.
 
 run_tests: sanitize-long-only"""
 import json
+import math
 import os
+import re
+import statistics
 
 from glint import IS_LONG, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, run, write
 
@@ -159,7 +162,7 @@ for line in worker.stdout:
         self.assertNotEqual(rows[0]["scene_hash"], changed[0]["scene_hash"])
 
     def test_variants(self):
-        """Each variant has its rows, with its options; the later ones are compared with the first, round by round."""
+        """Each variant has its rows, with its options; those of later ones are compared with the first's, round by round."""
         variants = "", "--work-group 4x2", "--build-options '-DUNUSED=1 -DOTHER=2'", "--samples 1,2 --bounces 0"
         options = " ".join(f'--variant "{variant}"' for variant in variants)
         command = f"bench sphere.yaml --size 32x24 --seconds 0.4 --lanes 1 {options}"
@@ -180,11 +183,29 @@ for line in worker.stdout:
             self.assertTrue(min(ratios) <= run["to_first"]["ratio"] <= max(ratios), run["to_first"])
         out = self.glint(command).stdout
         self.assertRegex(out, r"(?m)^    \(no options\)$")
-        self.assertRegex(out, r"(?m)^    --work-group 4x2: [0-9.]+( \([0-9.]+ to [0-9.]+\))? times the first row's frame time$")
+        self.assertRegex(out, r"(?m)^    --work-group 4x2: [0-9.]+( \([0-9.]+ to [0-9.]+\))? times the first variant's frame time$")
+        self.assertEqual(re.findall(r"(?m)^ +rays: ([0-9]+) camera", out), ["768", "1536"], "where they differ")
         names = {entry["name"] for entry in self.json(f"{command} --format benchmark")["benchmarks"]}
         self.assertEqual(names, {f"sphere.yaml/32x24/single/1/auto/{end}" for end in
                                  ("1/5", *(f"1/5/{variant}" for variant in variants[1:3]),
                                   f"1/0/{variants[3]}", f"2/0/{variants[3]}")})
+
+    def ratio(self, run, other):
+        """The ratio of frame times that glint estimates: the median of the medians of up to 20 blocks of rounds."""
+        logs = [math.log(mine / its) for mine, its in zip(run["frame_samples_ms"], other["frame_samples_ms"])]
+        count = min(len(logs), 20)
+        blocks = (logs[i * len(logs) // count:(i + 1) * len(logs) // count] for i in range(count))
+        return math.exp(statistics.median(map(statistics.median, blocks)))
+
+    def test_row_of_the_first_variant(self):
+        """A row is compared with that of the same precision."""
+        runs = self.json("bench sphere.yaml --size 32x24 --seconds 0.4 --lanes 1 --precision single,strict --json "
+                         "--variant '--samples 1' --variant '--samples 2'")["runs"]
+        self.assertEqual([(run["precision"], run["samples"]) for run in runs],
+                         [(precision, samples) for samples in (1, 2) for precision in ("single", "strict")])
+        self.assertEqual(["to_first" in run for run in runs], [False, False, True, True])
+        for first, run in zip(runs[:2], runs[2:]):
+            self.assertAlmostEqual(run["to_first"]["ratio"] / self.ratio(run, first), 1, delta=1e-6)
 
     def test_variants_against_an_earlier_report(self):
         """Rows of variants that have other options for the driver are other rows."""

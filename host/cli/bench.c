@@ -61,12 +61,15 @@ static const char help_text[] =
     "      --worker          answer another glint's --against\n"
     "      --launches        list the kernel launches of each row's last run\n"
     "      --variant OPTIONS\n"
-    "                        rows with these options, such as \"--lanes 8 --work-group 8x8\", compared with "
-    "the "
-    "first row;\n"
+    "                        rows with these options, such as \"--lanes 8 --work-group 8x8\", split at "
+    "blanks "
+    "outside of quotes;\n"
     "                        any of --precision, --lanes, --bvh, --samples, --bounces, --work-group and "
     "--build-options;\n"
-    "                        may be repeated\n"
+    "                        may be repeated; each row is compared with that of the first variant, of the "
+    "same "
+    "precision,\n"
+    "                        lanes, BVH and samples unless the variants differ in these\n"
     "      --precision LIST  of single, strict, double, certified (default: single)\n"
     "      --samples LIST    per pixel, one row each (default: 1)\n" //
     HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_KEEP_KERNELS HELP_FORMAT HELP_HELP;
@@ -240,24 +243,17 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
 {
     const BenchOptions *options = &bench->options;
     const VariantSet *set = &bench->set;
-    const RenderReport **reports = memory_allocate_zeroed(set->count, sizeof *reports);
-    for (size_t i = 0; i < set->count; i++)
-        if (set->variants[i].renderer) reports[i] = renderer_report(set->variants[i].renderer);
     RowComparison *comparisons = baseline ? rows_compare(bench, baseline) : NULL;
     const Device *device = bench->open.compute.device;
     BenchReport report = {
         .device = device,
-        .rows = set->rows,
-        .reports = reports,
-        .count = set->count,
+        .set = set,
         .lists_launches = options->launches,
-        .calibration = &set->calibration,
         .comparisons = comparisons,
     };
     if (report_has_text(&options->report)) bench_print_text(&report, stdout);
     const bool is_written = options->report.format == FORMAT_TEXT ||
                             report_write(bench_json(&report), &bench_table, &options->report);
-    free(reports);
     int status = is_written ? EXIT_DONE : EXIT_USER;
     if (!variant_set_any_measured(set)) {
         fputs("glint bench: no row could be measured\n", stderr);

@@ -128,38 +128,55 @@ static void launches_print(FILE *stream, const RenderReport *report)
     }
 }
 
-static const double first_tolerance = 1.02;
+// Returns the report of a row's last run, or NULL if the row was not measured.
+static const RenderReport *run_report(const BenchReport *report, size_t i)
+{
+    const Renderer *renderer = report->set->variants[i].renderer;
+    return renderer ? renderer_report(renderer) : NULL;
+}
 
-// Compares the row of a variant with the first row of its scene. Returns false if there is nothing to
-// compare.
+// Returns whether a measured row is compared with one of the first --variant, if that was measured.
+static bool has_first(const BenchReport *report, size_t i)
+{
+    return report->set->variants[i].choice > 0 && !report->set->rows[i].failure;
+}
+
+static const char first_unavailable[] = "the first variant's row is not available";
+
+// Compares a row with that of the first variant. Returns false if that is not available.
 static bool first_compare(const BenchReport *report, size_t i, Comparison *comparison)
 {
-    const BenchRow *row = &report->rows[i], *first = row;
-    while (first > report->rows && first[-1].key.scene == row->key.scene)
-        first--;
-    if (!row->key.variant || first == row || first->failure || row->failure) return false;
-    *comparison =
-        comparison_of_rounds(&row->times.frame, &first->times.frame, report->count, first_tolerance);
-    return true;
+    const BenchRow *row = &report->set->rows[i],
+                   *first = &report->set->rows[variant_set_first(report->set, i)];
+    const double tolerance = 1; // for a verdict, which is not reported
+    if (!first->failure)
+        *comparison =
+            comparison_of_rounds(&row->times.frame, &first->times.frame, report->set->count, tolerance);
+    return !first->failure;
 }
 
 static void variant_print(const BenchReport *report, size_t i, FILE *stream)
 {
-    const char *variant = report->rows[i].key.variant;
+    const char *variant = report->set->rows[i].key.variant;
     Comparison comparison;
     if (!variant) return;
     fprintf(stream, "    %s", variant[0] ? variant : "(no options)");
-    if (first_compare(report, i, &comparison)) {
-        fprintf(stream, ": %.3f", comparison.ratio);
-        if (isfinite(comparison.high)) fprintf(stream, " (%.3f to %.3f)", comparison.low, comparison.high);
-        fputs(" times the first row's frame time", stream);
+    if (has_first(report, i)) {
+        if (first_compare(report, i, &comparison)) {
+            fprintf(stream, ": %.3f", comparison.ratio);
+            if (isfinite(comparison.high))
+                fprintf(stream, " (%.3f to %.3f)", comparison.low, comparison.high);
+            fputs(" times the first variant's frame time", stream);
+        } else {
+            fprintf(stream, ": not compared, because %s", first_unavailable);
+        }
     }
     fputc('\n', stream);
 }
 
 static void row_print(const BenchReport *report, size_t i, FILE *stream)
 {
-    const BenchRow *row = &report->rows[i];
+    const BenchRow *row = &report->set->rows[i];
     fprintf(stream, "  %-6s %5u  %-4s", row->key.precision, row->key.lanes, row->key.bvh);
     if (row->failure) {
         fprintf(stream, "  not available: %s\n", row->failure);
@@ -176,15 +193,15 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     variant_print(report, i, stream);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);
-    if (report->lists_launches && report->reports[i]) launches_print(stream, report->reports[i]);
+    if (report->lists_launches) launches_print(stream, run_report(report, i));
 }
 
 // Prints the reasons for missing figures, each once.
 static void reasons_print(const BenchReport *report, FILE *stream)
 {
     const char *printed[2] = {NULL};
-    for (size_t i = 0; i < report->count; i++) {
-        const BenchRow *row = &report->rows[i];
+    for (size_t i = 0; i < report->set->count; i++) {
+        const BenchRow *row = &report->set->rows[i];
         if (row->failure) continue;
         const char *reasons[2] = {row->build_cold.why_not, row->build_cached.why_not};
         for (size_t k = 0; k < 2; k++) {
@@ -194,11 +211,11 @@ static void reasons_print(const BenchReport *report, FILE *stream)
     }
 }
 
-static void rays_print(const BenchRow *row, FILE *stream)
+static void rays_print(const uint64_t *rays, const char *indent, FILE *stream)
 {
-    fprintf(stream, "  rays:");
+    fprintf(stream, "%srays:", indent);
     for (int kind = 0; kind < RAYS_COUNT; kind++)
-        fprintf(stream, "%s %" PRIu64 " %s", kind ? "," : "", row->rays[kind],
+        fprintf(stream, "%s %" PRIu64 " %s", kind ? "," : "", rays[kind],
                 kind == RAYS_CAMERA_HITS ? "of them hit" : bench_ray_names[kind]);
     fputc('\n', stream);
 }
@@ -212,15 +229,20 @@ void bench_print_text(const BenchReport *report, FILE *stream)
 {
     device_print(report, stream);
     const char *scene = "";
-    for (size_t i = 0; i < report->count; i++) {
-        const BenchKey *key = &report->rows[i].key;
-        if (strcmp(scene, key->scene) != 0) {
-            scene = key->scene;
-            fprintf(stream, "\n%s, %ux%u\n", scene, key->width, key->height);
-            if (!report->rows[i].failure) rays_print(&report->rows[i], stream);
+    const uint64_t *rays = NULL; // those last printed of the scene
+    for (size_t i = 0; i < report->set->count; i++) {
+        const BenchRow *row = &report->set->rows[i];
+        if (strcmp(scene, row->key.scene) != 0) {
+            scene = row->key.scene;
+            fprintf(stream, "\n%s, %ux%u\n", scene, row->key.width, row->key.height);
+            rays = row->failure ? NULL : row->rays;
+            if (rays) rays_print(rays, "  ", stream);
             fputs(table_head, stream);
         }
         row_print(report, i, stream);
+        if (row->failure || (rays && memcmp(rays, row->rays, sizeof row->rays) == 0)) continue;
+        rays = row->rays;
+        rays_print(rays, "    ", stream);
     }
     reasons_print(report, stream);
 }
@@ -309,11 +331,25 @@ void key_json(Json *json, const BenchKey *key)
     if (key->variant) json_text(json, "variant", key->variant);
 }
 
+static void first_json(Json *json, const BenchReport *report, size_t i)
+{
+    Comparison to_first;
+    json_begin_object(json, "to_first");
+    if (first_compare(report, i, &to_first)) {
+        json_number(json, "ratio", to_first.ratio);
+        json_number(json, "low", to_first.low);
+        json_number(json, "high", to_first.high);
+    } else {
+        unavailable_json(json, first_unavailable);
+    }
+    json_end(json);
+}
+
 static void results_json(Json *json, const BenchReport *report, size_t i)
 {
-    const BenchRow *row = &report->rows[i];
+    const BenchRow *row = &report->set->rows[i];
     hash_json(json, "kernel_hash", row->kernel_hash);
-    build_options_json(json, report->reports[i]);
+    build_options_json(json, run_report(report, i));
     times_json(json, row);
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);
@@ -325,14 +361,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     json_end(json);
     rays_json(json, row);
     json_bool(json, "traverses_bvh", row->traverses_bvh);
-    Comparison to_first;
-    if (first_compare(report, i, &to_first)) {
-        json_begin_object(json, "to_first");
-        json_number(json, "ratio", to_first.ratio);
-        json_number(json, "low", to_first.low);
-        json_number(json, "high", to_first.high);
-        json_end(json);
-    }
+    if (has_first(report, i)) first_json(json, report, i);
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 
@@ -345,19 +374,19 @@ Json *bench_json(const BenchReport *report)
     json_end(json);
     json_begin_object(json, "calibration");
     json_int64(json, "rounds", CALIBRATION_ROUNDS);
-    samples_json(json, "samples_ms", &report->calibration->wall);
-    samples_json(json, "processor_samples_ms", &report->calibration->processor);
+    samples_json(json, "samples_ms", &report->set->calibration.wall);
+    samples_json(json, "processor_samples_ms", &report->set->calibration.processor);
     json_end(json);
     json_begin_array(json, "runs");
-    for (size_t i = 0; i < report->count; i++) {
-        const BenchRow *row = &report->rows[i];
+    for (size_t i = 0; i < report->set->count; i++) {
+        const BenchRow *row = &report->set->rows[i];
         json_begin_object(json, NULL);
         key_json(json, &row->key);
         if (row->failure)
             unavailable_json(json, row->failure);
         else
             results_json(json, report, i);
-        if (report->lists_launches && report->reports[i]) launches_json(json, report->reports[i]);
+        if (report->lists_launches && run_report(report, i)) launches_json(json, run_report(report, i));
         json_end(json);
     }
     json_end(json);

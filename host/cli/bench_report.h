@@ -2,11 +2,10 @@
 #pragma once
 
 #include "host/cli/format.h"
+#include "host/cli/variants.h"
 #include "host/measure/bench.h"
-#include "host/measure/calibration.h"
 #include "host/measure/comparison.h"
 #include "host/opencl/device.h"
-#include "host/render/renderer.h"
 
 // The comparison of a row, or the reason why there is none.
 typedef struct {
@@ -19,11 +18,8 @@ typedef struct {
 
 typedef struct {
     const Device *device;
-    const BenchRow *rows;
-    const RenderReport *const *reports; // those of each row's last run; NULL for rows that were not measured
-    size_t count;
+    const VariantSet *set;
     bool lists_launches;
-    const Calibration *calibration;
     const RowComparison *comparisons; // of the rows with the baseline, or NULL
 } BenchReport;
 

@@ -85,6 +85,9 @@ extern const double variants_opened_fraction, variants_measured_fraction; // of 
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
 bool variant_set_any_measured(const VariantSet *set);
+// Returns the row with which a variant is compared: the row of the same scene and the first --variant that
+// has most of precision, lanes, BVH and samples in common, the earliest of several.
+size_t variant_set_first(const VariantSet *set, size_t row);
 // Returns the share that is done if rows are opened, measured and compared one set after another: all rows
 // before those of the set, and the fraction of the set's rows.
 double variant_set_fraction(const VariantSet *set, double fraction_done);
