@@ -9,7 +9,7 @@ import os
 import re
 import statistics
 
-from glint import IS_LONG, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, run, write
+from glint import IS_LONG, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, read, run, write
 
 LANES = "" if IS_LONG else "--lanes 1"  # kernels of few lanes build faster, and each process builds some without a cache
 QUICK = f"--size 32x24 --seconds 0.1 {LANES}"
@@ -206,6 +206,27 @@ for line in worker.stdout:
         self.assertEqual(["to_first" in run for run in runs], [False, False, True, True])
         for first, run in zip(runs[:2], runs[2:]):
             self.assertAlmostEqual(run["to_first"]["ratio"] / self.ratio(run, first), 1, delta=1e-6)
+
+    def test_clamped_lanes(self):
+        """Lanes beyond the device's vectors that would repeat a row are not measured."""
+        device = next(device for device in self.json("devices --json")["devices"] if device["default"])
+        if device["type"] != "cpu" or device["native_double_width"] not in (4, 8):
+            self.skipTest("the device does not have vectors of 4 or 8 doubles")
+        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --precision double --lanes 8,16"
+        out = self.glint(f"{command} --variant '--samples 1' --variant '--lanes 16 --samples 2' --format json --output report.json").stdout
+        runs = json.loads(read("report.json"))["runs"]
+        keys = [(row["lanes"], row["variant"]) for row in runs]
+        self.assertEqual(len(set(keys)), len(keys), keys)
+        lanes = device["native_double_width"]
+        self.assertEqual(runs[0]["lanes"], lanes)
+        reason = f"16 lanes exceed the device's vectors, and the row of {lanes} lanes is the same"
+        self.assertEqual((runs[1]["lanes"], runs[1]["status"], runs[1]["reason"]), (16, "unavailable", reason))
+        self.assertEqual(runs[2]["lanes"], lanes)
+        self.assertEqual(runs[2]["to_first"], {"status": "unavailable", "reason": "the first variant's row is not available"})
+        self.assertIn(f"not available: {reason}\n", out)
+        self.assertIn("--lanes 16 --samples 2: not compared, because the first variant's row is not available\n", out)
+        process = self.glint(f"{command} --against {PROGRAM}", 4)
+        self.assertRegex(process.stdout, f", 16 lanes, .*: 0 pairs\n    {reason}\n")
 
     def test_variants_against_an_earlier_report(self):
         """Rows of variants that have other options for the driver are other rows."""

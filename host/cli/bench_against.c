@@ -201,7 +201,8 @@ static bool pair_measure(Against *against, Worker *workers, size_t pair)
             size_t which = (turn + other_is_first(pair + round)) % 2;
             whole = worker_run(&workers[which], seconds, row_count) && !progress_interrupted();
             for (size_t i = 0; i < row_count && whole; i++) {
-                if (seconds[i] == 0) against->comparisons[i].why_not = not_available;
+                if (seconds[i] == 0 && !against->comparisons[i].why_not)
+                    against->comparisons[i].why_not = not_available;
                 series_add(&times[2 * i + which], seconds[i]);
                 series_add(&against->frames[which][i], seconds[i]);
             }
@@ -330,9 +331,9 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
                    memory_allocate_zeroed(set->count, sizeof *against.ratios)},
         .comparisons = memory_allocate_zeroed(set->count, sizeof *against.comparisons),
     };
+    variant_set_fit_lanes(set, device);
     for (size_t i = 0; i < set->count; i++)
-        set->rows[i].key.lanes = device_lanes(device, set->variants[i].settings.precision == PRECISION_DOUBLE,
-                                              set->rows[i].key.lanes);
+        against.comparisons[i].why_not = set->rows[i].failure;
     Progress progress;
     progress_open(&progress, !report_has_text(&options->report));
     int status = pairs_run(&against, &progress);

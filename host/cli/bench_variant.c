@@ -112,7 +112,6 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
     Compute *compute = variant_compute(shared, variant);
     MessageList messages = {0};
     const RenderSettings *settings = &variant->settings;
-    row->key.lanes = device_lanes(compute->device, settings->precision == PRECISION_DOUBLE, settings->lanes);
     if ((!timing_builds || builds_measure(compute, variant, row, &messages)) &&
         rays_count(compute, variant, row, &messages))
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);

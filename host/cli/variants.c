@@ -3,6 +3,7 @@
 #include "host/base/clock.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -185,10 +186,36 @@ bool variant_set_round(VariantSet *set, bool warm_up)
     return true;
 }
 
-bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress)
+// Returns whether a variant renders as a later one of the same scene and --variant does with these lanes.
+static bool renders_as(const BenchRow *row, const Variant *variant, const Variant *later, uint32_t lanes)
+{
+    const RenderSettings *one = &variant->settings, *other = &later->settings;
+    return row->key.lanes == lanes && variant->scene == later->scene && variant->choice == later->choice &&
+           one->precision == other->precision && one->bvh == other->bvh &&
+           one->sample_count == other->sample_count;
+}
+
+void variant_set_fit_lanes(VariantSet *set, const Device *device)
 {
     for (size_t i = 0; i < set->count; i++) {
+        const RenderSettings *settings = &set->variants[i].settings;
+        BenchRow *row = &set->rows[i];
+        const uint32_t lanes = device_lanes(device, settings->precision == PRECISION_DOUBLE, settings->lanes);
+        for (size_t k = 0; k < i && lanes < settings->lanes && !row->failure; k++)
+            if (renders_as(&set->rows[k], &set->variants[k], &set->variants[i], lanes))
+                row->failure =
+                    text_format("%u lanes exceed the device's vectors, and the row of %u lanes is the same",
+                                settings->lanes, lanes);
+        if (!row->failure) row->key.lanes = lanes;
+    }
+}
+
+bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress)
+{
+    variant_set_fit_lanes(set, compute->device);
+    for (size_t i = 0; i < set->count; i++) {
         if (progress_interrupted()) return false;
+        if (set->rows[i].failure) continue;
         const double done = variants_opened_fraction * (double)i / (double)set->count;
         if (progress)
             progress_step(progress, variant_set_fraction(set, done), "building row %zu of %zu",

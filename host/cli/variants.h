@@ -73,7 +73,10 @@ bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t cho
 // Returns the variants of one scene as a set that shares them, for variant_set_measure. It must not be
 // closed.
 VariantSet variant_set_part(const VariantSet *set, size_t first, size_t count);
-// Opens each variant and warms it up. `progress` may be NULL. Returns false if the user interrupted
+// Sets the rows' lanes to those that the device renders with. If fewer lanes than requested make a row equal
+// to an earlier one, the row keeps the requested lanes and is not available.
+void variant_set_fit_lanes(VariantSet *set, const Device *device);
+// Opens each available variant and warms it up. `progress` may be NULL. Returns false if the user interrupted
 // or the device failed.
 bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress);
 // Runs every variant once. Returns false if the user interrupted or the device failed.
