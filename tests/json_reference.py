@@ -79,7 +79,7 @@ ELSEWHERE = {
     "glint devices": (),
     "glint diff": (),
     "glint bench": ("glint", *(f"device.{name}" for name in ("name", "board", "pci", "uuid", "platform", "driver", "type", "units", "clock_mhz", "passports")),
-                    "runs[].launches[]."),
+                    "runs[].launches[].", "runs[].passports[]."),
     "glint bench --against": ("glint", "date", "host", "build", "device", *(f"runs[].{name}" for name in (
         "scene", "variant", "precision", "lanes", "bvh", "size", "samples", "bounces", "comparison", "frame_ms", "frame_samples_ms"))),
     "glint accuracy": ("glint", "device", *(f"scenes[].variants[].{name}" for name in (
@@ -293,6 +293,7 @@ MEANINGS = {
     "runs[].variant": "text; the options of `--variant`; only with that",
     "runs[].to_first": "figure; frame time over that of the first variant's row, of the rounds that both ran; only with `--variant`, from its second on",
     "runs[].to_first.ratio": "number; estimated",
+    "runs[].passports[]": "object; of the row's build options, as `device.passports[]`; only with these in `--variant`",
     "runs[].to_first.{low,high}": "number or null; of its confidence interval; null: too few repeats",
     "scene_hash": "hash; of the contents of the scene's files; rows of reports match by it",
     "{frame_samples_ms,kernel_samples_ms,processor_samples_ms}": "number; of every run, in order",

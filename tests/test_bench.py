@@ -228,6 +228,16 @@ for line in worker.stdout:
         process = self.glint(f"{command} --against {PROGRAM}", 4)
         self.assertRegex(process.stdout, f", 16 lanes, .*: 0 pairs\n    {reason}\n")
 
+    def test_passports_of_variants(self):
+        """Rows with work-groups have the device's passports, and those with build options have separate ones."""
+        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --lanes 1 --json"
+        report = self.json(f"{command} --variant '--work-group 4x2' --variant '--work-group 2x2'")
+        self.assertTrue(report["device"]["passports"])
+        self.assertEqual(["passports" in run for run in report["runs"]], [False, False])
+        report = self.json(f"{command} --variant '--build-options -DUNUSED=1'")
+        self.assertFalse(report["device"]["passports"])
+        self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
+
     def test_variants_against_an_earlier_report(self):
         """Rows of variants that have other options for the driver are other rows."""
         command = "bench sphere.yaml --size 32x24 --seconds 0.1 --lanes 1 --tolerance 1e6 --json"

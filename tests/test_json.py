@@ -162,7 +162,8 @@ class Json(TestCase):
         self.check_members("glint bench", self.json(
             f"bench plain.yaml {SMALL} {QUICK} --samples 2,3 --json --compare bench.json", status=4),
             json.loads(bench.stdout),
-            self.json(f"bench plain.yaml {SMALL} --samples 2 {QUICK} --json --variant '' --variant '--work-group 4x4'"), *strong)
+            self.json(f"bench plain.yaml {SMALL} --samples 2 {QUICK} --json --variant '' --variant '--work-group 4x4'"),
+            self.json(f"bench plain.yaml {SMALL} --samples 2 {QUICK} --json --variant '--build-options -DUNUSED=1'"), *strong)
         self.check_members("glint bench --against", self.json(
             f"bench plain.yaml {SMALL} {QUICK} --json --against {PROGRAM}", status=4))
 

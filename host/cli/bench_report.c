@@ -193,7 +193,9 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     variant_print(report, i, stream);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);
-    if (report->lists_launches) launches_print(stream, run_report(report, i));
+    const RenderReport *last = run_report(report, i);
+    if (last->device->passports != report->device->passports) passports_remark(last->device, stream);
+    if (report->lists_launches) launches_print(stream, last);
 }
 
 // Prints the reasons for missing figures, each once.
@@ -362,6 +364,8 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     rays_json(json, row);
     json_bool(json, "traverses_bvh", row->traverses_bvh);
     if (has_first(report, i)) first_json(json, report, i);
+    const Device *device = run_report(report, i)->device;
+    if (device->passports != report->device->passports) passports_json(json, device);
     if (report->comparisons) comparison_json(json, &report->comparisons[i]);
 }
 

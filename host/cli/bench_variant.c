@@ -86,13 +86,13 @@ Device variant_device(const Device *device, const Variant *variant)
     return own;
 }
 
-// Returns the Compute that the variant renders with. Its passports are those of the build options.
+// Returns the Compute that the variant renders with.
 static Compute *variant_compute(Compute *compute, Variant *variant)
 {
     variant->compute = compute;
     if (!variant->build_options && variant->work_group[0] == 0) return compute;
     variant->own_device = variant_device(compute->device, variant);
-    variant->own_device.passports = device_passports_open();
+    if (variant->build_options) variant->own_device.passports = device_passports_open();
     variant->own = *compute;
     variant->own.device = &variant->own_device;
     return &variant->own;
@@ -160,6 +160,6 @@ bool variant_run(Variant *variant, BenchTimes *times)
 void variant_close(Variant *variant)
 {
     renderer_close(variant->renderer);
-    if (variant->own.context) device_passports_close(variant->own_device.passports);
+    if (variant->own.context && variant->build_options) device_passports_close(variant->own_device.passports);
     *variant = (Variant){0};
 }

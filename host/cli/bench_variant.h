@@ -13,7 +13,7 @@ typedef struct {
     uint32_t work_group[2];
     Compute *compute; // the command's
     // With such options: copies of the device and of `compute` that have them and share the context and
-    // queue.
+    // queue. Build options also have separate passports.
     Device own_device;
     Compute own;
     Renderer *renderer; // NULL if it is not open or not available on the device
