@@ -8,12 +8,25 @@ import math
 import os
 import re
 import statistics
+import unittest
 
-from glint import IS_LONG, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, read, run, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, read, run, shim_build, write
 
 LANES = "" if IS_LONG else "--lanes 1"  # kernels of few lanes build faster, and each process builds some without a cache
 QUICK = f"--size 32x24 --seconds 0.1 {LANES}"
 TRIANGLES = f"{ROOT}/scenes/triangles.yaml"
+# Launches fail from the one of number FAILING on.
+FAILING = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void *f, unsigned g, void *h, void *i)
+{
+    static int count;
+    if (count++ >= atoi(getenv("FAILING"))) return -5;
+    return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
+}
+"""
 
 
 class Bench(TestCase):
@@ -237,6 +250,16 @@ for line in worker.stdout:
         report = self.json(f"{command} --variant '--build-options -DUNUSED=1'")
         self.assertFalse(report["device"]["passports"])
         self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
+
+    @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
+    def test_failing_variant(self):
+        """The call of a variant with options for the driver is named, as it is opened and in its many runs."""
+        failing = shim_build("failing.so", FAILING)
+        for count in 0, 60:
+            process = self.glint("bench sphere.yaml --size 32x24 --seconds 60 --lanes 1 --variant '--work-group 4x2'", 2,
+                                 env={"LD_PRELOAD": failing, "FAILING": str(count)})
+            self.assertRegex(process.stderr, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
+            self.assertEqual(process.stdout, "")
 
     def test_variants_against_an_earlier_report(self):
         """Rows of variants that have other options for the driver are other rows."""
