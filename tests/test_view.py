@@ -582,7 +582,7 @@ class View(TestCase):
         self.assertEqual(window.process.wait(DEADLINE), 130)
 
     def test_faults(self):
-        environment = {"DISPLAY": "", "WAYLAND_DISPLAY": "", "SDL_VIDEODRIVER": ""}
+        environment = {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
         self.refuses("view scene.yaml", "no display", env=environment)
         self.refuses("view", "no scene")
         write("bad.yaml", "camera: 5\n")

@@ -210,11 +210,19 @@ static void window_close(Window *window)
     SDL_Quit();
 }
 
-// Without a display SDL takes a driver that shows nothing.
+static bool is_set(const char *variable)
+{
+    const char *value = getenv(variable);
+    return value && value[0];
+}
+
+// Without a display SDL 2 takes a driver that shows nothing, and SDL 3 takes none.
 static bool display_exists(void)
 {
-    const char *driver = SDL_GetCurrentVideoDriver(), *wanted = getenv("SDL_VIDEODRIVER");
-    return (wanted && wanted[0]) || (strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0);
+    const char *driver = SDL_GetCurrentVideoDriver();
+    if (is_set("SDL_VIDEODRIVER")) return true;
+    if (!driver) return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
+    return strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0;
 }
 
 // Returns the scale of text: the pixels of a point of the window; where that has one, as X11's, more on a
@@ -255,13 +263,15 @@ static bool window_open(Window *window)
 
 WindowEnd window_run(const WindowOptions *options)
 {
-    if (SDL_Init(SDL_INIT_VIDEO) != 0) return window_fault("no window can be opened");
+    const bool has_video = SDL_Init(SDL_INIT_VIDEO) == 0;
     Window window = {.options = options, .redraws = true, .pivot_at = {-1, -1}};
     WindowEnd end = WINDOW_ABSENT;
     if (!display_exists()) {
         fputs("glint: no window can be opened: there is no display; is DISPLAY or WAYLAND_DISPLAY set?\n",
               stderr);
         SDL_Quit();
+    } else if (!has_video) {
+        window_fault("no window can be opened");
     } else if (!window_open(&window)) {
         window_fault("no window can be opened");
         window_close(&window);
