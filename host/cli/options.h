@@ -105,7 +105,7 @@ enum {
     "                        trace no reflected or refracted ray whose weight in its pixel is below W,\n"    \
     "                        from 0 to 1 (default: 0, trace all)\n"
 #define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
-#define HELP_LENIENT  "      --lenient         read dialects of .rt files, with warnings\n"
+#define HELP_LENIENT  "      --lenient         read dialects of .rt files\n"
 #define HELP_SET                                                                                             \
     "      --set PATH=VALUE  set a value of YAML scenes, such as camera.fov=60; may be repeated\n"
 #define HELP_MAX_PIXELS "      --max-pixels N    of an image that is read (default: 134217728)\n"

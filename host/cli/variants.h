@@ -42,7 +42,7 @@ enum {
 
 // The help of these options except --precision, whose default differs.
 #define HELP_VARIANTS                                                                                        \
-    "      --lanes LIST      of 1, 4, 8, 16, (default and CPU maximum: vector width)\n"                      \
+    "      --lanes LIST      of 1, 4, 8, 16 (default and CPU maximum: vector width)\n"                       \
     "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
     "      --size WxH        image size (default: as glint render)\n"                                        \
     "      --seconds MAX     time limit of the measurement, converged or not (default: 5 per "               \

@@ -20,7 +20,7 @@ static const struct {
     {"S2", "sphere seen from up to 10,000 radii away", {verify_far_fringe}},
     {"S3", "tiny sphere", {0}},
     {"S4", "ground sphere, from a millionth of its radius above", {verify_ground_horizon}},
-    {"S5", "rays an ulp beside a sphere's tangent", {0}},
+    {"S5", "rays an ulp from a sphere's tangent", {0}},
     {"S6", "inside a sphere, and leaving it", {verify_scaled_directions, verify_leaving_spheres}},
     {"S7", "spheres up to 2^60 times as large as their distance", {verify_sizes}},
     {"P1", "plane up to the horizon", {verify_plane_horizon}},
