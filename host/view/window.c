@@ -270,9 +270,7 @@ WindowEnd window_run(const WindowOptions *options)
         fputs("glint: no window can be opened: there is no display; is DISPLAY or WAYLAND_DISPLAY set?\n",
               stderr);
         SDL_Quit();
-    } else if (!has_video) {
-        window_fault("no window can be opened");
-    } else if (!window_open(&window)) {
+    } else if (!has_video || !window_open(&window)) {
         window_fault("no window can be opened");
         window_close(&window);
     } else {
