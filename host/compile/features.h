@@ -7,14 +7,18 @@
 #include "kernels/features.h"
 #include <stdint.h>
 
-typedef uint32_t FeatureSet;
-
 #define FEATURE_BIT_INDEX(name, ...) FEATURE_INDEX_##name,
 enum { FEATURE_LIST(FEATURE_BIT_INDEX) FEATURE_COUNT };
 #undef FEATURE_BIT_INDEX
-#define FEATURE_BIT(name, ...) FEATURE_##name = 1u << FEATURE_INDEX_##name,
-enum { FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (1u << FEATURE_COUNT) - 1 };
+
+// An extension, since the constants of ISO C's enumerations are int.
+#define FEATURE_BIT(name, ...) FEATURE_##name = UINT64_C(1) << FEATURE_INDEX_##name,
+__extension__ typedef enum {
+    FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (UINT64_C(1) << FEATURE_COUNT) - 1
+} FeatureBits;
 #undef FEATURE_BIT
+
+typedef uint64_t FeatureSet;
 
 extern const char *const feature_names[FEATURE_COUNT]; // "SPHERES", …
 
