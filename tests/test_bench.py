@@ -281,6 +281,7 @@ for line in worker.stdout:
             ("sphere.yaml --variant '--device 0'", "glint bench --variant: unrecognized option '--device'"),
             ("sphere.yaml --variant 'sphere.yaml'", '--variant: expected options, not "sphere.yaml"'),
             ("sphere.yaml --variant '~'", '--variant: expected options, not "~"'),
+            ("sphere.yaml --variant '--lanes 1' --variant '--lanes 1'", '--variant "--lanes 1" is given twice'),
             ("sphere.yaml --variant '--lanes \"1'", "--variant: a quote is not closed"),
             ("sphere.yaml --variant '--work-group 60000x2'", "--work-group: 60000x2 has 120000 work-items"),
         ):

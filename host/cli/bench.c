@@ -185,8 +185,14 @@ static bool variant_read(BenchOptions *options, size_t index)
 static bool variants_read(BenchOptions *options)
 {
     const int first_scene = optind;
-    for (size_t i = 0; i < options->variant_count; i++)
+    for (size_t i = 0; i < options->variant_count; i++) {
+        for (size_t k = 0; k < i; k++)
+            if (strcmp(options->variant_texts[i], options->variant_texts[k]) == 0) {
+                fprintf(stderr, "glint: --variant \"%s\" is given twice\n", options->variant_texts[i]);
+                return false;
+            }
         if (!variant_read(options, i)) return false;
+    }
     optind = first_scene;
     return true;
 }

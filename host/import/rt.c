@@ -14,7 +14,8 @@ typedef struct {
     bool has_element, has_ambient, has_camera, has_size;
 } RtReader;
 
-static const Range range_axis = {-1, 1, false, "from -1 to 1"};
+static const Range range_axis = {-1, 1, false, "from -1 to 1"},
+                   range_ratio = {0, 1, false, "from 0 to 1; with --lenient 0 or more"};
 
 static bool read_color(Line *line, Color *color)
 {
@@ -82,7 +83,7 @@ static bool read_material(RtReader *reader, Material *material)
 static bool read_ratio(RtReader *reader, double *ratio)
 {
     const size_t offset = line_peek(&reader->line).offset;
-    const Range *range = reader->lenient ? &range_not_negative : &range_unit;
+    const Range *range = reader->lenient ? &range_not_negative : &range_ratio;
     if (!line_number(&reader->line, "ratio", range, ratio)) return false;
     if (*ratio > 1) report_warning(&reader->report, offset, "'ratio' is above 1; used unchanged");
     return true;
