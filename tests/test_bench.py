@@ -14,6 +14,7 @@ from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, main, 
 
 LANES = "" if IS_LONG else "--lanes 1"  # kernels of few lanes build faster, and each process builds some without a cache
 QUICK = f"--size 32x24 --seconds 0.1 {LANES}"
+TINY = "--size 32x24 --lanes 1 --no-build-times"
 TRIANGLES = f"{ROOT}/scenes/triangles.yaml"
 # Launches fail from the one of number FAILING on.
 FAILING = """
@@ -90,6 +91,12 @@ class Bench(TestCase):
             counts = [run["rays"]["camera_hits"] for run in runs if run["scene"] == scene]
             self.assertLessEqual(max(counts) - min(counts), 2)
 
+    def test_no_build_times(self):
+        process = self.glint(f"bench sphere.yaml {TINY} --seconds 0.1 --output report.json")
+        untimed = {"status": "unavailable", "reason": "builds were not timed"}
+        self.assertEqual(json.loads(read("report.json"))["runs"][0]["build_ms"], {"cold": untimed, "cached": untimed})
+        self.assertEqual(process.stdout.count("builds were not timed"), 1)
+
     def decided(self, command, status=0):
         """The command with as much time as it takes until the samples are enough for an interval."""
         for seconds in (0.5, 2, 8):
@@ -101,7 +108,7 @@ class Bench(TestCase):
 
     def test_comparison(self):
         """A busy machine may take many times as long, but not a million times; the speed of the calibration goes along."""
-        report = self.json(f"bench sphere.yaml {QUICK} --json")
+        report = self.json(f"bench sphere.yaml {QUICK} --no-build-times --json")
         run, calibration = report["runs"][0], report["calibration"]
         for times in (run["frame_samples_ms"], run["processor_samples_ms"], calibration["samples_ms"],
                       calibration["processor_samples_ms"]):
@@ -115,7 +122,7 @@ class Bench(TestCase):
         write("less-work", json.dumps(report))
         calibration["rounds"] //= 2
         write("other-calibration", json.dumps(report))
-        command = f"bench sphere.yaml {QUICK} --compare"
+        command = f"bench sphere.yaml {QUICK} --no-build-times --compare"
         self.assertRegex(self.decided(f"{command} report --tolerance 1e6").stdout, r"(?m)frame time: [0-9.]+ \(.*\): same within")
         process = self.decided(f"{command} faster --json", status=3)
         comparison = json.loads(process.stdout)["runs"][0]["comparison"]
@@ -142,7 +149,7 @@ for line in worker.stdout:
     print(*(1e-6 * float(word) for word in line.split()), flush=True)
 """)
         os.chmod("other", 0o755)
-        command = "bench sphere.yaml --size 32x24 --samples 1,2 --against"
+        command = "bench sphere.yaml --size 32x24 --no-build-times --samples 1,2 --against"
         report = self.json(f"{command} ./other --json", status=3)
         self.assertEqual([run["samples"] for run in report["runs"]], [1, 2])
         for run in report["runs"]:
@@ -167,7 +174,7 @@ for line in worker.stdout:
         """That of a scene from a pipe is that of its bytes, which are gone once they are read."""
         os.symlink("/dev/stdin", "pipe.yaml")
         write("other.yaml", SPHERE + "# other\n")
-        tiny = f"--size 8x8 --seconds 0.01 {LANES} --json"
+        tiny = f"--size 8x8 --seconds 0.01 {LANES} --no-build-times --json"
         rows = self.json(f"bench sphere.yaml pipe.yaml other.yaml {tiny}", input=SPHERE)["runs"]
         self.assertEqual(rows[0]["scene_hash"], rows[1]["scene_hash"])
         self.assertNotEqual(rows[0]["scene_hash"], rows[2]["scene_hash"])
@@ -198,7 +205,7 @@ for line in worker.stdout:
         self.assertRegex(out, r"(?m)^    \(no options\)$")
         self.assertRegex(out, r"(?m)^    --work-group 4x2: [0-9.]+( \([0-9.]+ to [0-9.]+\))? times the first variant's frame time$")
         self.assertEqual(re.findall(r"(?m)^ +rays: ([0-9]+) camera", out), ["768", "1536"], "where they differ")
-        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --lanes 1 --variant '' --variant '--bounces 0'"
+        command = f"bench sphere.yaml {TINY} --seconds 0.1 --variant '' --variant '--bounces 0'"
         names = {entry["name"] for entry in self.json(f"{command} --format benchmark")["benchmarks"]}
         self.assertEqual(names, {f"sphere.yaml/32x24/single/1/auto/1/{end}" for end in ("5", "0/--bounces 0")})
 
@@ -211,7 +218,7 @@ for line in worker.stdout:
 
     def test_row_of_the_first_variant(self):
         """A row is compared with that of the same precision."""
-        runs = self.json("bench sphere.yaml --size 32x24 --seconds 0.4 --lanes 1 --precision single,strict --json "
+        runs = self.json(f"bench sphere.yaml {TINY} --seconds 0.4 --precision single,strict --json "
                          "--variant '--samples 1' --variant '--samples 2'")["runs"]
         self.assertEqual([(run["precision"], run["samples"]) for run in runs],
                          [(precision, samples) for samples in (1, 2) for precision in ("single", "strict")])
@@ -224,7 +231,7 @@ for line in worker.stdout:
         device = next(device for device in self.json("devices --json")["devices"] if device["default"])
         if device["type"] != "cpu" or device["native_double_width"] not in (4, 8):
             self.skipTest("the device does not have vectors of 4 or 8 doubles")
-        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --precision double --lanes 8,16"
+        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --no-build-times --precision double --lanes 8,16"
         out = self.glint(f"{command} --variant '--samples 1' --variant '--lanes 16 --samples 2' --format json --output report.json").stdout
         runs = json.loads(read("report.json"))["runs"]
         keys = [(row["lanes"], row["variant"]) for row in runs]
@@ -242,7 +249,7 @@ for line in worker.stdout:
 
     def test_passports_of_variants(self):
         """Rows with work-groups have the device's passports, and those with build options have separate ones."""
-        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --lanes 1 --json"
+        command = f"bench sphere.yaml {TINY} --seconds 0.1 --json"
         report = self.json(f"{command} --variant '--work-group 4x2' --variant '--work-group 2x2'")
         self.assertTrue(report["device"]["passports"])
         self.assertEqual(["passports" in run for run in report["runs"]], [False, False])
@@ -255,14 +262,14 @@ for line in worker.stdout:
         """The call of a variant with options for the driver is named, as it is opened and in its many runs."""
         failing = shim_build("failing.so", FAILING)
         for count in 0, 60:
-            process = self.glint("bench sphere.yaml --size 32x24 --seconds 60 --lanes 1 --variant '--work-group 4x2'", 2,
+            process = self.glint(f"bench sphere.yaml {TINY} --seconds 60 --variant '--work-group 4x2'", 2,
                                  env={"LD_PRELOAD": failing, "FAILING": str(count)})
             self.assertRegex(process.stderr, "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
             self.assertEqual(process.stdout, "")
 
     def test_variants_against_an_earlier_report(self):
         """Rows of variants that have other options for the driver are other rows."""
-        command = "bench sphere.yaml --size 32x24 --seconds 0.1 --lanes 1 --tolerance 1e6 --json"
+        command = f"bench sphere.yaml {TINY} --seconds 0.1 --tolerance 1e6 --json"
         write("report", self.glint(f"{command} --variant '--work-group 4x2'").stdout)
         process = self.glint(f"{command} --compare report --variant '--work-group 2x2'", status=1)
         self.assertIn("report has none of these rows", process.stderr)

@@ -16,7 +16,7 @@ SMALL = "--size 32x24"
 HAS_DOUBLE = need_device()["fp64"]
 # Command, options, the members with its rows, the headings that name a row, and members by their headings.
 COMMANDS = {
-    "bench": (f"bench s.yaml {SMALL} --seconds 0.05 --samples 1,2", ["runs"], 8,
+    "bench": (f"bench s.yaml {SMALL} --seconds 0.05 --no-build-times --samples 1,2", ["runs"], 8,
               {"precision": ("precision",), "samples": ("samples",), "frame ms": ("frame_ms", "median"), "runs": ("frame_ms", "runs")}),
     "verify": ("verify S1 P4 --precision single", ["precisions", "cases"], 3,
                {"case": ("name",), "passed": ("passed",), "rays": ("rays",), "worst": ("worst",)}),

@@ -19,6 +19,7 @@ enum {
     OPTION_WORKER,
     OPTION_TOLERANCE,
     OPTION_LAUNCHES,
+    OPTION_NO_BUILD_TIMES,
     OPTION_VARIANT
 };
 
@@ -29,6 +30,7 @@ static const struct option long_options[] = {
     {"worker", no_argument, NULL, OPTION_WORKER},
     {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
     {"launches", no_argument, NULL, OPTION_LAUNCHES},
+    {"no-build-times", no_argument, NULL, OPTION_NO_BUILD_TIMES},
     {"variant", required_argument, NULL, OPTION_VARIANT},
     {"samples", required_argument, NULL, OPTION_SAMPLES},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
@@ -60,6 +62,7 @@ static const char help_text[] =
     "with --compare)\n"
     "      --worker          answer another glint's --against\n"
     "      --launches        list the kernel launches of each row's last run\n"
+    "      --no-build-times  take kernels from the cache instead of timing their builds\n"
     "      --variant OPTIONS\n"
     "                        rows with these options, as in \"--lanes 8 --work-group 8x8\";\n"
     "                        any of --precision, --lanes, --bvh, --samples, --bounces,\n"
@@ -113,6 +116,9 @@ static bool option_take(BenchOptions *options, int option, const char *value)
         return true;
     case OPTION_LAUNCHES:
         options->launches = true;
+        return true;
+    case OPTION_NO_BUILD_TIMES:
+        options->variants.no_build_times = true;
         return true;
     case OPTION_VARIANT:
         if (options->variant_count == VARIANTS_MAX) {

@@ -207,7 +207,7 @@ static void reasons_print(const BenchReport *report, FILE *stream)
         if (row->failure) continue;
         const char *reasons[2] = {row->build_cold.why_not, row->build_cached.why_not};
         for (size_t k = 0; k < 2; k++) {
-            if (reasons[k] && !printed[k]) fprintf(stream, "-: %s\n", reasons[k]);
+            if (reasons[k] && !printed[k] && reasons[k] != printed[0]) fprintf(stream, "-: %s\n", reasons[k]);
             if (reasons[k]) printed[k] = reasons[k];
         }
     }

@@ -112,6 +112,7 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
     Compute *compute = variant_compute(shared, variant);
     MessageList messages = {0};
     const RenderSettings *settings = &variant->settings;
+    if (!timing_builds) row->build_cold.why_not = row->build_cached.why_not = "builds were not timed";
     if ((!timing_builds || builds_measure(compute, variant, row, &messages)) &&
         rays_count(compute, variant, row, &messages))
         variant->renderer = renderer_open(compute, variant->scene, settings, &messages);

@@ -254,7 +254,7 @@ static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progr
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress)
 {
-    if (!variant_set_start(set, compute, is_benchmark, progress)) return false;
+    if (!variant_set_start(set, compute, is_benchmark && !options->no_build_times, progress)) return false;
     const double row_seconds = options->seconds > 0 ? options->seconds / (double)set->row_count : 5;
     const double seconds = row_seconds * (double)set->count;
     bool whole = rounds_run(set, seconds, is_benchmark, progress);

@@ -16,8 +16,9 @@ typedef struct {
     uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0 for one sample
     uint32_t bounce_count;
-    double seconds;   // 0 for the default
-    const char *name; // the text of --variant, or NULL
+    double seconds;      // 0 for the default
+    bool no_build_times; // of a benchmark
+    const char *name;    // the text of --variant, or NULL
 } VariantOptions;
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
@@ -82,8 +83,9 @@ bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Pr
 // Runs every variant once. Returns false if the user interrupted or the device failed.
 bool variant_set_round(VariantSet *set, bool warm_up);
 // Measures the variants interleaved (A B C A B C …), so that drift affects all alike, until the times
-// converge or a share of options->seconds passes. If `is_benchmark`, also times the builds, and calibrates
-// each round. Returns false if the user interrupted or the device failed.
+// converge or a share of options->seconds passes. If `is_benchmark`, also times the builds unless
+// options->no_build_times, and calibrates each round. Returns false if the user interrupted or the device
+// failed.
 extern const double variants_opened_fraction, variants_measured_fraction; // of a row's work
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
