@@ -15,8 +15,11 @@
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 enum { OPTION_LEAN = OPTION_OWN, OPTION_QUICK };
 
@@ -389,6 +392,36 @@ static int verification_work(void *context)
     return device_close(&open, device_verify(verification, &open.compute));
 }
 
+static bool nothing_take(void *context, const VerifyResult *result)
+{
+    (void)context, (void)result;
+    return true;
+}
+
+// Starts a process that builds the kernels of `strict` and `double` into the cache while `single` is
+// verified, by running a case that needs all of them. It ends with this process. No OpenCL call may have been
+// made before.
+static void builder_start(const VerifyOptions *options)
+{
+    static char name[] = "P6";
+    char *const names[] = {name};
+    const VerifyChoice choice = {names, 1};
+    const VerifySink sink = {.take = nothing_take};
+    fflush(stdout); // otherwise each process would print the contents of the buffer
+    if (fork() != 0) return;
+    prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)) _exit(EXIT_USER);
+    OpenDevice open;
+    if (!device_open(&open, &options->common)) _exit(EXIT_USER);
+    const Precision last = open.compute.device->fp64 ? PRECISION_DOUBLE : PRECISION_STRICT;
+    for (Precision precision = PRECISION_STRICT; precision <= last; precision++) {
+        const VerifySettings settings = {.render = precision_settings(options, precision), .quick = true};
+        VerifyKernels kernels = {0};
+        verify_run(&open.compute, &settings, &choice, &sink, &kernels);
+    }
+    _exit(EXIT_DONE);
+}
+
 static bool is_case(const char *name)
 {
     size_t i = 0;
@@ -442,5 +475,9 @@ int command_verify(int argument_count, char **arguments)
     Verification verification = {.options = &options, .journal = verify_journal_open()};
     for (size_t i = 0; verify_case_name(i); i++)
         verification.case_count += is_chosen(&options, verify_case_name(i));
+    const CommonOptions *common = &options.common;
+    if (options.every_precision && options.cases.count == 0 && !options.lean && !common->no_cache &&
+        !common->kernel_folder)
+        builder_start(&options);
     return verify_journal_work(verification.journal, verification_work, &verification);
 }
