@@ -37,7 +37,7 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
     }
     Ray ray = ray_make_unit(origin, vector_normalize(direction), active);
     if (HAS_AREA_LIGHTS) ray.sample = sample;
-    if (IS_CERTIFIED) ray.direction_error = (real)(CAMERA_DIRECTION_ERROR * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) ray.direction_error = (real)(header->forward.w * UNIT_ROUNDOFF);
     if (!has_lens && !is_orthographic) ray_set_common_origin(&ray, COMMON_ORIGIN_EYE, mask_none());
     return ray;
 }

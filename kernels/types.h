@@ -376,6 +376,8 @@ typedef struct {
     // the lens to where the ray from the lens' center meets that plane; lens_right and lens_up lead from the
     // center to the edge. With HAS_ORTHOGRAPHIC and lens_up.w = 1 it runs along forward, from the eye + x
     // right + y up.
+    // With HAS_ORTHOGRAPHIC the eye is that of the shifted frame. forward.w: at `certified`, the direction
+    // error of these rays, in u of their length.
     scalar4 eye, forward, right, up;
     scalar4 lens_right, lens_up;
     scalar4 bounds;                  // those of the BVH; xyz: center, w: largest |x| + |y| + |z| from there

@@ -48,6 +48,8 @@ static void grabbed_point_stays_under_the_cursor(void **state)
     for (int i = 0; i < 4; i++) {
         Camera start = camera_make((FieldAxis)(i % 2));
         start.orthographic = i >= 2;
+        start.shift[0] = -0.2;
+        start.shift[1] = 0.4;
         Camera camera = start;
         Vector3 point = point_along(&start, from, 4);
 
@@ -131,6 +133,7 @@ static void check_yaml(const Camera *camera)
     if (read->half_tangent != camera->half_tangent)
         fail_msg("%.17g read as %.17g from %s", camera->half_tangent, read->half_tangent, text_c(&text));
     assert_int_equal(read->orthographic, camera->orthographic);
+    assert_memory_equal(read->shift, camera->shift, sizeof camera->shift);
     assert_true(read->lens_radius == camera->lens_radius);
     assert_true(read->focal_distance == camera->focal_distance);
     assert_int_equal(read->has_focus, camera->has_focus);
@@ -156,6 +159,7 @@ static void yaml_gives_the_same_camera(void **state)
     lens.focal_distance = 1.0 / 3;
     check_yaml(&lens);
     lens.orthographic = true;
+    lens.shift[1] = 0.1;
     check_yaml(&lens);
     lens.focal_distance = 0;
     check_yaml(&lens);

@@ -325,6 +325,12 @@ static void aims_cameras(void **state)
     camera.field_axis = FIELD_HORIZONTAL;
     ray = reference_camera_ray(&camera, 4, 2, 3, 1);
     assert_true(ray.direction.x == (Quad)0.375 && ray.direction.y == -(Quad)0.125 && ray.direction.z == -1);
+    // The frame, 1 wide, moves by a half to the left and a quarter up.
+    camera.shift[0] = -0.5;
+    camera.shift[1] = 0.25;
+    ray = reference_camera_ray(&camera, 4, 2, 3, 1);
+    assert_true(ray.direction.x == -(Quad)0.125 && ray.direction.y == (Quad)0.125 && ray.direction.z == -1);
+    camera.shift[0] = camera.shift[1] = 0;
     // Looking along `up`, the first axis square to the view stands in: here x is the way up.
     camera.up = (Vector3){0, 0, 2};
     ray = reference_camera_ray(&camera, 1, 2, 0, 0);

@@ -240,8 +240,7 @@ static void test_losses(void **state)
           "7:20: warning: 'shadow_filter_off' is not used: transparent objects cast shadows\n"
           "7:56: warning: ambient occlusion is not shown\n"
           "7:105: warning: 'trans_raster3d' is not used: opacity does not depend on the angle\n");
-    assert_messages("s.dat", BEGIN CAMERA_OF("projection fisheye", "frustum -1 2 -1 1 ") SPHERE,
-                    "3:1: warning: the camera's frustum is not centered: its middle moves\n"
+    assert_messages("s.dat", BEGIN CAMERA_OF("projection fisheye", "") SPHERE,
                     "3:19: warning: the fisheye projection becomes one in perspective\n"
                     "warning: s.dat: no lights\n");
 }
@@ -257,6 +256,17 @@ static void test_fading(void **state)
     assert_vector(scene.lights.items[0].color, 1.6, 0, 0);
     const double *fading = scene.lights.items[0].fading;
     assert_true(fading[0] == 1 && fading[1] == 2 && fading[2] == 1);
+    scene_free(&scene);
+}
+
+static void test_frustum(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("", "frustum -1 2 -3 1 ") SPHERE);
+    assert_number(scene.camera.half_tangent, 2);
+    assert_number(scene.camera.frame_aspect, 0.75);
+    assert_number(scene.camera.shift[0], 0.125);
+    assert_number(scene.camera.shift[1], -0.25);
     scene_free(&scene);
 }
 
@@ -311,9 +321,10 @@ static void test_picture(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_camera), cmocka_unit_test(test_lights),       cmocka_unit_test(test_materials),
-        cmocka_unit_test(test_shapes), cmocka_unit_test(test_meshes),       cmocka_unit_test(test_losses),
-        cmocka_unit_test(test_fading), cmocka_unit_test(test_orthographic), cmocka_unit_test(test_picture),
+        cmocka_unit_test(test_camera),  cmocka_unit_test(test_lights),  cmocka_unit_test(test_materials),
+        cmocka_unit_test(test_shapes),  cmocka_unit_test(test_meshes),  cmocka_unit_test(test_losses),
+        cmocka_unit_test(test_fading),  cmocka_unit_test(test_frustum), cmocka_unit_test(test_orthographic),
+        cmocka_unit_test(test_picture),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
 }

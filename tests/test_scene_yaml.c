@@ -251,10 +251,12 @@ static void test_focal_length(void **state)
 {
     (void)state;
     Scene scene = scene_of_text(
-        "s.yaml", "camera: {position: [0, 0, 0], look_at: [0, 0, 1], focal_length: 2, frame: [3, 2]}\n");
+        "s.yaml", "camera: {position: [0, 0, 0], look_at: [0, 0, 1], focal_length: 2, frame: [3, 2], "
+                  "shift: [-0.5, 0.25]}\n");
     assert_int_equal(scene.camera.field_axis, FIELD_HORIZONTAL);
     assert_number(scene.camera.half_tangent, 0.75);
     assert_number(scene.camera.frame_aspect, 1.5);
+    assert_true(scene.camera.shift[0] == -0.5 && scene.camera.shift[1] == 0.25);
     scene_free(&scene);
 }
 

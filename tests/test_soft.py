@@ -229,6 +229,8 @@ class Soft(TestCase):
             write("soft.yaml", camera.format(key, light))
             self.refuses(command, f"{message}which has no error bound: choose a precision other than certified")
             self.refuses("certify soft.yaml --precision strict --size 8x8", "the exact reference has no .*cannot judge this scene")
+        write("soft.yaml", camera.format(", shift: [0, 5]", f"{{{point}}}"))
+        self.refuses(command, "the camera's 'shift' is so large that its rays have no error bound: choose a precision other than certified")
         ghost = "materials: {{ghost: {{shadow: false}}}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1{}}}}}]\n"
         for material, refused in (", material: ghost", True), ("", False):
             write("soft.yaml", camera.replace("objects: []\n", "").format("", f"{{{point}}}") + ghost.format(material))

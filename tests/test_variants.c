@@ -322,6 +322,30 @@ static void regions_are_cuts_of_the_whole(void **state)
     film_free(&whole);
 }
 
+// A shifted frame shows a part of a larger frame around the view. The numbers are exact.
+static void shifted_frames_are_cuts_of_a_larger_one(void **state)
+{
+    (void)state;
+    enum { SIDE = 32 };
+    Scene scene = every_shape;
+    scene.camera = (Camera){.position = {0.5, 3, -10}, .look_at = {0.5, 3, 1}, .up = {0, 1, 0}};
+    RenderSettings settings = film_settings(2 * SIDE, 2 * SIDE, probe_same_bits_from());
+    for (int i = 0; i < 2; i++) {
+        scene.camera.orthographic = i == 1;
+        scene.camera.half_tangent = i == 1 ? 4 : 0.5;
+        settings.width = settings.height = settings.region_width = settings.region_height = 2 * SIDE;
+        Film whole = render(&scene, &settings), expected = film_cut(&whole, SIDE, 0, SIDE, SIDE);
+        scene.camera.half_tangent /= 2;
+        scene.camera.shift[0] = scene.camera.shift[1] = 0.5;
+        settings.width = settings.height = settings.region_width = settings.region_height = SIDE;
+        Film shifted = render(&scene, &settings);
+        same_and_freed(&shifted, &expected, i == 1 ? "shift of parallel rays" : "shift");
+        scene.camera.shift[0] = scene.camera.shift[1] = 0;
+        film_free(&whole);
+        film_free(&expected);
+    }
+}
+
 static void check_sampled(const Scene *scene)
 {
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
@@ -394,6 +418,7 @@ int main(void)
         cmocka_unit_test(bands_agree),
         cmocka_unit_test(launches_of_samples_agree),
         cmocka_unit_test(regions_are_cuts_of_the_whole),
+        cmocka_unit_test(shifted_frames_are_cuts_of_a_larger_one),
         cmocka_unit_test(points_of_areas_agree),
         cmocka_unit_test(mirror_gives_the_mirrored_image),
     };

@@ -10,5 +10,22 @@ CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
     Vector3 up = vector_cross(right, forward);
     double span = camera->field_axis == FIELD_VERTICAL ? height : width;
     double half_pixel = camera->half_tangent / span;
-    return (CameraBasis){forward, vector_scale(right, half_pixel), vector_scale(up, half_pixel)};
+    CameraBasis basis = {
+        forward, vector_scale(right, half_pixel), vector_scale(up, half_pixel), forward, {0}};
+    if (camera->shift[0] != 0 || camera->shift[1] != 0) { // else a zero might change its sign
+        const double frame = 2 * camera->half_tangent;
+        basis.shift = vector_add(vector_scale(right, camera->shift[0] * frame),
+                                 vector_scale(up, camera->shift[1] * frame));
+        if (!camera->orthographic) basis.middle = vector_add(forward, basis.shift);
+    }
+    return basis;
+}
+
+// The roundings of the three vectors, which are perpendicular, add up to sqrt 3, those of two sums to 2, of
+// an offset in the pixel to 1 and of the unit length to 1. Where the frame is shifted, the middle and the
+// offset from there, each at most |middle| + |d| long, may cancel down to the ray's d, which is at least 1
+// long: docs/numerics.md.
+double camera_direction_error(const CameraBasis *basis)
+{
+    return vector_is_zero(basis->shift) ? 7 : 6 * (1 + vector_length(basis->middle));
 }

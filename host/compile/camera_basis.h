@@ -7,8 +7,17 @@
 typedef struct {
     Vector3 forward;   // unit
     Vector3 right, up; // half a pixel along the image's width and height, at distance 1
+    // The middle of the image, as seen from the eye, at distance 1: `forward` unless the frame is shifted.
+    // With parallel rays, the middle is at `shift` and the rays run along `forward`.
+    Vector3 middle, shift;
 } CameraBasis;
 
 // Where `up` is zero or parallel to the view, the world axis least aligned with the view stands in for it
 // (the first of x, y, z where several are).
 CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height);
+
+// Returns a bound on the error of a kernel's rays in perspective, in units of roundoff of their length.
+// Beyond CAMERA_DIRECTION_ERROR_MAX the rays of the eye are farther off than cull spheres allow at
+// `certified`.
+enum { CAMERA_DIRECTION_ERROR_MAX = 32 };
+double camera_direction_error(const CameraBasis *basis);

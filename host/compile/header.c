@@ -35,6 +35,8 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
                 below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
     const Vector3 forward = vector_normalize(scene->sky.forward);
+    const Vector3 eye =
+        scene->camera.orthographic ? vector_add(compiled->eye_offset, basis.shift) : compiled->eye_offset;
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
         .ambient = scalar4_of(scene_ambient(compiled, scene), 0),
@@ -44,8 +46,8 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .sky_below = scalar4_of(below, 0),
         .sky_forward = scalar4_of(forward, scene->sky.intensity),
         .sky_right = scalar4_of(vector_cross(forward, vector_normalize(scene->sky.up)), 0),
-        .eye = scalar4_of(compiled->eye_offset, 0),
-        .forward = scalar4_of(basis.forward, 0),
+        .eye = scalar4_of(eye, 0),
+        .forward = scalar4_of(basis.middle, camera_direction_error(&basis)),
         .right = scalar4_of(basis.right, 0),
         .up = scalar4_of(basis.up, 0),
         .lens_right = scalar4_of(vector_scale(vector_normalize(basis.right), lens_radius),

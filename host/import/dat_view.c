@@ -74,8 +74,8 @@ bool dat_camera(DatReader *reader)
         height = f[3] - f[2];
         if (!(f[1] > f[0] && height > 0))
             return report_error(&reader->report, offset, "'frustum' must be left, right, bottom and top");
-        if (f[0] != -f[1] || f[2] != -f[3])
-            report_warning(&reader->report, offset, "the camera's frustum is not centered: its middle moves");
+        reader->scene->camera.shift[0] = (f[0] + f[1]) / 2 / height;
+        reader->scene->camera.shift[1] = (f[2] + f[3]) / 2 / height;
         reader->scene->camera.frame_aspect = (f[1] - f[0]) / height;
     }
     Camera *camera = &reader->scene->camera;

@@ -23,6 +23,7 @@ typedef struct {
     // the frame itself.
     double half_tangent;
     double frame_aspect; // width over height of the frame, or 0 where the file gives none
+    double shift[2];     // of the frame in its plane, to the right and up, in frames along field_axis
     bool orthographic;   // rays are parallel to the view
     // With a lens the plane across the view at focal_distance is in focus or, if that is 0, the one through
     // `focus`, or through look_at.

@@ -15,7 +15,7 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
     const CameraBasis basis = camera_basis(camera, width, height);
     const Quad x = (Quad)2 * column + 1 - width, y = height - 1 - (Quad)2 * row;
     const Quad3 sideways = quad3_add(quad3_scale(quad3(basis.right), x), quad3_scale(quad3(basis.up), y));
-    const Quad3 direction = quad3_add(quad3(basis.forward), sideways);
+    const Quad3 direction = quad3_add(quad3(basis.middle), sideways);
     return (ReferenceRay){quad3(camera->position), direction, 0, (Quad)FLT_MAX};
 }
 

@@ -5,7 +5,7 @@
 
 static const double POLE_ANGLE = M_PI / 180; // between the view and `up`, at least
 
-static void camera_shift(Camera *camera, Vector3 by)
+static void camera_move(Camera *camera, Vector3 by)
 {
     camera->position = vector_add(camera->position, by);
     camera->look_at = vector_add(camera->look_at, by);
@@ -16,7 +16,7 @@ CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y)
     CameraBasis basis = camera_basis(camera, size.width, size.height);
     Vector3 right = vector_scale(basis.right, 2 * x + 1 - size.width);
     Vector3 up = vector_scale(basis.up, size.height - 1 - 2 * y);
-    Vector3 across = vector_add(right, up);
+    Vector3 across = vector_add(vector_add(right, up), basis.shift);
     if (camera->orthographic) return (CameraRay){vector_add(camera->position, across), basis.forward};
     return (CameraRay){camera->position, vector_normalize(vector_add(basis.forward, across))};
 }
@@ -55,7 +55,7 @@ void camera_pan(Camera *camera, ImageSize size, double distance, const double fr
     double depth = camera->orthographic ? 1 : distance * vector_dot(basis.forward, ray);
     Vector3 right = vector_scale(basis.right, 2 * depth * (from[0] - to[0]));
     Vector3 up = vector_scale(basis.up, 2 * depth * (to[1] - from[1]));
-    camera_shift(camera, vector_add(right, up));
+    camera_move(camera, vector_add(right, up));
 }
 
 void camera_dolly(Camera *camera, Vector3 pivot, double factor)
@@ -65,10 +65,10 @@ void camera_dolly(Camera *camera, Vector3 pivot, double factor)
         Vector3 to_pivot = vector_subtract(pivot, camera->position);
         Vector3 across = vector_subtract(to_pivot, vector_scale(forward, vector_dot(to_pivot, forward)));
         camera->half_tangent *= factor;
-        camera_shift(camera, vector_scale(across, 1 - factor));
+        camera_move(camera, vector_scale(across, 1 - factor));
         return;
     }
-    camera_shift(camera, vector_scale(vector_subtract(pivot, camera->position), 1 - factor));
+    camera_move(camera, vector_scale(vector_subtract(pivot, camera->position), 1 - factor));
 }
 
 void camera_fly(Camera *camera, double forward, double right, double up)
@@ -76,7 +76,7 @@ void camera_fly(Camera *camera, double forward, double right, double up)
     CameraBasis basis = camera_basis(camera, 1, 1);
     Vector3 sideways = vector_add(vector_scale(vector_normalize(basis.right), right),
                                   vector_scale(vector_normalize(basis.up), up));
-    camera_shift(camera, vector_add(vector_scale(basis.forward, forward), sideways));
+    camera_move(camera, vector_add(vector_scale(basis.forward, forward), sideways));
 }
 
 void camera_look_at(Camera *camera, Vector3 point)

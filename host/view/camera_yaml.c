@@ -65,6 +65,13 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
     vector_write(text, "position", camera->position);
     vector_write(text, "look_at", camera->look_at);
     vector_write(text, "up", camera->up);
+    if (camera->shift[0] != 0 || camera->shift[1] != 0) {
+        text_appendf(text, "shift: [");
+        number_write_yaml(text, camera->shift[0]);
+        text_appendf(text, ", ");
+        number_write_yaml(text, camera->shift[1]);
+        text_appendf(text, "], ");
+    }
     if (camera->lens_radius > 0) {
         text_appendf(text, "aperture: ");
         number_write_yaml(text, 2 * camera->lens_radius);

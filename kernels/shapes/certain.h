@@ -19,11 +19,6 @@ typedef struct {
     real t, low, high;
 } CertainHit;
 
-// The direction error of camera rays, in u of their length. The roundings of the three vectors, which are
-// perpendicular, add up to sqrt 3, those of two sums to 2, of an offset in the pixel to 1 and of the unit
-// length to 1.
-enum { CAMERA_DIRECTION_ERROR = 7 };
-
 // Returns a / b, or `otherwise` if that is out of range.
 static inline real divide_or(real a, real b, real otherwise)
 {

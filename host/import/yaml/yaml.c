@@ -20,7 +20,7 @@ typedef struct {
     double fov_degrees, focal_length, frame[2], height, aperture, turn;
 } CameraFields;
 
-static bool read_frame(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+static bool read_pair(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
 }
@@ -45,8 +45,9 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FIRST, OPTIONAL, &range_field_of_view},
         {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_SECOND, REQUIRED,
          &range_positive},
-        {"frame", read_frame, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
+        {"frame", read_pair, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
         {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
+        {"shift", read_pair, offsetof(CameraFields, camera.shift), FORM_ANY, OPTIONAL, NULL},
         {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL, NULL},
         {"aperture", read_number, offsetof(CameraFields, aperture), FORM_ANY, OPTIONAL, &range_not_negative},
         {"focus", read_focus, 0, FORM_ANY, OPTIONAL, NULL},
