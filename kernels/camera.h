@@ -2,6 +2,7 @@
 #ifndef CAMERA_H
 #define CAMERA_H
 
+#include "numerics/angle.h"
 #include "sampling.h"
 #include "scene.h"
 #include "shapes/certain.h"
@@ -9,6 +10,18 @@
 typedef struct {
     integer x, y; // counted in the whole image from the top left
 } Pixels;
+
+// Returns the direction of a place in the image, in half pixels from its center.
+static inline Vector equirectangular_direction(global const SceneHeader *header, real x, real y)
+{
+    const real quarter = (real)(0.25f), half_turn = (real)(0.5f);
+    real longitude = x * (real)(header->right.w), latitude = y * (real)(header->up.w);
+    real away = fabs(longitude), sine = real_sine_of_turns(real_min(away, half_turn - away));
+    Vector level = vector_fma(vector_of(header->right), lanes_select(longitude < (real)(0), -sine, sine),
+                              vector_scale(vector_of(header->forward), real_sine_of_turns(quarter - away)));
+    return vector_fma(vector_of(header->up), real_sine_of_turns(latitude),
+                      vector_scale(level, real_sine_of_turns(quarter - fabs(latitude))));
+}
 
 // Returns the ray of sample `index`, through a point of each pixel. dx and dy run from -1 to 1 across the
 // pixel, and 0 is the center. Coordinates are half pixels from the image's center, 2 i + 1 - width, which are
@@ -22,10 +35,12 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
     real y = real_from_integer((integer)((scalar_integer)header->image.y) - 1 - pixels.y * 2) + dy;
     Vector origin = vector_of(header->eye), direction = vector_of(header->forward);
     bool has_lens = HAS_LENS && header->lens_right.w > 0;
-    bool is_orthographic = HAS_ORTHOGRAPHIC && header->lens_up.w != 0;
+    bool is_orthographic = HAS_ORTHOGRAPHIC && header->lens_up.w == CAMERA_ORTHOGRAPHIC;
     Vector right = vector_of(header->right), up = vector_of(header->up);
     if (is_orthographic)
         origin = vector_fma(right, x, vector_fma(up, y, origin));
+    else if (HAS_EQUIRECTANGULAR && header->lens_up.w == CAMERA_EQUIRECTANGULAR)
+        direction = equirectangular_direction(header, x, y);
     else
         direction = vector_fma(right, x, vector_fma(up, y, direction));
     if (has_lens) {

@@ -14,6 +14,7 @@
     FEATURE(AREA_LIGHTS, )        \
     FEATURE(LENS, )               \
     FEATURE(ORTHOGRAPHIC, )       \
+    FEATURE(EQUIRECTANGULAR, )    \
     FEATURE(SKY, )                \
     FEATURE(CHECKERS, )           \
     FEATURE(IMAGES, )             \

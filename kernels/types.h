@@ -361,6 +361,8 @@ typedef struct {
     uint4 kind; // x: LIGHT_KIND_…, y: LIGHT_AREA_…
 } Light;
 
+enum { CAMERA_ORTHOGRAPHIC = 1, CAMERA_EQUIRECTANGULAR };
+
 typedef struct {
     scalar4 background, ambient;
     // With HAS_SKY the background is that of directions across the unit vector sky_up. sky_above and
@@ -374,8 +376,10 @@ typedef struct {
     //
     // With HAS_LENS and lens_right.w > 0, one over the distance of the focal plane, it runs from a point of
     // the lens to where the ray from the lens' center meets that plane; lens_right and lens_up lead from the
-    // center to the edge. With HAS_ORTHOGRAPHIC and lens_up.w = 1 it runs along forward, from the eye + x
-    // right + y up.
+    // center to the edge. With HAS_ORTHOGRAPHIC and lens_up.w = CAMERA_ORTHOGRAPHIC it runs along forward,
+    // from the eye + x right + y up. With HAS_EQUIRECTANGULAR and lens_up.w = CAMERA_EQUIRECTANGULAR its
+    // longitude is x right.w turns, from forward towards right, and its latitude y up.w turns, towards up;
+    // these three are then unit vectors.
     // With HAS_ORTHOGRAPHIC the eye is that of the shifted frame. forward.w: at `certified`, the direction
     // error of these rays, in u of their length.
     scalar4 eye, forward, right, up;

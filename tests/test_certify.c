@@ -80,6 +80,31 @@ static void tilted_normals_are_decided(void **state)
     scene_free(&scene);
 }
 
+// Spheres around the zenith, the nadir and the seam, and shapes in all directions.
+static void panoramas_are_right(void **state)
+{
+    (void)state;
+    const bool has_double = probe_has(PRECISION_DOUBLE);
+    Scene scene = scene_of_text(
+        "panorama.yaml",
+        "camera: {position: [0.1, 1, 0.2], look_at: [1, 1.3, -2], up: [0.1, 1, 0], projection: "
+        "equirectangular}\n"
+        "background: {horizon: 0.5, zenith: blue, nadir: [1, 0.5, 0]}\n"
+        "lights: [{point: {position: [1, 6, 0]}}, {directional: {direction: [1, -1, 2]}}]\n"
+        "objects:\n"
+        "  - sphere: {center: [0.3, 4, 0.2], radius: 0.7, material: {color: gold}}\n"
+        "  - sphere: {center: [-0.5, -3, 0.3], radius: 1, material: {color: red}}\n"
+        "  - sphere: {center: [-1, 0.7, 2.2], radius: 0.8, material: {color: green, reflection: 0.4}}\n"
+        "  - box: {min: [2, 0, -3], max: [4, 2, -1], material: {checker: {colors: [1, 0.3], size: 0.3}}}\n"
+        "  - torus: {center: [-3, 1, -2], axis: [1, 0, 1], major: 1, minor: 0.3}\n"
+        "  - disc: {center: [0, -1, 0], normal: [0, 1, 0], radius: 6}\n");
+    const CertifyErrors errors =
+        certify(&scene, has_double ? PRECISION_DOUBLE : PRECISION_STRICT, 1, PIXELS, NULL);
+    assert_true(wrong_pixels(&errors) <= (has_double ? 0 : 2));
+    assert_true(!has_double || errors.right_color < 1e-10);
+    scene_free(&scene);
+}
+
 static void colors_compare(const Scene *scene, uint32_t scale)
 {
     const size_t count = PIXELS * (size_t)scale * scale;
@@ -134,7 +159,8 @@ static void there_are_no_false_alarms(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_best_precision_is_right), cmocka_unit_test(tilted_normals_are_decided),
-        cmocka_unit_test(colors_of_certified_are_exact), cmocka_unit_test(there_are_no_false_alarms)};
+        cmocka_unit_test(the_best_precision_is_right), cmocka_unit_test(panoramas_are_right),
+        cmocka_unit_test(tilted_normals_are_decided), cmocka_unit_test(colors_of_certified_are_exact),
+        cmocka_unit_test(there_are_no_false_alarms)};
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -337,6 +337,28 @@ static void aims_cameras(void **state)
     assert_true(ray.direction.x == (Quad)0.5 && ray.direction.y == 0);
 }
 
+static void aims_panoramas(void **state)
+{
+    (void)state;
+    const Camera camera = {.look_at = {0, 0, -1},
+                           .up = {0, 1, 0},
+                           .field_axis = FIELD_HORIZONTAL,
+                           .half_tangent = M_PI,
+                           .equirectangular = true};
+    static const struct {
+        unsigned column, row; // of 8 by 3
+        double x, y, z;       // longitudes from 7/8 of a half-turn to the left on, latitudes of 60, 0 and -60
+    } pixels[] = {{0, 1, -0.38268343236508977, 0, 0.92387953251128674},
+                  {3, 1, -0.38268343236508977, 0, -0.92387953251128674},
+                  {5, 0, 0.46193976625564337, 0.8660254037844386, -0.19134171618254489},
+                  {7, 2, 0.19134171618254489, -0.8660254037844386, 0.46193976625564337}};
+    for (size_t i = 0; i < sizeof pixels / sizeof *pixels; i++) {
+        const ReferenceRay ray = reference_camera_ray(&camera, 8, 3, pixels[i].column, pixels[i].row);
+        const Vector3 expected = {pixels[i].x, pixels[i].y, pixels[i].z};
+        assert_true(reference_distance(expected, ray.direction) < 4 * DBL_EPSILON);
+    }
+}
+
 // The camera's vectors in double are those of quadruple precision but for rounding.
 static void rounds_cameras(void **state)
 {
@@ -519,6 +541,7 @@ int main(void)
         cmocka_unit_test(casts_shadows),
         cmocka_unit_test(lays_checkers),
         cmocka_unit_test(aims_cameras),
+        cmocka_unit_test(aims_panoramas),
         cmocka_unit_test(rounds_cameras),
         cmocka_unit_test(rounds_every_number),
         cmocka_unit_test(finds_the_nearest),

@@ -36,7 +36,7 @@ static int variants_close(void **state)
 
 // Points of areas depend on the pixel, so that a mirrored image has others. Parallel rays need another
 // camera.
-#define SAMPLED_FEATURES (FEATURE_AREA_LIGHTS | FEATURE_LENS | FEATURE_ORTHOGRAPHIC)
+#define SAMPLED_FEATURES (FEATURE_AREA_LIGHTS | FEATURE_LENS | FEATURE_ORTHOGRAPHIC | FEATURE_EQUIRECTANGULAR)
 
 // Renders with the settings' features unchanged.
 static Film render(const Scene *scene, const RenderSettings *settings)
@@ -169,6 +169,8 @@ static const struct {
                                      "0.4, focus: 4}\nambient: 0.5\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_ORTHOGRAPHIC,
      "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], height: 4}\nambient: 0.5\n" SPHERE},
+    {FEATURE_SPHERES | FEATURE_EQUIRECTANGULAR, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], "
+                                                "projection: equirectangular}\nambient: 0.5\n" SPHERE},
     {FEATURE_SKY, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
                   "background: {horizon: 1, zenith: [0, 0, 1], up: [0.1, 1, 0]}\n"},
     {FEATURE_SKY | FEATURE_IMAGES, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
@@ -387,16 +389,39 @@ static void points_of_areas_agree(void **state)
     check_sampled(&parallel);
 }
 
+// Packets of a panorama are not part of a plane; culls must not assume that they are.
+static void panoramas_agree(void **state)
+{
+    (void)state;
+    Scene panorama = every_shape;
+    panorama.camera.equirectangular = true;
+    panorama.camera.field_axis = FIELD_HORIZONTAL;
+    panorama.camera.half_tangent = M_PI;
+    panorama.camera.position = (Vector3){0.3, 1.7, 0.4};
+    check_sampled(&panorama);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
+    settings.bvh = BVH_OFF;
+    Film expected = render(&panorama, &settings);
+    for (const uint32_t *lanes = tested_lanes(probe_compute.device); *lanes; lanes++) {
+        settings.lanes = *lanes;
+        settings.bvh = BVH_ON;
+        Film film = render(&panorama, &settings);
+        same_and_freed(&film, &expected, "panorama with a BVH");
+    }
+    film_free(&expected);
+}
+
 // Hard case R7 (docs/verify.md).
 static void mirror_gives_the_mirrored_image(void **state)
 {
     (void)state;
-    Scene mirrored = scene_of_file("tests/scenes/every_shape.yaml");
+    Scene mirrored = scene_of_file("tests/scenes/every_shape.yaml"), seen = every_shape;
     scene_mirror(&mirrored);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         for (uint32_t width = WIDTH; width <= WIDTH + 1; width++) {
+            seen.camera.equirectangular = mirrored.camera.equirectangular = width > WIDTH;
             RenderSettings settings = film_settings(width, HEIGHT, precision);
-            Film film = render(&every_shape, &settings), flipped = film_flipped(&film);
+            Film film = render(&seen, &settings), flipped = film_flipped(&film);
             Film mirror = render(&mirrored, &settings);
             char what[64];
             snprintf(what, sizeof what, "%s, mirrored, %u wide", precision_names[settings.precision], width);
@@ -420,6 +445,7 @@ int main(void)
         cmocka_unit_test(regions_are_cuts_of_the_whole),
         cmocka_unit_test(shifted_frames_are_cuts_of_a_larger_one),
         cmocka_unit_test(points_of_areas_agree),
+        cmocka_unit_test(panoramas_agree),
         cmocka_unit_test(mirror_gives_the_mirrored_image),
     };
     return cmocka_run_group_tests(tests, variants_open, variants_close);

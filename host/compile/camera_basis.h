@@ -6,7 +6,7 @@
 
 typedef struct {
     Vector3 forward;   // unit
-    Vector3 right, up; // half a pixel along the image's width and height, at distance 1
+    Vector3 right, up; // half a pixel along the image's width and height, at distance 1, in its middle
     // The middle of the image, as seen from the eye, at distance 1: `forward` unless the frame is shifted.
     // With parallel rays, the middle is at `shift` and the rays run along `forward`.
     Vector3 middle, shift;

@@ -77,6 +77,7 @@ FeatureSet features_of(const Scene *scene)
     if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;
     if (scene->sky.texture > 0) set |= FEATURE_IMAGES;
     if (scene->camera.orthographic) set |= FEATURE_ORTHOGRAPHIC;
+    if (scene->camera.equirectangular) set |= FEATURE_EQUIRECTANGULAR;
     return set;
 }
 

@@ -30,7 +30,12 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     const double focal_distance = camera_focal_distance(&scene->camera),
                  lens_radius = focal_distance > 0 ? scene->camera.lens_radius : 0;
-    const double sample_width = 2 * sqrt(vector_dot(basis.right, basis.right) / settings->sample_count);
+    const bool is_equirectangular = scene->camera.equirectangular;
+    const Vector3 right = is_equirectangular ? vector_normalize(basis.right) : basis.right,
+                  up = is_equirectangular ? vector_normalize(basis.up) : basis.up;
+    double half_pixel_squared = vector_dot(basis.right, basis.right);
+    if (is_equirectangular) half_pixel_squared = fmax(half_pixel_squared, vector_dot(basis.up, basis.up));
+    const double sample_width = 2 * sqrt(half_pixel_squared / settings->sample_count);
     const bool has_sky = !vector_is_zero(scene->sky.up);
     const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
                 below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
@@ -48,12 +53,14 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .sky_right = scalar4_of(vector_cross(forward, vector_normalize(scene->sky.up)), 0),
         .eye = scalar4_of(eye, 0),
         .forward = scalar4_of(basis.middle, camera_direction_error(&basis)),
-        .right = scalar4_of(basis.right, 0),
-        .up = scalar4_of(basis.up, 0),
+        .right = scalar4_of(right, is_equirectangular ? 0.5 / settings->width : 0),
+        .up = scalar4_of(up, is_equirectangular ? 0.25 / settings->height : 0),
         .lens_right = scalar4_of(vector_scale(vector_normalize(basis.right), lens_radius),
                                  focal_distance > 0 ? 1 / focal_distance : 0),
         .lens_up = scalar4_of(vector_scale(vector_normalize(basis.up), lens_radius),
-                              scene->camera.orthographic ? 1 : 0),
+                              is_equirectangular           ? CAMERA_EQUIRECTANGULAR
+                              : scene->camera.orthographic ? CAMERA_ORTHOGRAPHIC
+                                                           : 0),
         .bounds = center_and_half_extent(&compiled->bvh_bounds),
         .bounds_low = scalar4_of(compiled->bvh_bounds.min, instance_slack(compiled, settings)),
         .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),

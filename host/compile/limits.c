@@ -103,6 +103,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_AREA_LIGHTS, "a light has an area"},
         {FEATURE_LENS, "the camera has an 'aperture'"},
         {FEATURE_ORTHOGRAPHIC, "the camera has parallel rays"},
+        {FEATURE_EQUIRECTANGULAR, "the camera is equirectangular"},
         {FEATURE_CUTOUTS, "a material has a 'cutout'"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;

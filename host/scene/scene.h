@@ -25,6 +25,9 @@ typedef struct {
     double frame_aspect; // width over height of the frame, or 0 where the file gives none
     double shift[2];     // of the frame in its plane, to the right and up, in frames along field_axis
     bool orthographic;   // rays are parallel to the view
+    // The image shows all directions, by longitude from left to right and latitude from bottom to top;
+    // half_tangent is then pi along the width, and there is neither a shift nor a lens.
+    bool equirectangular;
     // With a lens the plane across the view at focal_distance is in focus or, if that is 0, the one through
     // `focus`, or through look_at.
     double lens_radius; // 0: no lens

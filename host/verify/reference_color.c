@@ -14,6 +14,17 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
 {
     const CameraBasis basis = camera_basis(camera, width, height);
     const Quad x = (Quad)2 * column + 1 - width, y = height - 1 - (Quad)2 * row;
+    if (camera->equirectangular) {
+        const Quad half_turn = QUAD_CALL(acos)(-1), longitude = half_turn * x / width,
+                   latitude = half_turn / 2 * y / height;
+        const Quad3 right = quad3(vector_normalize(basis.right)), up = quad3(vector_normalize(basis.up));
+        const Quad3 level = quad3_add(quad3_scale(quad3(basis.forward), QUAD_CALL(cos)(longitude)),
+                                      quad3_scale(right, QUAD_CALL(sin)(longitude)));
+        return (ReferenceRay){quad3(camera->position),
+                              quad3_add(quad3_scale(level, QUAD_CALL(cos)(latitude)),
+                                        quad3_scale(up, QUAD_CALL(sin)(latitude))),
+                              0, (Quad)FLT_MAX};
+    }
     const Quad3 sideways = quad3_add(quad3_scale(quad3(basis.right), x), quad3_scale(quad3(basis.up), y));
     const Quad3 direction = quad3_add(quad3(basis.middle), sideways);
     return (ReferenceRay){quad3(camera->position), direction, 0, (Quad)FLT_MAX};

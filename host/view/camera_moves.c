@@ -16,6 +16,15 @@ CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y)
     CameraBasis basis = camera_basis(camera, size.width, size.height);
     Vector3 right = vector_scale(basis.right, 2 * x + 1 - size.width);
     Vector3 up = vector_scale(basis.up, size.height - 1 - 2 * y);
+    if (camera->equirectangular) {
+        const double longitude = M_PI * ((2 * x + 1) / size.width - 1),
+                     latitude = M_PI / 2 * (1 - (2 * y + 1) / size.height);
+        const Vector3 level = vector_add(vector_scale(basis.forward, cos(longitude)),
+                                         vector_scale(vector_normalize(basis.right), sin(longitude)));
+        return (CameraRay){camera->position,
+                           vector_add(vector_scale(level, cos(latitude)),
+                                      vector_scale(vector_normalize(basis.up), sin(latitude)))};
+    }
     Vector3 across = vector_add(vector_add(right, up), basis.shift);
     if (camera->orthographic) return (CameraRay){vector_add(camera->position, across), basis.forward};
     return (CameraRay){camera->position, vector_normalize(vector_add(basis.forward, across))};
@@ -52,6 +61,11 @@ void camera_pan(Camera *camera, ImageSize size, double distance, const double fr
 {
     CameraBasis basis = camera_basis(camera, size.width, size.height);
     Vector3 ray = camera_ray(camera, size, from[0], from[1]).direction;
+    if (camera->equirectangular) {
+        Vector3 other = camera_ray(camera, size, to[0], to[1]).direction;
+        camera_move(camera, vector_scale(vector_subtract(ray, other), distance));
+        return;
+    }
     double depth = camera->orthographic ? 1 : distance * vector_dot(basis.forward, ray);
     Vector3 right = vector_scale(basis.right, 2 * depth * (from[0] - to[0]));
     Vector3 up = vector_scale(basis.up, 2 * depth * (to[1] - from[1]));

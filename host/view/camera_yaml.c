@@ -86,6 +86,8 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
     if (camera->orthographic) {
         text_appendf(text, "height: ");
         number_write_yaml(text, 2 * camera->half_tangent);
+    } else if (camera->equirectangular) {
+        text_appendf(text, "projection: equirectangular");
     } else if (camera->field_axis == FIELD_VERTICAL) {
         text_appendf(text, "fov: ");
         number_write_yaml(text, field_of_view(camera->half_tangent));

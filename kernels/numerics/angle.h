@@ -34,4 +34,24 @@ static inline real real_turns(real x, real y)
     return lanes_select(y < (real)(0), -turns, turns);
 }
 
+// Returns the sine of an angle in turns, -1/4 to 1/4, by Taylor's series up to a^21 / 21! (Abramowitz,
+// Stegun, 4.3.65), whose remainder is below 2^-59.
+static inline real real_sine_of_turns(real turns)
+{
+#if IS_DOUBLE
+    const real turn = (real)(0x1.921fb54442d18p+2);
+#else
+    const real turn = (real)(0x1.921fb6p+2f);
+#endif
+    const scalar one = 1; // the factors are those from term to term, 1 / (n (n - 1)), without the first
+    const scalar factors[] = {one / 420, one / 342, one / 272, one / 210, one / 156,
+                              one / 110, one / 72,  one / 42,  one / 20};
+    const real angle = turns * turn, squared = angle * angle;
+    real series = (real)(1);
+#pragma unroll
+    for (uint i = 0; i < 9; i++)
+        series = real_fma(-squared * (real)(factors[i]), series, (real)(1));
+    return real_fma(-angle * squared * (real)(one / 6), series, angle);
+}
+
 #endif

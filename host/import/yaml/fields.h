@@ -54,7 +54,7 @@ typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode 
 
 // Alternative forms of a mapping, as bits; keys of different forms exclude each other.
 typedef unsigned Form;
-enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_ANY = 7 };
+enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_FOURTH = 8, FORM_ANY = 15 };
 
 enum { OPTIONAL = false, REQUIRED = true };
 

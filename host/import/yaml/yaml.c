@@ -8,6 +8,7 @@
 #include "host/scene/portable.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 // Turns a vector about a unit axis, counterclockwise seen from the axis' tip.
 static Vector3 vector_turned(Vector3 v, Vector3 axis, double degrees)
@@ -25,6 +26,13 @@ static bool read_pair(YamlReader *reader, const Field *field, const YamlNode *no
     return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
 }
 
+static bool read_projection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    *(bool *)target = true;
+    return (node->kind == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "equirectangular") == 0) ||
+           expected_report(reader, field->name, "equirectangular", node);
+}
+
 // Takes a distance or a point.
 static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
@@ -38,6 +46,7 @@ static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *n
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 {
+    enum { FORM_FLAT = FORM_FIRST | FORM_SECOND | FORM_THIRD }; // the image is part of a plane
     static const Field fields[] = {
         {"position", read_vector, offsetof(CameraFields, camera.position), FORM_ANY, REQUIRED, NULL},
         {"look_at", read_vector, offsetof(CameraFields, camera.look_at), FORM_ANY, REQUIRED, NULL},
@@ -47,10 +56,12 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
          &range_positive},
         {"frame", read_pair, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
         {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
-        {"shift", read_pair, offsetof(CameraFields, camera.shift), FORM_ANY, OPTIONAL, NULL},
+        {"projection", read_projection, offsetof(CameraFields, camera.equirectangular), FORM_FOURTH, REQUIRED,
+         NULL},
+        {"shift", read_pair, offsetof(CameraFields, camera.shift), FORM_FLAT, OPTIONAL, NULL},
         {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL, NULL},
-        {"aperture", read_number, offsetof(CameraFields, aperture), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"focus", read_focus, 0, FORM_ANY, OPTIONAL, NULL},
+        {"aperture", read_number, offsetof(CameraFields, aperture), FORM_FLAT, OPTIONAL, &range_not_negative},
+        {"focus", read_focus, 0, FORM_FLAT, OPTIONAL, NULL},
     };
     CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
     Form form;
@@ -76,6 +87,10 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
     if (form == FORM_THIRD) {
         camera->orthographic = true;
         camera->half_tangent = read.height / 2;
+    } else if (form == FORM_FOURTH) {
+        camera->field_axis = FIELD_HORIZONTAL;
+        camera->half_tangent = M_PI;
+        camera->frame_aspect = 2;
     } else if (form == FORM_FIRST) {
         camera->field_axis = FIELD_VERTICAL;
         camera->half_tangent = portable_tangent(read.fov_degrees * (M_PI / 360));
