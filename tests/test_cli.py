@@ -45,6 +45,7 @@ WRONG_COMMAND_LINES = [
     ("^--set:1:12: error: 'fov' must be a number, not '6O'$",
      "{render|trace --rays rays|check|bench|accuracy|certify} sphere.yaml --set camera.fov=6O"),
     ("s.rt: only values of YAML scenes", "{render|check} s.rt --set camera.fov=60"),
+    ("cannot read 'nowhere.yaml'", "{render|trace --rays rays|check|bench|accuracy|certify} sphere.yaml --camera nowhere.yaml"),
     ("--set: may be given at most 64 times", "check sphere.yaml" + 65 * " --set camera.fov=60"),
     ('--bits: .*"12"', "render sphere.yaml --bits 12"),
     ('--tone: .*"flimic".*did you mean filmic', "render sphere.yaml --tone flimic"),
@@ -349,6 +350,29 @@ class Images(CliTestCase):
         self.assertEqual(self.glint(f"{trace.format('sphere.yaml')} {options}").stdout, self.glint(trace.format("small.yaml")).stdout)
         bounds = "bounds +-0.5 -0.5 -0.5"
         self.assertRegex(self.glint(f"check sphere.yaml {options}").stdout, bounds)
+
+    def test_camera_of_another_scene(self):
+        """Its keys count, but not its objects and their warnings; the scene needs no camera, and --set changes the scene."""
+        camera, *others = SPHERE.splitlines(keepends=True)
+        moved = camera.replace("fov: 60", "fov: {keys: {0: 60, 2: 20}}")
+        self.assertNotEqual(moved, camera)
+        write("objects.yaml", "".join(others))
+        write("shot.yaml", moved)
+        write("whole.yaml", moved + "".join(others).replace("radius: 1", "radius: 0.5"))
+        process = self.glint(f"render objects.yaml --camera shot.yaml --set objects[0].sphere.radius=0.5 --frames 1 {SMALL} -o a%d.ppm")
+        self.assertNotIn("warning", process.stderr)
+        self.glint(f"render whole.yaml --frames 1 {SMALL} -o b%d.ppm")
+        self.assertSameBytes("a1.ppm", "b1.ppm")
+        write("bad.yaml", camera.replace("fov", "fow"))
+        self.refuses("render objects.yaml --camera bad.yaml", "^bad.yaml:1:[0-9]+: error: unknown camera key 'fow'")
+        self.refuses("render objects.yaml", "^objects.yaml:1:1: error: scene lacks 'camera'")
+        write("shot.ppm", "begin_scene\nresolution 80 60\ncamera zoom 1 aspectratio 1 antialiasing 0 raydepth 8\n"
+              "center 1 2 3 viewdir -1 -2 -3 updir 0 1 0\nend_camera\nend_scene\n")
+        self.glint(f"render sphere.yaml --camera shot.ppm {SMALL} -o c.ppm")
+        write("same.yaml", "camera: {position: [1, 2, -3], look_at: [0, 0, 0], focal_length: 1, frame: [1.3333333333333333, 1]}\n" + "".join(others))
+        self.glint(f"render same.yaml {SMALL} -o d.ppm")
+        self.assertSameBytes("c.ppm", "d.ppm")
+        self.refuses(f"render sphere.yaml --camera shot.ppm {SMALL} -o shot.ppm", "would overwrite 'shot.ppm'")
 
     def test_display(self):
         """The PNG has the curve's values of the linear image, and its notes name the options; a region has the same pattern."""

@@ -436,6 +436,23 @@ class View(TestCase):
         write("scene.cfg", "")
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
+    def test_camera_of_another_file(self):
+        """It is watched, and the camera is written into it."""
+        camera, *others = SCENE.splitlines(keepends=True)
+        write("scene.yaml", "".join(others))
+        write("shot.yaml", camera)
+        window = Window(self, options="--camera shot.yaml --write-camera")
+        window.shows_at_last(self.image_of(SCENE))
+        window.key("Left")
+        camera = window.camera()
+        window.line("^camera written to shot.yaml")
+        window.key("x")  # hides it
+        self.assertEqual(numbers(Path("shot.yaml").read_text(), "position"), numbers(camera, "position"))
+        moved = SCENE.replace("-4]", "-5]")
+        write("shot.yaml", moved)
+        window.shows_at_last(self.image_of(moved))
+        window.close()
+
     @staticmethod
     def failing_calls():
         return shim_build("calls.so", FAILING_CALLS, "-ldl")

@@ -27,7 +27,7 @@ static const struct option long_options[] = {
     {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
     FORMAT_LONG_OPTIONS,
     COMMON_LONG_OPTIONS,
-    SET_LONG_OPTION,
+    SET_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     REFERENCE_LONG_OPTION,
     {"help", no_argument, NULL, 'h'},

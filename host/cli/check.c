@@ -22,7 +22,7 @@ static const struct option long_options[] = {
     {"json", no_argument, NULL, OPTION_JSON},
     {"object", required_argument, NULL, OPTION_OBJECT},
     {"lenient", no_argument, NULL, OPTION_LENIENT},
-    SET_LONG_OPTION,
+    SET_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
 };

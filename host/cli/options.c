@@ -235,6 +235,9 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
     case OPTION_SET:
         *valid = override_add(common, value);
         return true;
+    case OPTION_CAMERA:
+        common->camera = value;
+        return true;
     case OPTION_MAX_PIXELS:
         *valid = option_max_pixels(value);
         return true;
@@ -298,6 +301,7 @@ SceneOptions scene_options_of(const CommonOptions *common)
                           .override_name = "--set",
                           .override_count = common->override_count,
                           .frame = common->frame,
+                          .camera = common->camera,
                           .stage = common->stage};
 }
 

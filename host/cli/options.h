@@ -26,8 +26,9 @@ typedef struct {
     const char *kernel_folder;            // NULL if not given
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
-    double frame; // of an animated scene
-    Stage *stage; // records what takes time; may be NULL
+    const char *camera; // the scene of --camera, NULL if not given
+    double frame;       // of an animated scene
+    Stage *stage;       // records what takes time; may be NULL
 } CommonOptions;
 
 // getopt_long values of long options. A command's other options start at OPTION_OWN.
@@ -39,6 +40,7 @@ enum {
     OPTION_NO_CACHE,
     OPTION_LENIENT,
     OPTION_SET,
+    OPTION_CAMERA,
     OPTION_MAX_PIXELS,
     OPTION_PERTURB,
     OPTION_REFERENCE_DEVICE,
@@ -58,10 +60,11 @@ enum {
         "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
     }
 
-// The option of commands whose scenes' values can be set.
-#define SET_LONG_OPTION                                                                                      \
+// The options of commands whose scenes' values can be set.
+#define SET_LONG_OPTIONS                                                                                     \
+    {"set", required_argument, NULL, OPTION_SET},                                                            \
     {                                                                                                        \
-        "set", required_argument, NULL, OPTION_SET                                                           \
+        "camera", required_argument, NULL, OPTION_CAMERA                                                     \
     }
 
 // The option of commands that render or trace.
@@ -98,8 +101,7 @@ enum {
     "                        or gpu, with commas between (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
 #define HELP_LANES                                                                                           \
     "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)\n"
-#define HELP_BOUNCES                                                                                         \
-    "      --bounces N       reflections and refractions of a ray: at most N, up to 255 (default: 5)\n"
+#define HELP_BOUNCES "      --bounces N       reflections and refractions of a ray, up to 255 (default: 5)\n"
 #define HELP_MIN_CONTRIBUTION                                                                                \
     "      --min-contribution W\n"                                                                           \
     "                        trace no reflected or refracted ray whose weight in its pixel is below W,\n"    \
@@ -107,7 +109,8 @@ enum {
 #define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
 #define HELP_LENIENT  "      --lenient         read dialects of .rt files\n"
 #define HELP_SET                                                                                             \
-    "      --set PATH=VALUE  set a value of YAML scenes, such as camera.fov=60; may be repeated\n"
+    "      --set PATH=VALUE  set a value in YAML, such as camera.fov=60; repeatable\n"                       \
+    "      --camera FILE     a scene whose camera is used\n"
 #define HELP_MAX_PIXELS "      --max-pixels N    of an image that is read (default: 134217728)\n"
 #define HELP_PERTURB                                                                                         \
     "      --perturb SEED[:SCALE]\n"                                                                         \

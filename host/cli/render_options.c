@@ -50,7 +50,7 @@ static const struct option long_options[] = {
     {"format", required_argument, NULL, OPTION_FORMAT},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
-    SET_LONG_OPTION,
+    SET_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     DRIVER_LONG_OPTIONS,
     REFERENCE_LONG_OPTION,

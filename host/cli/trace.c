@@ -21,7 +21,7 @@ static const struct option long_options[] = {
     {"rays", required_argument, NULL, OPTION_RAYS},
     {"output", required_argument, NULL, 'o'},
     COMMON_LONG_OPTIONS,
-    SET_LONG_OPTION,
+    SET_LONG_OPTIONS,
     PERTURB_LONG_OPTION,
     DRIVER_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},

@@ -39,7 +39,7 @@ enum {
         {"device", required_argument, NULL, OPTION_DEVICE},                                                  \
         {"reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE},                              \
         {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
-        {"lenient", no_argument, NULL, OPTION_LENIENT}, SET_LONG_OPTION
+        {"lenient", no_argument, NULL, OPTION_LENIENT}, SET_LONG_OPTIONS
 
 // The help of these options except --precision, whose default differs.
 #define HELP_VARIANTS                                                                                        \

@@ -27,7 +27,7 @@ static const struct option long_options[] = {
     {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
     {"write-camera", no_argument, NULL, OPTION_WRITE_CAMERA},
     COMMON_LONG_OPTIONS,
-    SET_LONG_OPTION,
+    SET_LONG_OPTIONS,
     {"help", no_argument, NULL, 'h'},
     {0},
 };
@@ -37,7 +37,7 @@ static const char help_text[] =
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel, once the camera rests (default: 16)\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION
-    "      --write-camera    C writes the camera into the scene file, which is YAML\n" //
+    "      --write-camera    C writes the camera into its file, which is YAML\n" //
     HELP_SET HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
 
 typedef struct {
@@ -92,12 +92,13 @@ static int options_read(ViewOptions *options, int argument_count, char **argumen
     }
     if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
-    if (options->writes_camera && strcmp(options->scene, "-") == 0) {
+    const char *camera = options->common.camera ? options->common.camera : options->scene;
+    if (options->writes_camera && strcmp(camera, "-") == 0) {
         fprintf(stderr, "glint: --write-camera: standard input cannot be written; name a YAML file\n");
         return EXIT_USER;
     }
-    if (options->writes_camera && !scene_is_yaml(options->scene)) {
-        fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", options->scene);
+    if (options->writes_camera && !scene_is_yaml(camera)) {
+        fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", camera);
         return EXIT_USER;
     }
     return OPTIONS_READ;

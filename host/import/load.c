@@ -1,7 +1,9 @@
 #include "host/import/load.h"
 
+#include "host/base/array.h"
 #include "host/base/file.h"
 #include "host/base/hash.h"
+#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/import/mesh/mesh_import.h"
 #include "host/import/textures.h"
@@ -72,7 +74,7 @@ bool scene_is_known(const char *path)
     return has_scene_ending(path) || mesh_is_known(path);
 }
 
-bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+static bool file_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
 {
     *scene = (Scene){0};
     const bool is_known = has_scene_ending(path);
@@ -102,4 +104,38 @@ bool scene_load(Scene *scene, const char *path, const SceneOptions *options, Mes
     }
     text_free(&text);
     return read;
+}
+
+// Replaces the camera by that of another scene. That scene's file counts as included. Its warnings, which are
+// not about what is rendered, are left out.
+static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *messages)
+{
+    SceneOptions own = *options;
+    own.camera = NULL;
+    own.override_count = 0;
+    if (own.file_named) own.file_named(own.context, options->camera);
+    Scene other;
+    MessageList found = {0};
+    const bool is_read = file_load(&other, options->camera, &own, &found);
+    if (is_read) {
+        scene->camera = other.camera;
+        scene->is_animated |= other.is_animated;
+        scene->frame = options->frame;
+        scene->text_hash = hash_bytes(scene->text_hash, &other.text_hash, sizeof other.text_hash);
+        const IncludedFile file = {memory_copy_text(options->camera), other.text_hash};
+        array_push(scene->included, file);
+        scene_free(&other);
+    } else {
+        message_list_move(messages, &found);
+    }
+    message_list_free(&found);
+    return is_read;
+}
+
+bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
+{
+    if (!file_load(scene, path, options, messages)) return false;
+    if (!options->camera || camera_load(scene, options, messages)) return true;
+    scene_free(scene);
+    return false;
 }

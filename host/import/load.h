@@ -13,6 +13,7 @@ typedef struct {
     size_t override_count;
     const char *override_name; // of their source in messages
     double frame;              // of an animated YAML scene
+    const char *camera;        // the path of another scene, whose camera replaces the scene's; NULL: none
     // Called with each mesh, image and scene that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);
     void *context;
@@ -28,7 +29,8 @@ bool scene_is_known(const char *path);
 bool scene_is_yaml(const char *path);
 
 // Reads a scene. Its ending gives the format (.yaml .yml .json .rt .cfg .nff .dat, or one of a mesh), or its
-// first word that of .dat. On a mistake in the file returns false with errors in `messages` and an empty
+// first word that of .dat. On a mistake in the file or in that of the camera, which is read without the
+// overrides, returns false with errors in `messages` and an empty
 // scene. Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 

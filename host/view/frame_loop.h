@@ -24,6 +24,12 @@ typedef struct {
     void *save_context;
 } FrameLoopOptions;
 
+// Returns the path of the file that has the camera.
+static inline const char *camera_path(const FrameLoopOptions *options)
+{
+    return options->scene_options.camera ? options->scene_options.camera : options->scene_path;
+}
+
 typedef struct {
     unsigned number; // of the request
     uint32_t width, height;

@@ -42,7 +42,7 @@ bool is_own_write(FrameLoop *loop)
     pthread_mutex_unlock(&loop->mutex);
     Text text = {0};
     MessageList messages = {0};
-    bool same = written.count > 0 && text_read_file(&text, loop->options.scene_path, &messages) &&
+    bool same = written.count > 0 && text_read_file(&text, camera_path(&loop->options), &messages) &&
                 text.count == written.count && memcmp(text.items, written.items, text.count) == 0;
     message_list_free(&messages);
     text_free(&text);
@@ -80,7 +80,7 @@ bool scene_reload(FrameLoop *loop)
 
 bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages)
 {
-    const char *path = loop->options.scene_path;
+    const char *path = camera_path(&loop->options);
     Text old = {0}, text = {0};
     if (!text_read_file(&old, path, messages)) return false;
     const Source source = {.file = path, .bytes = text_c(&old), .length = old.count};

@@ -26,7 +26,7 @@ static void camera_write(Window *window)
     if (!stream) return;
     if (frame_loop_write_camera(window->frames, &window->camera, &messages)) {
         window->file_camera = window->camera;
-        fprintf(stream, "camera written to %s\n", window->options->frames.scene_path);
+        fprintf(stream, "camera written to %s\n", camera_path(&window->options->frames));
     }
     message_list_print(&messages, stream);
     message_list_free(&messages);

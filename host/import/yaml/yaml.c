@@ -178,7 +178,7 @@ static void document_read(YamlReader *reader)
 {
     static const Field fields[] = {
         {"include", read_include, 0, FORM_ANY, OPTIONAL, NULL},
-        {"camera", read_node, offsetof(Document, camera), FORM_ANY, REQUIRED, NULL},
+        {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL, NULL},
         {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
         {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
         {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
@@ -187,9 +187,13 @@ static void document_read(YamlReader *reader)
         {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL, NULL},
     };
     Document document = {.ambient = vector_all(NAN)};
-    fields_read(reader, reader->tree.nodes.items, "scene", fields, COUNT_OF(fields), &document, NULL);
+    const YamlNode *root = reader->tree.nodes.items;
+    fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document, NULL);
     scene_set_background(reader->scene, &document.background, document.ambient);
-    if (document.camera) yaml_read_camera(reader, document.camera);
+    if (document.camera)
+        yaml_read_camera(reader, document.camera);
+    else if (!reader->options->camera && root->kind == YAML_MAPPING)
+        report_error(&reader->report, root->offset, "scene lacks 'camera'");
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them
         yaml_read_materials(reader, document.materials);
