@@ -57,6 +57,20 @@ class Frames(TestCase):
         self.assertSameBytes("f00.npy", "f12.npy")
         self.assertNotEqual(npy_read("f00.npy"), npy_read("f01.npy"))
 
+    def test_all(self):
+        """The scene, or else that of --camera, has the number of frames."""
+        moving = SCENE.format(**KEYS)
+        write("moving.yaml", f"frames: 3\n{moving}")
+        write("still.yaml", SPHERE)
+        for options, count in ("moving.yaml --frames all", 3), ("still.yaml --camera moving.yaml --frames all", 3), \
+                ("moving.yaml --set frames=2 --frames all", 2), ("moving.yaml --frames all --frames 1", 1):
+            with self.subTest(options):
+                self.glint(f"render {options} {RENDER} -o all%d.ppm")
+                names = sorted(Path().glob("all*.ppm"))
+                self.assertEqual(len(names), count)
+                for name in names:
+                    name.unlink()
+
     def test_names(self):
         write("moving.yaml", SCENE.format(**KEYS))
         os.makedirs("a%d", exist_ok=True)
@@ -132,10 +146,12 @@ class Frames(TestCase):
             "--frames 0-3 -o %d/a.png": "or have a place for the number",
             "--frames 0-3 -o %5d.png": "or have a place for the number",
             "--frames 0-3 -o %d-%02d.png": "more than one place",
-            "--frames 3-2": "--frames: expected A or A-B",
-            "--frames -1": "--frames: expected A or A-B",
-            "--frames 1x": "--frames: expected A or A-B",
-            "--frames 0-1000000": "--frames: expected A or A-B",
+            "--frames 3-2": "--frames: expected A, A-B or all",
+            "--frames -1": "--frames: expected A, A-B or all",
+            "--frames 1x": "--frames: expected A, A-B or all",
+            "--frames 0-1000000": "--frames: expected A, A-B or all",
+            "--frames all": "--frames all: 'moving.yaml' has no 'frames'; name them, such as 0-47",
+            "--frames all -o a.png": "or have a place for the number",
             "--frames 0-3 still.yaml": "--frames takes one scene",
             "--frames 0-3 --checkpoint c": "--checkpoint takes one frame; --skip-existing",
             "--frames 0-3 --timing=json": "--timing=json and =trace take one frame",

@@ -85,7 +85,7 @@ static const char help_text[] =
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command resumes where an earlier one ended\n"
-                    "      --frames A[-B]    render these frames of an animation; -o has %d or %04d for the "
+                    "      --frames A-B|all  render these frames of an animation; -o has %d or %04d for the "
                     "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
@@ -112,8 +112,6 @@ static bool region_read(const char *value, uint32_t region[4])
     return false;
 }
 
-enum { FRAMES_MAX = 1000000 };
-
 // Reads a frame's number and moves behind it.
 static bool frame_read(const char **at, uint32_t *frame)
 {
@@ -127,6 +125,9 @@ static bool frame_read(const char **at, uint32_t *frame)
 
 static bool frames_read(const char *value, RenderOptions *options)
 {
+    options->has_all_frames = strcmp(value, "all") == 0;
+    options->frame_count = 1; // until the scene is read
+    if (options->has_all_frames) return true;
     const char *at = value;
     bool is_valid = frame_read(&at, &options->first_frame);
     uint32_t last = options->first_frame;
@@ -136,7 +137,7 @@ static bool frames_read(const char *value, RenderOptions *options)
     }
     options->frame_count = last - options->first_frame + 1;
     if (is_valid && *at == '\0' && last >= options->first_frame) return true;
-    fprintf(stderr, "glint: --frames: expected A or A-B with 0 <= A <= B < %d, not \"%s\"\n", FRAMES_MAX,
+    fprintf(stderr, "glint: --frames: expected A, A-B or all with 0 <= A <= B < %d, not \"%s\"\n", FRAMES_MAX,
             value);
     return false;
 }
@@ -307,6 +308,25 @@ static bool several_fit(const RenderOptions *options)
     return false;
 }
 
+// Sets the number of frames to that of the scene. Returns false with a message if it has none.
+static bool frames_count(RenderOptions *options)
+{
+    Scene scene;
+    MessageList messages = {0};
+    const char *path = options->scenes[0];
+    const SceneOptions scene_options = scene_options_of(&options->common);
+    const bool is_read = scene_load(&scene, path, &scene_options, &messages);
+    if (is_read) {
+        message_list_free(&messages); // the warnings, which the first frame's scene repeats
+        options->frame_count = scene.frame_count;
+        if (scene.frame_count == 0)
+            message_error(&messages, "--frames all: '%s' has no 'frames'; name them, such as 0-47", path);
+        scene_free(&scene);
+    }
+    messages_print(&messages, path);
+    return is_read && options->frame_count > 0;
+}
+
 int render_options_read(RenderOptions *options, int argument_count, char **arguments)
 {
     *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
@@ -332,8 +352,9 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
                                   "--skip-existing may leave --timing=json or =trace nothing to report");
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
-    const bool is_one = options->scene_count == 1 && options->frame_count <= 1;
-    return is_one || several_fit(options) ? OPTIONS_READ : EXIT_USER;
+    const bool is_one = options->scene_count == 1 && options->frame_count <= 1 && !options->has_all_frames;
+    if (!is_one && !several_fit(options)) return EXIT_USER;
+    return !options->has_all_frames || frames_count(options) ? OPTIONS_READ : EXIT_USER;
 }
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)

@@ -17,7 +17,7 @@ typedef struct {
     double min_contribution;
     uint32_t region[4];                // x, y, width, height
     uint32_t first_frame, frame_count; // of an animation; a count of 0 if not given
-    bool has_region, has_transfer, has_format, quiet, skips_existing;
+    bool has_all_frames, has_region, has_transfer, has_format, quiet, skips_existing;
     ErrorBudget budget; // a limit of 0 means none
     TimingStyle timing;
 } RenderOptions;

@@ -273,9 +273,10 @@ typedef struct {
         IncludedFile *items;
         size_t count, capacity;
     } included;
-    Source *overrides; // what replaced values of the file, PATH=VALUE each, in order; NULL if none
-    bool is_animated;  // values depend on the frame
-    double frame;      // that the options named
+    Source *overrides;    // what replaced values of the file, PATH=VALUE each, in order; NULL if none
+    bool is_animated;     // values depend on the frame
+    uint32_t frame_count; // of the animation; 0: not given
+    double frame;         // that the options named
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;
@@ -327,6 +328,8 @@ Color tint_factors(Color tint);
 // Makes a material pass the fraction 1 - opacity of the light from behind, unbent, and dims what the surface
 // itself shows by the opacity.
 void material_set_opacity(Material *material, double opacity);
+
+enum { FRAMES_MAX = 1000000 };
 
 enum { IMAGE_SIDE_MAX = 1 << 20 }; // in pixels
 

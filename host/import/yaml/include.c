@@ -29,17 +29,17 @@ typedef struct {
 
 // The keys of a scene that an included file may have. Collections are joined; other values count only where
 // the scene has none.
-enum { SECTION_COUNT = 7 };
+enum { SECTION_COUNT = 8 };
 static const struct {
     const char *name;
     bool is_joined;
     YamlKind kind;
     const char *must; // be
 } sections[SECTION_COUNT] = {
-    {"camera", false, YAML_MAPPING, NULL},          {"background", false, YAML_MAPPING, NULL},
-    {"ambient", false, YAML_SCALAR, NULL},          {"lights", true, YAML_SEQUENCE, "a list"},
-    {"materials", true, YAML_MAPPING, "a mapping"}, {"define", true, YAML_MAPPING, "a mapping"},
-    {"objects", true, YAML_SEQUENCE, "a list"},
+    {"camera", false, YAML_MAPPING, NULL},       {"background", false, YAML_MAPPING, NULL},
+    {"frames", false, YAML_SCALAR, NULL},        {"ambient", false, YAML_SCALAR, NULL},
+    {"lights", true, YAML_SEQUENCE, "a list"},   {"materials", true, YAML_MAPPING, "a mapping"},
+    {"define", true, YAML_MAPPING, "a mapping"}, {"objects", true, YAML_SEQUENCE, "a list"},
 };
 
 // A mapping to which files are added.

@@ -168,17 +168,29 @@ static bool read_include(YamlReader *reader, const Field *field, const YamlNode 
                         "'%s' cannot be set: files are included before values are set", field->name);
 }
 
+static bool read_frames(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    double count;
+    if (!read_number(reader, field, node, &count)) return false;
+    if (count != floor(count)) return expected_report(reader, field->name, "a whole number", node);
+    *(uint32_t *)target = (uint32_t)count;
+    return true;
+}
+
 typedef struct {
     Background background;
     Color ambient;
+    uint32_t frame_count;
     const YamlNode *camera, *lights, *materials, *definitions, *objects;
 } Document;
 
 static void document_read(YamlReader *reader)
 {
+    static const Range range_frames = {1, FRAMES_MAX, false, "from 1 to 1000000"};
     static const Field fields[] = {
         {"include", read_include, 0, FORM_ANY, OPTIONAL, NULL},
         {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL, NULL},
+        {"frames", read_frames, offsetof(Document, frame_count), FORM_ANY, OPTIONAL, &range_frames},
         {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
         {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
         {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
@@ -189,6 +201,7 @@ static void document_read(YamlReader *reader)
     Document document = {.ambient = vector_all(NAN)};
     const YamlNode *root = reader->tree.nodes.items;
     fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document, NULL);
+    reader->scene->frame_count = document.frame_count;
     scene_set_background(reader->scene, &document.background, document.ambient);
     if (document.camera)
         yaml_read_camera(reader, document.camera);
