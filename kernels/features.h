@@ -28,7 +28,8 @@
     FEATURE(CONDUCTORS, )         \
     FEATURE(ABSORPTION, )         \
     FEATURE(EYE_POWERS, )         \
-    FEATURE(BVH, )
+    FEATURE(BVH, )                \
+    FEATURE(SMOOTH_NORMALS, )
 // clang-format on
 
 #endif

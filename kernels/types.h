@@ -96,7 +96,7 @@ typedef struct {
 
 // Separate from Triangle, because every intersection test reads that, but only the closest hit reads these.
 typedef struct {
-    scalar4 a, b, c; // unit
+    scalar4 a, b, c; // unit; w of a: 1 if all are on one side of the triangle, else 0
 } TriangleNormals;
 
 // At `certified`, the neighbors of a triangle: the ids of the triangles across the edges opposite a, b and c,

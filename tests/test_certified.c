@@ -9,6 +9,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
+#include "host/scene/mesh.h"
 #include "host/verify/certify.h"
 #include "host/verify/verify.h"
 #include "tests/film.h"
@@ -284,9 +285,9 @@ static const FeatureSet family_features[FAMILY_COUNT] = {
 // would take half as long again.
 #define COMMON_FEATURES                                                                                      \
     (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_BOXES | FEATURE_CYLINDERS | FEATURE_CONES |  \
-     FEATURE_TRIANGLES | FEATURE_TORI | FEATURE_PARABOLOIDS | FEATURE_POINT_LIGHTS |                         \
-     FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION | FEATURE_TRANSMISSION |             \
-     FEATURE_EYE_POWERS | FEATURE_BVH)
+     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS |                       \
+     FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION |             \
+     FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
 
 // Returns the features that are built in whether a scene needs them or not.
 static FeatureSet extra_features(void)
@@ -720,6 +721,35 @@ static void needles_have_an_area(void **state)
     }
 }
 
+// Bumps and hollows with smooth normals, lit from low and from behind: rays to lights start above some of
+// their triangles and pass over their edges.
+static void smooth_meshes_are_decided(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    size_t undecided = 0;
+    const unsigned count = tests_are_long() ? 300 : 12;
+    for (unsigned seed = 0; seed < count; seed++) {
+        random_state.state = seed;
+        Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.4);
+        Mesh mesh = mesh_in_view();
+        for (size_t i = 0; i < mesh.vertex_count; i++)
+            mesh.vertices[i] =
+                vector_add((Vector3){0, 0, random_between(&random_state, -0.3, 0.3)},
+                           vector_scale(vector_subtract(mesh.vertices[i], eye), seed % 4 ? 0.8 : 1));
+        mesh_make_normals(&mesh);
+        array_push(scene.meshes, mesh);
+        array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+        point_light_add(&scene, vector_scale(random_unit_vector(&random_state), 4), 1);
+        array_push(scene.lights, ((Light){.kind = LIGHT_DIRECTIONAL,
+                                          .color = {0.5, 0.5, 0.5},
+                                          .direction = {random_between(&random_state, -1, 1), 1, 0.3}}));
+        undecided += check_small(&scene, 0, "a smooth mesh", seed);
+    }
+    print_message("%zu pixels undecided of %u\n", undecided, count * SMALL_SIDE * SMALL_SIDE);
+    assert_true(undecided * 200 < count * SMALL_SIDE * SMALL_SIDE);
+}
+
 // A shape of a size, in front of the eye.
 static Object shape_of_size(unsigned form, double size)
 {
@@ -782,7 +812,7 @@ int main(int argc, char **argv)
         cmocka_unit_test(checkers_far_out_are_decided), cmocka_unit_test(faint_paths_are_decided),
         cmocka_unit_test(skimming_rays_are_decided),    cmocka_unit_test(horizons_are_decided),
         cmocka_unit_test(thin_walls_are_decided),       cmocka_unit_test(needles_have_an_area),
-        cmocka_unit_test(mixed_sizes_are_decided)};
+        cmocka_unit_test(mixed_sizes_are_decided),      cmocka_unit_test(smooth_meshes_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, painters_close);
 }

@@ -1,5 +1,7 @@
 // Shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
 // run_tests: sanitize-long-only
+#include "host/base/array.h"
+#include "host/base/memory.h"
 #include "host/verify/reference_color.h"
 #include "tests/film.h"
 #include "tests/probe.h"
@@ -8,6 +10,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -67,6 +70,58 @@ static void darkens_an_eclipse_in_meters(void **state)
         film_free(&film);
     }
     scene_free(&scene);
+}
+
+// Returns a ball of 12 x 8 quadrilaterals with the normals of a sphere.
+static Mesh coarse_ball(void)
+{
+    enum { ROUND = 12, HIGH = 8 };
+    const double pi = 3.14159265358979323846;
+    Mesh mesh = {.vertices = memory_allocate(ROUND * (HIGH + 1), sizeof *mesh.vertices),
+                 .normals = memory_allocate(ROUND * (HIGH + 1), sizeof *mesh.normals),
+                 .triangles = memory_allocate(2 * ROUND * HIGH, sizeof *mesh.triangles)};
+    for (uint32_t row = 0; row <= HIGH; row++)
+        for (uint32_t column = 0; column < ROUND; column++) {
+            const double down = pi * row / HIGH, round = 2 * pi * column / ROUND;
+            const Vector3 at = {sin(down) * cos(round), cos(down), sin(down) * sin(round)};
+            mesh.normals[mesh.vertex_count] = mesh.vertices[mesh.vertex_count] = at;
+            const uint32_t here = (uint32_t)mesh.vertex_count++, next = row * ROUND + (column + 1) % ROUND;
+            if (row == 0) continue;
+            const uint32_t parts[2][3] = {{here, here - ROUND, next}, {next, here - ROUND, next - ROUND}};
+            memcpy(mesh.triangles[mesh.triangle_count], parts, sizeof parts);
+            mesh.triangle_count += 2;
+        }
+    return mesh;
+}
+
+// The flat triangles of a smooth ball do not shade it where its normals face the light. Only a small ball
+// near it does.
+static void smooth_meshes_do_not_shade_themselves(void **state)
+{
+    (void)state;
+    for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
+        Scene scene =
+            scene_of_text("ball.yaml", "camera: {position: [0, 0.6, 4.2], look_at: [0, 0, 0], fov: 32}\n"
+                                       "lights: [{directional: {direction: [-1, -0.25, 0.15]}}]\n"
+                                       "objects: [{sphere: {center: [1.5, 0.5, 0], radius: 0.35}}]\n");
+        array_push(scene.meshes, coarse_ball());
+        array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+        const RenderSettings settings = film_settings(160, 120, precision);
+        Film film = film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_SHADOW | AOV_OBJECT);
+        const Vector3 to_light = vector_normalize((Vector3){1, 0.25, -0.15});
+        size_t lit = 0, dark = 0;
+        for (size_t i = 0; i < (size_t)film.width * film.height; i++) {
+            if (film.object[i] == UINT32_MAX || film.object[i] == 0) continue;
+            const Vector3 normal = {film.normal[3 * i], film.normal[3 * i + 1], film.normal[3 * i + 2]};
+            if (vector_dot(normal, to_light) < 1e-4) continue;
+            lit += film.shadow[i] == 0;
+            dark += film.shadow[i] != 0;
+        }
+        assert_in_range(lit, 2000, 5000);
+        assert_in_range(dark, 20, 100); // by the small ball
+        film_free(&film);
+        scene_free(&scene);
+    }
 }
 
 // What the grounds below need. A kernel with injected errors and every feature takes four times as long to
@@ -173,6 +228,7 @@ int main(void)
         cmocka_unit_test(keeps_small_shadows_on_huge_ground),
         cmocka_unit_test(takes_a_veils_light_once),
         cmocka_unit_test(darkens_an_eclipse_in_meters),
+        cmocka_unit_test(smooth_meshes_do_not_shade_themselves),
     };
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -124,6 +124,10 @@ static const struct {
      SCENE_HEAD "objects: [{cone: {from: [-1, 0, 0], to: [1, 1, 0.3], radius: [0.7, 0.1]}}]\n"},
     {FEATURE_TRIANGLES,
      SCENE_HEAD "objects: [{triangle: {vertices: [[-1, 0, 0], [1, 0.2, 0], [0, 1.5, 0.4]]}}]\n"},
+    {FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_DIRECTIONAL_LIGHTS,
+     SCENE_HEAD "lights: [{directional: {direction: [2, -1, 0.6]}}]\n"
+                "objects: [{triangle: {vertices: [[-1, 0, 0], [1, 0.2, 0], [0, 1.5, 0.4]],\n"
+                "  normals: [[-1, -0.5, -1], [1, -0.5, -1], [0, 1, -1]]}}]\n"},
     {FEATURE_TORI,
      SCENE_HEAD "objects: [{torus: {center: [0, 0.5, 0], axis: [0.3, 1, 0.2], major: 1, minor: 0.4}}]\n"},
     {FEATURE_PARABOLOIDS, SCENE_HEAD

@@ -65,8 +65,11 @@ FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *
 FeatureSet features_of(const Scene *scene)
 {
     FeatureSet set = materials_union(scene, material_features);
-    for (size_t i = 0; i < scene->objects.count; i++)
-        set |= shape_features[shape_ops[scene->objects.items[i].kind]->kind];
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        set |= shape_features[shape_ops[object->kind]->kind];
+        if (object_is_smooth(scene, object)) set |= FEATURE_SMOOTH_NORMALS;
+    }
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         set |= light_features[light->kind];

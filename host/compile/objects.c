@@ -53,9 +53,7 @@ static void arrays_make(CompiledScene *compiled, const Scene *scene)
             continue;
         }
         counts[shape_ops[object->kind]->kind] += count;
-        bool smooth =
-            mesh ? mesh->normals != NULL : object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth;
-        if (smooth) normals_count += count;
+        if (object_is_smooth(scene, object)) normals_count += count;
         if (mesh && mesh->uvs && scene->textures.count > 0) uvs_count += count;
     }
     for (size_t kind = 0; kind < KIND_COUNT; kind++)

@@ -172,6 +172,12 @@ size_t scene_primitive_count(const Scene *scene)
     return count;
 }
 
+bool object_is_smooth(const Scene *scene, const Object *object)
+{
+    if (object->kind == SHAPE_MESH) return scene->meshes.items[object->as.mesh.index].normals != NULL;
+    return object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth;
+}
+
 void scene_free(Scene *scene)
 {
     for (size_t i = 0; i < scene->material_names.count; i++)

@@ -340,3 +340,5 @@ void scene_choose_image_size(const Scene *scene, uint32_t *width, uint32_t *heig
 // Returns how many ids an object takes: one for each triangle of a mesh, otherwise one.
 size_t object_primitive_count(const Scene *scene, const Object *object);
 size_t scene_primitive_count(const Scene *scene);
+// Returns whether an object consists of triangles with the normals of vertices.
+bool object_is_smooth(const Scene *scene, const Object *object);

@@ -36,6 +36,8 @@ typedef struct {
     Quad3 point, normal, geometric, to_eye;
     Quad scale; // how far the point is from the ray's origin
     Quad start; // the surface is at most this far from the point
+    Quad3 lift; // from the point to the start of rays to lights
+    bool is_lifted;
     bool entering;
     uint32_t index; // of the object
     const Object *object;
@@ -87,6 +89,36 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
     return x * x * (3 - 2 * x);
 }
 
+// Sets the start of rays to lights above a smooth triangle whose normals are all on one side: it is moved, by
+// each vertex's weight, along its normal up to its tangent plane (kernels/shapes/triangle.h).
+static void surface_lift(Surface *surface)
+{
+    const Object *object = surface->object;
+    if (object->kind != SHAPE_TRIANGLE || !object->as.triangle.smooth) return;
+    Quad3 vertices[3], normals[3];
+    bool agrees = true;
+    for (int i = 0; i < 3; i++) {
+        vertices[i] = quad3(object->as.triangle.vertices[i]);
+        normals[i] = quad3_unit(quad3(object->as.triangle.normals[i]));
+    }
+    if (quad3_dot(normals[0], surface->geometric) < 0)
+        for (int i = 0; i < 3; i++)
+            normals[i] = quad3_scale(normals[i], -1);
+    const Quad3 across =
+        quad3_cross(quad3_subtract(vertices[1], vertices[0]), quad3_subtract(vertices[2], vertices[0]));
+    const Quad squared = quad3_dot(across, across);
+    for (int i = 0; i < 3; i++) {
+        const Quad3 next = vertices[(i + 1) % 3], last = vertices[(i + 2) % 3];
+        const Quad3 part = quad3_cross(quad3_subtract(last, next), quad3_subtract(surface->point, next));
+        const Quad weight = quad3_dot(across, part) / squared;
+        const Quad height = quad3_dot(quad3_subtract(vertices[i], surface->point), normals[i]);
+        agrees = agrees && quad3_dot(normals[i], surface->geometric) > 0;
+        if (height > 0) surface->lift = quad3_add(surface->lift, quad3_scale(normals[i], weight * height));
+    }
+    surface->is_lifted = agrees;
+    if (!agrees) surface->lift = (Quad3){0, 0, 0};
+}
+
 // Returns whether the light reaches the surface.
 static bool add_light(const ReferenceScene *world, const Light *light, const Surface *surface,
                       ReferenceColor *sum)
@@ -102,18 +134,29 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sur
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
     if (facing <= 0) return false;
 
-    Quad start = surface->start / quad3_length(to_light_unnormalized);
-    ReferenceRay shadow = {surface->point, to_light_unnormalized, start, directional ? (Quad)LDBL_MAX : 1};
+    const Quad3 way =
+        directional ? to_light_unnormalized : quad3_subtract(to_light_unnormalized, surface->lift);
+    const Quad start = surface->start / quad3_length(way);
+    ReferenceRay shadow = {quad3_add(surface->point, surface->lift), way, start,
+                           directional ? (Quad)LDBL_MAX : 1};
     Quad strength =
         light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
     if (light_fades(light)) {
         const Quad distance = quad3_length(to_light_unnormalized);
         strength /= light->fading[0] + distance * (light->fading[1] + distance * light->fading[2]);
     }
-    // a light before the shading normal but behind the surface
-    const Quad height = quad3_dot(surface->geometric, to_light);
+    // a light before the shading normal but behind the surface, unless the lifted ray passes over its rim
+    const Quad height = quad3_dot(surface->geometric, quad3_unit(way));
     sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(height) * surface->scale));
-    Color passed = height <= 0 ? material_passing(material) : vector_all(1);
+    bool sinks = height <= 0;
+    if (sinks && surface->is_lifted) {
+        ReferenceRay whole = shadow;
+        whole.tmin = -start;
+        const ReferenceHit own = reference_hit_object(surface->object, &whole);
+        sum->margin = fmin(sum->margin, (double)own.margin);
+        sinks = own.found;
+    }
+    Color passed = sinks ? material_passing(material) : vector_all(1);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Material *medium = &scene->materials.items[object->material];
@@ -174,6 +217,7 @@ static Surface surface_at(const ReferenceScene *world, const ReferenceRay *ray, 
         surface.normal = quad3_unit(quad3_add(surface.normal, random_offset(random, blur)));
         surface.start += blur * size;
     }
+    surface_lift(&surface);
     if (material->checker) surface.base = checker_color(object, material, hit, surface.point, &hit->margin);
     return surface;
 }

@@ -60,7 +60,7 @@ static inline LightRay light_ray(const Light *light, uint index, const Surface *
 {
     bool has_area = HAS_AREA_LIGHTS && light->kind.y != LIGHT_AREA_NONE;
     LightRay to_light;
-    Vector start = secondary_ray_origin(surface, false);
+    Vector start = shadow_ray_origin(surface);
     to_light.strength = to_light.fading = (real)(1);
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
@@ -186,19 +186,27 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     Ray *shadow_ray = &to_light->shadow_ray;
     const real zero = (real)(0);
     real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
+    if (HAS_SMOOTH_NORMALS) place_error = place_error + surface->lift_error;
     real brightest = (real)(light->color.w), strength_error = zero;
     mask far_off = mask_none(), skips_culling = far_off;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
         // without another root: a unit vector is off by 14.5 u, a dot product by 3 u
-        shadow_ray->length =
-            vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
+        if (!HAS_SMOOTH_NORMALS)
+            shadow_ray->length =
+                vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
         // nothing is known of a light so near that rounding moves it onto the surface, or too far away to
         // square
         real squared = shadow_ray->squared;
         mask in_range = (squared >= (real)(SMALLEST_RATIO)) & (squared <= (real)(1 / SMALLEST_RATIO));
-        real relative = lanes_select(in_range, place_error * ray_inverse_length(shadow_ray), NEVER);
+        real nearest = ray_inverse_length(shadow_ray);
+        if (HAS_SMOOTH_NORMALS) { // the light's distance from the position may be less
+            Vector to_position = vector_add(shadow_ray->direction, surface->lift);
+            real inverse = divide_or((real)(1 + 32 * UNIT_ROUNDOFF), vector_norm(to_position), NEVER);
+            nearest = real_max(nearest, inverse);
+        }
+        real relative = lanes_select(in_range, place_error * nearest, NEVER);
         far_off = !(relative <= SHADOW_DOUBT_MAX);
         skips_culling =
             (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
@@ -216,6 +224,13 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real geometric = vector_dot(surface_normal(surface), to_light->direction);
     real facing_error = surface->normal_error + angle_error;
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
+    if (HAS_SMOOTH_NORMALS) { // which the shadow ray, not parallel to the light's direction, must leave
+        geometric =
+            vector_dot(surface_normal(surface), shadow_ray->direction) * ray_inverse_length(shadow_ray);
+        geometric_error = geometric_error + (real)(96 * UNIT_ROUNDOFF);
+        shadow_ray->is_lifted = surface->lift_error > (real)(0);
+        shadow_ray->sinks = shadow_ray->is_lifted & (geometric < -geometric_error);
+    }
     shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
     mask turned = (to_light->facing < -facing_error) | !surface_found(surface);
     mask open = !turned & !(to_light->facing > facing_error);
@@ -226,6 +241,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     visibility->facing_doubt = open & faint;
     // a light in front of the shading normal but behind the surface is occluded by the surface itself
     mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
+    if (HAS_SMOOTH_NORMALS) behind = behind & !shadow_ray->sinks; // unless the ray is lifted beyond its rim
     mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
     self_doubt = self_doubt | (open & !faint);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));

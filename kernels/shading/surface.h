@@ -27,6 +27,7 @@ typedef struct {
     Vector normal;         // geometric, unit, facing the ray; only with triangles: surface_normal
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
+    Vector lift;           // with HAS_SMOOTH_NORMALS, as in a SurfacePoint
     real error;            // bound on the position's distance from the true surface
     real refracted_offset; // how far behind the surface a refracted ray starts
     Color3 ambient;        // the ambient light that it reflects, and its emission
@@ -46,6 +47,7 @@ typedef struct {
     // normal and, with HAS_TRIANGLES, of the geometric normal from the exact ones; on that of to_eye; and the
     // uncertain lanes.
     real place_error, normal_error, geometric_error, eye_error;
+    real lift_error;              // with HAS_SMOOTH_NORMALS, as in a SurfacePoint
     real line_error, start_error; // a reflected ray's origin_error and -tmin
     mask doubt;
     ChordEnd chord_end; // with HAS_CHORDS
@@ -114,7 +116,7 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
 // evaluated for all lanes at once.
 static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
                                                              const ObjectRange *range, uint material,
-                                                             const Ray *ray, real t)
+                                                             const Ray *ray, real t, real place_error)
 {
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     LaneSurfacePoints hit;
@@ -122,6 +124,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     Vector normal = zero;
     Corners corners = {zero, zero, zero}, normals = corners, uvs = corners;
     real density = (real)(scene->materials[material].reflection_transmission_ior.w);
+    real liftable = (real)(0);
     mask next_to_eye = mask_none();
     bool smooth = false;
     for (;;) {
@@ -137,10 +140,11 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         if (has_eye_height(triangle.id)) next_to_eye = next_to_eye | same;
         corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), corners);
         normal = vector_select(same, triangle_normal(&triangle), normal);
-        if (triangle.id.y > 0) {
+        if (HAS_SMOOTH_NORMALS && triangle.id.y > 0) {
             smooth = true;
             TriangleNormals own = scene->triangle_normals[triangle.id.y - 1];
             normals = corners_select(same, corners_of(own.a, own.b, own.c), normals);
+            liftable = lanes_select(same, (real)(own.a.w), liftable);
         }
         if (HAS_IMAGES && triangle.id.z > 0) {
             TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
@@ -155,7 +159,10 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         ray_prepare(&own);
         weights = triangle_weights(corners, &own);
         hit.point = instance_surface_point(&instance, corners, normal, weights);
-        if (smooth) normals = instance_normals(&instance, normals);
+        if (smooth) {
+            normals = instance_normals(&instance, normals);
+            corners = instance_corners(&instance, corners);
+        }
         if (HAS_IMAGES)
             density =
                 real_divide(density, lanes_select(hit.lanes, instance_stretch(&instance, normal), (real)(1)));
@@ -163,9 +170,18 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         weights = triangle_weights(corners, ray);
         hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
     }
-    if (smooth) triangle_smooth(normals, weights, &hit.point);
+    TriangleHeights heights = {(real)(0), (real)(0), (real)(0)};
+    if (smooth) {
+        triangle_smooth(normals, weights, &hit.point);
+        mask along = vector_dot(hit.point.normal, ray->direction) > (real)(0),
+             opposite = vector_dot(hit.point.normal, hit.point.shading_normal) < (real)(0);
+        liftable = lanes_select(along ^ opposite, -liftable, liftable);
+        heights = triangle_lift(corners, normals, weights, liftable, &hit.point);
+    }
 #if IS_CERTIFIED
-    triangle_set_normal_errors(corners, normals, weights, &hit.point);
+    real slimness = triangle_slimness(corners);
+    triangle_set_normal_errors(corners, normals, weights, slimness, &hit.point);
+    if (smooth) triangle_set_lift_error(corners, heights, liftable, slimness, place_error, &hit.point);
 #endif
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, uvs);
@@ -337,6 +353,8 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
         surface_set_line_error(surface, point);
     }
     surface->position = point->position;
+    if (HAS_SMOOTH_NORMALS) surface->lift = point->lift;
+    if (HAS_SMOOTH_NORMALS && IS_CERTIFIED) surface->lift_error = point->lift_error;
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
     if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
     Vector normal = vector_select(along, vector_negate(point->normal), point->normal);
@@ -393,7 +411,8 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         uint4 entry = range_entry(scene, &range, object);
         LaneSurfacePoints found;
         if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
-            found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t);
+            found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t,
+                                            IS_CERTIFIED ? surface.place_error : (real)(0));
         } else {
             found.lanes = pending == (integer)(object);
             found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
@@ -432,6 +451,13 @@ static inline Vector secondary_ray_origin(const Surface *surface, bool through)
     return vector_fma(surface_normal(surface),
                       through ? -surface->refracted_offset : surface->error + surface->error,
                       surface->position);
+}
+
+// Returns the origin of a ray to a light.
+static inline Vector shadow_ray_origin(const Surface *surface)
+{
+    Vector origin = secondary_ray_origin(surface, false);
+    return HAS_SMOOTH_NORMALS ? vector_add(origin, surface->lift) : origin;
 }
 
 // Returns the lanes where a transparent object may touch an opaque one.

@@ -63,6 +63,12 @@ static inline real instance_stretch(const Instance *instance, Vector normal)
     return (real)(instance->inverses[0].w) * real_sqrt(mapped);
 }
 
+static inline Corners instance_corners(const Instance *instance, Corners corners)
+{
+    return (Corners){instance_point(instance, corners.a), instance_point(instance, corners.b),
+                     instance_point(instance, corners.c)};
+}
+
 // A bound on what mapping adds to the error of a point and of the next ray's test, in units of 16 u of the
 // condition times the corners' largest coordinate from the instance's center.
 #define INSTANCE_POINT_ERROR ((real)(1.5f))

@@ -13,9 +13,11 @@ typedef struct {
     Vector normal;         // geometric, unit, to either side
     Vector shading_normal; // unit; differs on smooth triangles
     real rounding_scale;
+    Vector lift; // with HAS_SMOOTH_NORMALS, from the position to where rays to lights start
     // At `certified`, how fast the shading normal turns along the surface, and a bound on its error. For a
     // flat surface, a bound on the position's height over the exact surface, else NEVER.
     real curvature, normal_error, height;
+    real lift_error; // at `certified`, a bound on that of `lift`, 0 where nothing lifts
 } SurfacePoint;
 
 static inline SurfacePoint surface_point_make(Vector position, Vector normal, real rounding_scale)
@@ -24,7 +26,9 @@ static inline SurfacePoint surface_point_make(Vector position, Vector normal, re
     point.position = position;
     point.normal = point.shading_normal = normal;
     point.rounding_scale = rounding_scale;
+    if (HAS_SMOOTH_NORMALS) point.lift = (Vector){(real)(0), (real)(0), (real)(0)};
     if (IS_CERTIFIED) {
+        point.lift_error = (real)(0);
         point.curvature = point.normal_error = (real)(0);
         point.height = NEVER;
     }
@@ -54,10 +58,12 @@ static inline void surface_point_replace(SurfacePoint *point, mask where, const 
     point->normal = vector_select(where, other->normal, point->normal);
     point->shading_normal = vector_select(where, other->shading_normal, point->shading_normal);
     point->rounding_scale = lanes_select(where, other->rounding_scale, point->rounding_scale);
+    if (HAS_SMOOTH_NORMALS) point->lift = vector_select(where, other->lift, point->lift);
     if (!IS_CERTIFIED) return;
     point->curvature = lanes_select(where, other->curvature, point->curvature);
     point->normal_error = lanes_select(where, other->normal_error, point->normal_error);
     point->height = lanes_select(where, other->height, point->height);
+    if (HAS_SMOOTH_NORMALS) point->lift_error = lanes_select(where, other->lift_error, point->lift_error);
 }
 
 #endif

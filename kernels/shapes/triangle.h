@@ -266,6 +266,33 @@ static inline void triangle_smooth(Corners normals, TriangleWeights weights, Sur
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
+// How far each corner's tangent plane is above the point, 0 if it is below.
+typedef struct {
+    real a, b, c;
+} TriangleHeights;
+
+// Moves the start of rays to lights to the curved surface that the normals of the corners suggest, which a
+// flat triangle would shade where they still face the light. Each corner moves the point up to its tangent
+// plane along its normal, by its weight (Hanika, Hacking the shadow terminator, Ray Tracing Gems II, 2021,
+// chapter 4). `side` is 1 where the normals face the ray, -1 where they face away, and 0 where none lifts.
+static inline TriangleHeights triangle_lift(Corners corners, Corners normals, TriangleWeights weights,
+                                            real side, SurfacePoint *point)
+{
+    Vector ab = vector_subtract(corners.a, corners.b), bc = vector_subtract(corners.b, corners.c),
+           ca = vector_subtract(corners.c, corners.a);
+    real from_ab = weights.b * vector_dot(ab, normals.a), from_ac = weights.c * vector_dot(ca, normals.a);
+    real from_bc = weights.c * vector_dot(bc, normals.b), from_ba = weights.a * vector_dot(ab, normals.b);
+    real from_ca = weights.a * vector_dot(ca, normals.c), from_cb = weights.b * vector_dot(bc, normals.c);
+    const real zero = (real)(0);
+    TriangleHeights heights = {real_max(side * (from_ab - from_ac), zero),
+                               real_max(side * (from_bc - from_ba), zero),
+                               real_max(side * (from_ca - from_cb), zero)};
+    point->lift = triangle_blend((TriangleWeights){side * weights.a * heights.a, side * weights.b * heights.b,
+                                                   side * weights.c * heights.c},
+                                 normals);
+    return heights;
+}
+
 // Upper bounds: `size` on the vertices' distances from the eye, `longest` on the edges' lengths.
 typedef struct {
     scalar size, longest;
@@ -323,8 +350,10 @@ static inline real triangle_place_error(const Ray *ray, real distance, TriangleS
 
 // Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
 // vertices of a triangle that is hit are not farther across the ray than its longest edge and the error.
+// `own` are the lanes that lie ahead for certain.
 static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, const Ray *ray, mask lanes,
-                                                   TriangleSigns signs, TriangleSizes sizes, real error)
+                                                   mask own, TriangleSigns signs, TriangleSizes sizes,
+                                                   real error)
 {
     mask perhaps = lanes & signs.perhaps, certain = perhaps & signs.certain;
     const Vector along = ray_along(ray);
@@ -347,13 +376,17 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
     high = high + vertex_error;
     low = lanes_select(narrows, real_max(low, t - t_error), low);
     high = lanes_select(narrows, real_min(high, t + t_error), high);
+    if (HAS_SMOOTH_NORMALS) {
+        low = lanes_select(own, real_max(low, (real)(SMALLEST_RATIO)), low);
+        high = real_max(low, high);
+    }
     CertainHit hit = certain_crossing(ray, certain, perhaps, low, high);
     return certain_select(narrows, certain_at(hit, t), hit);
 }
 
 // Uses the vertices' distances from the ray's start, which may be much less than those from the eye.
 static OUT_OF_LINE CertainHit triangle_certain_hit_near(const TriangleEdges *edges, const Ray *ray,
-                                                        mask lanes, TriangleSizes sizes, real error)
+                                                        mask lanes, mask own, TriangleSizes sizes, real error)
 {
     real ax = edges->ax, ay = edges->ay, bx = edges->bx, by = edges->by, cx = edges->cx, cy = edges->cy;
     real distance = vector_norm(corners_max_abs((Corners){edges->a, edges->b, edges->c}));
@@ -361,7 +394,7 @@ static OUT_OF_LINE CertainHit triangle_certain_hit_near(const TriangleEdges *edg
     mask misses = (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
                   (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
     TriangleSigns signs = triangle_signs(edges, error);
-    return triangle_certain_crossing(edges, ray, lanes & !misses, signs, sizes, error);
+    return triangle_certain_crossing(edges, ray, lanes & !misses, own, signs, sizes, error);
 }
 
 // Tests first by one error for all edge functions of triangles that are hit (docs/numerics.md).
@@ -376,11 +409,15 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     mask lanes = RAY_ACTIVE(ray) & !((highest > edge_error) & (lowest < -edge_error));
     if (!lanes_any(lanes)) return certain_miss();
     TriangleSigns signs = triangle_signs(&edges, error);
-    lanes = lanes & signs.perhaps & !ray_left_for_good(ray, triangle->id.x, true);
+    mask own = ray_left_for_good(ray, triangle->id.x, true);
+    if (HAS_SMOOTH_NORMALS) own = own & !ray->sinks;
+    lanes = lanes & signs.perhaps & !own;
     if (!lanes_any(lanes)) return certain_miss();
-    CertainHit hit = triangle_certain_crossing(&edges, ray, lanes, signs, sizes, error);
+    own = HAS_SMOOTH_NORMALS ? ray_left_for_good(ray, triangle->id.x, true) : mask_none();
+    CertainHit hit = triangle_certain_crossing(&edges, ray, lanes, own, signs, sizes, error);
     if (RARELY(lanes_any(hit.doubt))) // certain lanes must not depend on uncertain ones
-        hit = certain_select(hit.doubt, triangle_certain_hit_near(&edges, ray, lanes, sizes, error), hit);
+        hit =
+            certain_select(hit.doubt, triangle_certain_hit_near(&edges, ray, lanes, own, sizes, error), hit);
     return hit;
 }
 
@@ -399,9 +436,8 @@ static inline real triangle_slimness(Corners corners)
 // Sets the errors of the normals. Each vertex is off by u of its length, and if normals are blended, the
 // weights move with the place.
 static inline void triangle_set_normal_errors(Corners corners, Corners normals, TriangleWeights weights,
-                                              SurfacePoint *point)
+                                              real slimness, SurfacePoint *point)
 {
-    real slimness = triangle_slimness(corners);
     real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
     Vector ab = vector_subtract(normals.a, normals.b), bc = vector_subtract(normals.b, normals.c);
     real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
@@ -411,9 +447,19 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
     point->normal_error = vertex_error * (slimness + point->curvature);
 }
 
-// Returns the lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor. So
-// they cannot hit this triangle if it lies behind the neighbor's plane and they leave to its front, nor if
-// they run to the side of this triangle's plane that the neighbor is on.
+// Sets the error of the lift in the lanes with a side (docs/numerics.md).
+static inline void triangle_set_lift_error(Corners corners, TriangleHeights heights, real side, real slimness,
+                                           real place_error, SurfacePoint *point)
+{
+    real moved = real_fma((real)(36 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(corners)), place_error);
+    real error = real_fma(moved * slimness, heights.a + heights.b + heights.c + (real)(3) * moved, moved);
+    point->lift_error = lanes_select(side == (real)(0), (real)(0), error);
+}
+
+// Returns the lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor or,
+// if lifted, in front of it. So they cannot hit this triangle if it lies behind the neighbor's plane and they
+// leave to its front, nor, unless lifted, if they run to the side of this triangle's plane that the neighbor
+// is on.
 static inline mask triangle_left_behind(const Triangle *triangle, const TriangleNeighbors *neighbors,
                                         const Ray *ray, mask lanes)
 {
@@ -428,8 +474,9 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
     sides = lanes_select(over_b, (integer)((scalar_integer)(ids_sides.w >> NEIGHBOR_SIDES_BITS & 7)), sides);
     sides = lanes_select(over_c, (integer)((scalar_integer)(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 7)),
                          sides);
-    mask is_behind = (sides & (integer)(NEIGHBOR_HAS_THIS_BEHIND)) != none,
-         in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
+    mask is_behind = (sides & (integer)(NEIGHBOR_HAS_THIS_BEHIND)) != none;
+    if (HAS_SMOOTH_NORMALS) sides = lanes_select(ray->is_lifted, none, sides);
+    mask in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
          behind = (sides & (integer)(NEIGHBOR_BEHIND)) != none;
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
     Vector normal = triangle_normal(triangle);

@@ -32,6 +32,9 @@ typedef struct {
     integer left;
     mask leaves_outward;
     bool ends_at_light;
+    // With HAS_SMOOTH_NORMALS, whether the ray starts in front of the triangle that it leaves instead of on
+    // it (shapes/triangle.h), and whether it runs back to its plane for certain.
+    mask is_lifted, sinks;
     // of a ray along a chord of the sphere that it leaves, NEVER of others: as of a Chord (shading/chords.h)
     real chord_turn, chord_end_place;
     real length; // of the direction, not below the exact one, within 48 u
@@ -122,6 +125,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         ray.left = (integer)(-1);
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
+        if (HAS_SMOOTH_NORMALS) ray.is_lifted = ray.sinks = mask_none();
         if (HAS_CHORDS) ray.chord_turn = ray.chord_end_place = NEVER;
     }
     ray.active = active & (ray.squared > (real)(0));

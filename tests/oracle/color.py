@@ -216,8 +216,8 @@ class Hit:
         self.against = dot(outward, ray.direction) < 0
         flat = isinstance(shape, exact.Plane)
         self.entering = self.against if flat else not shape.contains(ray.at(met.t - TINY))
-        geometry = outward if self.against else times(outward, -1)
-        self.geometry = unit(geometry)
+        self.facing = outward if self.against else times(outward, -1)
+        self.geometry = unit(self.facing)
         shading = unit(thing.shading(self.point, outward))
         if as_float(dot(shading, self.geometry)) < 0:
             shading = times(shading, -1)
@@ -302,6 +302,16 @@ def spot_strength(light, from_light, turn, rounding):
 def passing(scene, hit, way, end, turn, rounding):
     """The parts of a light's channels that get through, or None where that is open."""
     beam = leaving(hit, way, turn, rounding)
+    lift = hit.thing.lift(hit.point, hit.facing)
+    if lift is not None:
+        start = [middle(p + x) for p, x in zip(hit.point, lift)]
+        if end != inf:
+            way = subtract(add(hit.point, way), start)
+        # a place moves a vertex's share and its height
+        shape = hit.thing.shape
+        off = beam.off * (2 + 3 * shape.size**2 / length(shape.direction))
+        sinks = as_float(dot(hit.geometry, unit(way))) <= turn
+        beam = Beam(start, [middle(x) for x in way], off, turn, None if sinks else hit.thing, 1.0, hit.magnitude)
     parts, is_open = [arb(1)] * 3, False
     for thing in scene.things:
         met = crossing(thing, beam, rounding)

@@ -109,13 +109,32 @@ class Thing:
         vertices', each first made unit."""
         if self.normals is None:
             return [arb(x) for x in geometry]
+        units = [unit(normal) for normal in self.normals]
+        return [sum(share * n[k] for share, n in zip(self.shares(point, geometry), units)) for k in range(3)]
+
+    def shares(self, point, geometry):
         a, b, c = self.shape.vertices
         area = dot(geometry, geometry)
-        shares = [
+        return [
             dot(geometry, exact.cross(subtract(q, p), subtract(point, p))) / area for p, q in ((b, c), (c, a), (a, b))
         ]
+
+    def lift(self, point, geometry):
+        """From the point to where rays to lights start, None where nothing lifts: by the share of each vertex along its
+        normal, which faces as the geometry does, to its tangent plane."""
+        if self.normals is None:
+            return None
         units = [unit(normal) for normal in self.normals]
-        return [sum(share * n[k] for share, n in zip(shares, units)) for k in range(3)]
+        if dot(units[0], geometry) < 0:
+            units = [[-x for x in n] for n in units]
+        if not all(dot(n, geometry) > 0 for n in units):
+            return None
+        lift = [arb(0)] * 3
+        for share, vertex, n in zip(self.shares(point, geometry), self.shape.vertices, units):
+            height = dot(subtract(vertex, point), n)
+            if exact.middle(height) > 0:
+                lift = [x + share * height * y for x, y in zip(lift, n)]
+        return lift
 
 
 def unit(values):

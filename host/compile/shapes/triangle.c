@@ -124,13 +124,19 @@ static void triangle_keep_attributes(Triangle *triangle, const Triangle *moved)
     triangle->id.z = moved->id.z;
 }
 
-// What a triangle's id.y holds; a triangle with a vertex without a normal is flat.
-static uint32_t normals_add(Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
+// What a triangle's id.y holds; a triangle with a vertex without a normal is flat. Normals on both sides of
+// it are those of no surface near it.
+static uint32_t normals_add(Flattening *flattening, const Vector3 vertices[3], Vector3 a, Vector3 b,
+                            Vector3 c)
 {
     if (vector_is_zero(a) || vector_is_zero(b) || vector_is_zero(c)) return 0;
+    const Vector3 flat = triangle_normal(vertices[0], vertices[1], vertices[2]);
+    const double heights[] = {vector_dot(a, flat), vector_dot(b, flat), vector_dot(c, flat)};
+    const bool agree = (heights[0] > 0 && heights[1] > 0 && heights[2] > 0) ||
+                       (heights[0] < 0 && heights[1] < 0 && heights[2] < 0);
     TriangleNormals *normals = flattening->compiled->arrays[FLAT_TRIANGLE_NORMALS].items;
     normals[flattening->normals_count++] =
-        (TriangleNormals){scalar4_of(a, 0), scalar4_of(b, 0), scalar4_of(c, 0)};
+        (TriangleNormals){scalar4_of(a, agree), scalar4_of(b, 0), scalar4_of(c, 0)};
     return (uint32_t)flattening->normals_count;
 }
 
@@ -153,8 +159,8 @@ static void triangle_flatten(Flattening *flattening, const Object *object)
     if (flattening->moved)
         triangle_keep_attributes(&triangle, flattening->moved);
     else if (object->as.triangle.smooth)
-        triangle.id.y = normals_add(flattening, vector_normalize(normals[0]), vector_normalize(normals[1]),
-                                    vector_normalize(normals[2]));
+        triangle.id.y = normals_add(flattening, vertices, vector_normalize(normals[0]),
+                                    vector_normalize(normals[1]), vector_normalize(normals[2]));
     primitive_add(flattening, KIND_TRIANGLES, &triangle, object->material);
 }
 
@@ -178,7 +184,8 @@ static void mesh_flatten(Flattening *flattening, const Object *object)
     if (flattening->moved) {
         triangle_keep_attributes(&triangle, flattening->moved);
     } else {
-        if (mesh->normals) triangle.id.y = normals_add(flattening, normals[0], normals[1], normals[2]);
+        if (mesh->normals)
+            triangle.id.y = normals_add(flattening, vertices, normals[0], normals[1], normals[2]);
         uint32_t corners[3];
         corners_ordered(mesh, object, flattening->part, corners);
         triangle.id.z = uvs_add(flattening, mesh, &placed, corners, material);
