@@ -29,7 +29,8 @@
     FEATURE(ABSORPTION, )         \
     FEATURE(EYE_POWERS, )         \
     FEATURE(BVH, )                \
-    FEATURE(SMOOTH_NORMALS, )
+    FEATURE(SMOOTH_NORMALS, )     \
+    FEATURE(NORMAL_MAPS, )
 // clang-format on
 
 #endif

@@ -269,12 +269,16 @@ typedef struct {
     // steps of 2^-48, for double. Red's is that of all channels unless materials have filters.
     // of a conductor with the index n + i k, rgb: n^2 - k^2, w: 1 if it is one; and (2 n k)^2
     scalar4 conductor_real, conductor_imaginary_squared;
+    // The normal map's u and v are xy . (u, v) + z of each row. w: the strength; and the map's texels per
+    // unit of length over the density of the surface's texture coordinates.
+    scalar4 normal_u, normal_v;
     uint4 optical_depth, optical_depth_green, optical_depth_blue;
     // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_… along u and v
     uint4 texture;
     // x: 1 + the index of the first level of the texture whose alpha decides where rays pass, or 0; y: the
     // bits of the least alpha that stops them, as a float; z, w: WRAP_… along u and v
     uint4 cutout;
+    uint4 normal_map; // as `texture`
 } Material;
 
 // How a texture extends beyond its edges.

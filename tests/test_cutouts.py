@@ -228,7 +228,7 @@ class Cutouts(TestCase):
         return write("a.gltf", json.dumps(scene))
 
     def test_refused(self):
-        """Neither certified nor certify has cutouts; an opaque image is named."""
+        """Neither certified nor certify has cutouts, or normal maps; an opaque image is named."""
         png("opaque.png", [[1, 1]])
         scene = "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [1, 2, -5]}}]\nobjects: [{sphere: {center: [0, 0, 0], radius: 1, material: {image: %s.png, cutout: 0.5}}}]\n"
         write("half.yaml", scene % "half")
@@ -239,6 +239,10 @@ class Cutouts(TestCase):
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.glint("certify opaque.yaml --size 4x4" + (" --precision single" if not IS_LONG else ""))
         self.refuses("certify half.yaml", "the exact reference has no cutouts, and so cannot judge this scene")
+        write("bumps.yaml", scene.replace("image: %s.png, cutout: 0.5", "normal_map: half.png"))
+        self.glint("check bumps.yaml")
+        self.refuses("render bumps.yaml -o a.npy --precision certified", "a material has a normal map, which has no error bound")
+        self.refuses("certify bumps.yaml", "the exact reference has no normal maps, and so cannot judge this scene")
 
 
 def write_bytes(path, data):

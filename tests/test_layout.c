@@ -92,11 +92,14 @@ typedef struct {
     REALS(FLAT_MATERIALS, Material, FlatMaterial, absorption)                    \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, conductor_real)                \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, conductor_imaginary_squared)   \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, normal_u)                      \
+    REALS(FLAT_MATERIALS, Material, FlatMaterial, normal_v)                      \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth)              \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_green)        \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, optical_depth_blue)         \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, texture)                      \
     INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, cutout)                       \
+    INTEGERS(FLAT_MATERIALS, Material, FlatMaterial, normal_map)                   \
     REALS(FLAT_LIGHTS, Light, FlatLight, color)                                  \
     REALS(FLAT_LIGHTS, Light, FlatLight, position)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, direction)                              \

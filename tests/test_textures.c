@@ -424,6 +424,96 @@ static void opaque_images_cut_nothing(void **state)
     }
 }
 
+// Checks the shade along the camera's axis of a white object, whose normal map's only texel is given, in the
+// light from one direction.
+static void check_shade(const char *camera, const char *object, const char *more, const float texel[3],
+                        const char *light, double expected)
+{
+    TestTexture texture = {1, 1, {{texel[0], texel[1], texel[2]}}};
+    texture_write(&texture);
+    Text text = {0};
+    text_appendf(&text,
+                 "camera: {%s}\nlights: [{directional: {direction: %s}}]\n"
+                 "define: {square: {objects: [{mesh: {file: tests/textures/quad.obj}}]}}\n"
+                 "objects: [{%s material: {ambient: 0, normal_map: %s%s}}}]\n",
+                 camera, light, object, texture_path, more);
+    Scene scene = scene_of_text("s.yaml", text_c(&text));
+    RenderSettings settings = film_settings(1, 1, PRECISION_STRICT);
+    settings.instances = INSTANCES_SHARED;
+    Film film = film_render(&probe_compute, &scene, &settings, 0);
+    if (!(fabs(film.color[0] - expected) < 4e-7))
+        fail_msg("%s: the shade is %.9g, not %.9g", text_c(&text), film.color[0], expected);
+    film_free(&film);
+    scene_free(&scene);
+    text_free(&text);
+}
+
+#define SQUARE "mesh: {file: tests/textures/quad.obj,"
+#define FRONT  FROM(0.1, 0.2, 5)
+
+// Lambert's cosine of normals that are tilted by 1/2 along u or v, with the light at 3/5 of u or v.
+static void normal_maps_tilt_normals(void **state)
+{
+    (void)state;
+    const float right[] = {0.75F, 0.5F, 1}, up[] = {0.5F, 0.75F, 1}, flat[] = {0.5F, 0.5F, 1};
+    const double toward = (0.3 + 0.8) / sqrt(1.25), away = (-0.3 + 0.8) / sqrt(1.25);
+    const char *from_right = "[-0.6, 0, -0.8]", *from_up = "[0, -0.6, -0.8]";
+    check_shade(FRONT, SQUARE, "", flat, from_right, 0.8);
+    check_shade(FRONT, SQUARE, "", right, from_right, toward);
+    check_shade(FRONT, SQUARE, "", up, from_up, toward);
+    check_shade(FRONT, SQUARE, "", right, "[0.6, 0, -0.8]", away);
+    check_shade(FRONT, SQUARE, ", normal_strength: 2", right, from_right, (0.6 + 0.8) / sqrt(2));
+    check_shade(FRONT, SQUARE, ", normal_strength: 0", right, from_right, 0.8);
+    // a mirrored mesh mirrors its map, and from behind the map's bumps are hollows
+    check_shade(FRONT, SQUARE " transform: {scale: [-1, 1, 1]},", "", right, from_right, away);
+    check_shade(FRONT, SQUARE " transform: {scale: [-1, 1, 1]},", "", up, from_up, toward);
+    check_shade(FRONT, SQUARE " transform: {rotate: [0, 0, 90]},", "", right, from_up, toward);
+    const char *instance = "instance: {of: square, transform: {scale: [-1, 2, 1], rotate: [0, 0, 90]},";
+    check_shade(FRONT, instance, "", right, from_up, away);
+    check_shade(FRONT, instance, "", up, from_right, away);
+    check_shade(FROM(0.1, 0.2, -5), SQUARE, "", right, "[-0.6, 0, 0.8]", away);
+    check_shade(FRONT, "plane: {point: [0, 0, 0], normal: [0, 0, 3],", "", right, from_right, toward);
+    check_shade(FRONT, "disc: {center: [0, 0, 0], normal: [0, 0, 1], radius: 1,", "", up, from_up, toward);
+    check_shade(FROM(0, 5, 0.1), "plane: {point: [0, 0, 0], normal: [0, 1, 0],", "", up, "[0, -0.8, 0.6]",
+                toward);
+    check_shade(FROM(0, 0, 5), BALL, "", right, from_right, toward);
+    check_shade(FROM(0, 0, 5), BALL, "", up, from_up, toward);
+    check_shade(FROM(5, 0, 0), BALL, "", right, "[-0.8, 0, 0.6]", toward);
+    check_shade(FROM(0, 5, 0), BALL, "", right, "[-0.6, -0.8, 0]", 0.8); // a pole
+}
+
+// A flat map changes no bit, whatever the strength.
+static void flat_normal_maps_change_nothing(void **state)
+{
+    (void)state;
+    const TestTexture texture = {2, 2, {{0.5F, 0.5F, 1}, {0.5F, 0.5F, 1}, {0.5F, 0.5F, 1}, {0.5F, 0.5F, 1}}};
+    texture_write(&texture);
+    Film films[2];
+    for (int i = 0; i < 2; i++) {
+        Text text = {0}, map = {0};
+        if (i == 1) text_appendf(&map, ", normal_map: %s, normal_strength: 3", texture_path);
+        text_appendf(&text,
+                     "camera: {position: [0, 1, 5], look_at: [0, 0, 0]}\n"
+                     "lights: [{point: {position: [2, 3, 4]}}]\n"
+                     "materials: {shiny: {specular: 0.5, reflection: 0.3%s}}\n"
+                     "objects:\n  - sphere: {center: [1, 0, 0], radius: 1, material: shiny}\n"
+                     "  - plane: {point: [0, -1, 0], normal: [0.1, 1, 0], material: shiny}\n"
+                     "  - mesh: {file: tests/textures/quad.obj, material: shiny, transform: "
+                     "{rotate: [0, 30, 0], translate: [-1, 0, -1]}}\n",
+                     map.count > 0 ? text_c(&map) : "");
+        Scene scene = scene_of_text("s.yaml", text_c(&text));
+        assert_int_equal((features_of(&scene) & FEATURE_NORMAL_MAPS) != 0, i == 1);
+        const RenderSettings settings = film_settings(64, 48, PRECISION_STRICT);
+        films[i] = film_render(&probe_compute, &scene, &settings, 0);
+        scene_free(&scene);
+        text_free(&text);
+        text_free(&map);
+    }
+    film_assert_same(&films[1], &films[0], "a flat normal map");
+    film_free(&films[0]);
+    film_free(&films[1]);
+}
+
 static void jpeg_is_read(void **state)
 {
     (void)state;
@@ -476,7 +566,8 @@ static void scene_faults_are_reported(void **state)
     (void)state;
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
                     "4:21: error: 'color' cannot be combined with 'image'\n");
-    assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n", "4:6: error: material lacks 'image'\n");
+    assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n",
+                    "4:13: error: 'size' is that of an 'image' or a 'normal_map'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
                     "4:27: error: 'size' must be greater than 0\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, cutout: 50}\n",
@@ -553,6 +644,8 @@ int main(void)
         cmocka_unit_test(mirrors_filter_textures),
         cmocka_unit_test(every_build_gives_the_same_bits),
         cmocka_unit_test(every_build_has_the_same_holes),
+        cmocka_unit_test(normal_maps_tilt_normals),
+        cmocka_unit_test(flat_normal_maps_change_nothing),
         cmocka_unit_test(opaque_images_cut_nothing),
         cmocka_unit_test(instances_have_the_holes_of_copies),
         cmocka_unit_test(jpeg_is_read),

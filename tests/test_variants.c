@@ -55,7 +55,7 @@ static void scene_has_every_feature(void **state)
     (void)state;
     // test_textures has textures, which a mirror image would have to mirror, test_instances instances
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
-                         FEATURE_CUTOUTS | FEATURE_INSTANCES | SAMPLED_FEATURES,
+                         FEATURE_CUTOUTS | FEATURE_NORMAL_MAPS | FEATURE_INSTANCES | SAMPLED_FEATURES,
                      FEATURE_ALL);
     assert_int_equal(features_of(&sampled) & SAMPLED_FEATURES, FEATURE_AREA_LIGHTS | FEATURE_LENS);
 }
@@ -194,6 +194,10 @@ static const struct {
     {FEATURE_SPHERES | FEATURE_IMAGES | FEATURE_CUTOUTS,
      SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
                 "  material: {image: tests/textures/leaf.png, cutout: 0.5}}}]\n"},
+    {FEATURE_SPHERES | FEATURE_IMAGES | FEATURE_NORMAL_MAPS | FEATURE_REFLECTION | FEATURE_DIRECTIONAL_LIGHTS,
+     SCENE_HEAD "lights: [{directional: {direction: [2, -1, 0.6]}}]\n"
+                "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
+                "  material: {normal_map: scenes/images/globe.png, reflection: 0.5}}}]\n"},
     // where tests are long
     {FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n"},
     {FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n"},

@@ -306,6 +306,7 @@ static const char *reference_lacks(const Scene *scene)
     if (scene_primitive_count(scene) > OBJECTS_MAX)
         return "room for more than 67,108,864 objects and triangles";
     if (features & FEATURE_CUTOUTS) return "cutouts";
+    if (features & FEATURE_NORMAL_MAPS) return "normal maps";
     if (features & FEATURE_AREA_LIGHTS) return "lights with an area";
     if (features & FEATURE_LENS) return "a lens ('aperture')";
     return features & FEATURE_ORTHOGRAPHIC ? "parallel rays" : NULL;

@@ -30,7 +30,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
     [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
-    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, cutout),
+    [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, normal_map),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
     [FLAT_SHARED_MESHES] = LAYOUT(SharedMesh, place, place),

@@ -25,6 +25,7 @@ static FeatureSet material_features(const Material *material)
     if (material->checker) set |= FEATURE_CHECKERS;
     if (material_any_texture(material)) set |= FEATURE_IMAGES;
     if (material->cutout > 0) set |= FEATURE_CUTOUTS;
+    if (material->normal_texture > 0) set |= FEATURE_NORMAL_MAPS;
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
     // which includes reflected rays: total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;

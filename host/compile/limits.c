@@ -105,6 +105,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_ORTHOGRAPHIC, "the camera has parallel rays"},
         {FEATURE_EQUIRECTANGULAR, "the camera is equirectangular"},
         {FEATURE_CUTOUTS, "a material has a 'cutout'"},
+        {FEATURE_NORMAL_MAPS, "a material has a normal map"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;
     for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)

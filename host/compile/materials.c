@@ -51,6 +51,25 @@ static uint4 cutout_of(const CompiledScene *compiled, const Material *material)
     return cutout;
 }
 
+static uint4 texture_of(const CompiledScene *compiled, uint32_t number, const TextureWrap wraps[2])
+{
+    const CompiledTexture *texture = &compiled->textures[number - 1];
+    return (uint4){1 + texture->first_level, texture->level_count, wraps[0], wraps[1]};
+}
+
+// `any`: the texture of whose texels the surface's densities are.
+static void normal_map_set(FlatMaterial *flat, const CompiledScene *compiled, const Material *material,
+                           const CompiledTexture *any)
+{
+    const CompiledTexture *map = &compiled->textures[material->normal_texture - 1];
+    const double(*rows)[3] = material->normal_rows;
+    const double area = fabs(rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]),
+                 texels = (double)map->width * map->height / ((double)any->width * any->height);
+    flat->normal_map = texture_of(compiled, material->normal_texture, material->normal_wrap);
+    flat->normal_u = (scalar4){rows[0][0], rows[0][1], rows[0][2], material->normal_strength};
+    flat->normal_v = (scalar4){rows[1][0], rows[1][1], rows[1][2], sqrt(area * texels)};
+}
+
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding)
 {
     flat_array_renew(compiled, FLAT_MATERIALS, scene->materials.count);
@@ -84,10 +103,11 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             materials[i].grid = (scalar4){fmod(eye.x, 2 * size) / size, fmod(eye.y, 2 * size) / size,
                                           fmod(eye.z, 2 * size) / size, 1 / size};
         materials[i].cutout = cutout_of(compiled, material);
-        if (material->texture == 0) continue;
-        const CompiledTexture *texture = &compiled->textures[material->texture - 1];
-        materials[i].texture = (uint4){1 + texture->first_level, texture->level_count,
-                                       material->texture_wrap[0], material->texture_wrap[1]};
-        materials[i].reflection_transmission_ior.w = texture->width / material->texture_size;
+        if (material_any_texture(material) == 0) continue;
+        const CompiledTexture *any = &compiled->textures[material_any_texture(material) - 1];
+        materials[i].reflection_transmission_ior.w = any->width / material->texture_size;
+        if (material->texture > 0)
+            materials[i].texture = texture_of(compiled, material->texture, material->texture_wrap);
+        if (material->normal_texture > 0) normal_map_set(&materials[i], compiled, material, any);
     }
 }

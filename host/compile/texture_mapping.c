@@ -34,10 +34,11 @@ static Quad3 texture_up(Vector3 normal, Quad3 unit_normal)
 void surface_grid(const Flattening *flattening, uint32_t material, Vector3 normal, scalar4 *u, scalar4 *v)
 {
     const Material *look = &flattening->scene->materials.items[material];
-    if (look->texture == 0 && !look->checker) return;
+    const uint32_t any = material_any_texture(look);
+    if (any == 0 && !look->checker) return;
     const Quad3 unit = quad3_unit(quad3(axis_scaled(normal)));
-    if (look->texture > 0) {
-        const CompiledTexture *texture = &flattening->compiled->textures[look->texture - 1];
+    if (any > 0) {
+        const CompiledTexture *texture = &flattening->compiled->textures[any - 1];
         double width = look->texture_size;
         Quad3 up = texture_up(normal, unit);
         *u = grid_axis(flattening, quad3_cross(up, unit), width, 1);

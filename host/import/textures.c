@@ -69,7 +69,7 @@ static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *r
     if (problem) is_usable = report_error(report, offset, "cannot use '%s': %s", texture->path, problem);
     if (!is_usable) return false;
     *texel_count += (size_t)image->width * image->height;
-    if (!image->alpha && texture->alpha_by_luminance) alpha_by_luminance(&texture->image);
+    if (!image->alpha && texture->content == TEXTURE_OPACITY) alpha_by_luminance(&texture->image);
     return true;
 }
 

@@ -21,7 +21,9 @@ Material material_default(void)
                       .shininess = 32,
                       .ior = 1.5,
                       .checker_size = 1,
-                      .texture_size = 1};
+                      .texture_size = 1,
+                      .normal_rows = {{1, 0, 0}, {0, 1, 0}},
+                      .normal_strength = 1};
 }
 
 void light_fold_fading(Light *light)
@@ -73,24 +75,23 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
 }
 
 static bool texture_is(const SceneTexture *texture, const char *path, const char *layer,
-                       bool alpha_by_luminance)
+                       TextureContent content)
 {
-    return texture->alpha_by_luminance == alpha_by_luminance && strcmp(texture->path, path) == 0 &&
-           !texture->layer == !layer && (!layer || strcmp(texture->layer, layer) == 0);
+    return texture->content == content && strcmp(texture->path, path) == 0 && !texture->layer == !layer &&
+           (!layer || strcmp(texture->layer, layer) == 0);
 }
 
-uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, bool alpha_by_luminance,
+uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, TextureContent content,
                            size_t offset)
 {
     size_t index = 0;
-    while (index < scene->textures.count &&
-           !texture_is(&scene->textures.items[index], path, layer, alpha_by_luminance))
+    while (index < scene->textures.count && !texture_is(&scene->textures.items[index], path, layer, content))
         index++;
     if (index == SCENE_TEXTURES_MAX) return 0;
     if (index == scene->textures.count)
         array_push(scene->textures, ((SceneTexture){.path = memory_copy_text(path),
                                                     .layer = layer ? memory_copy_text(layer) : NULL,
-                                                    .alpha_by_luminance = alpha_by_luminance,
+                                                    .content = content,
                                                     .offset = offset}));
     return (uint32_t)index + 1;
 }

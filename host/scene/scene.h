@@ -94,16 +94,22 @@ typedef struct {
     uint32_t texture;            // in place of color: 1 + index into the scene's textures; 0: none
     double texture_size;         // width of a texture on a plane or disc, > 0, in scene units
     TextureWrap texture_wrap[2]; // along u and v, on a mesh
-    uint32_t cutout_texture;     // the surface is not there where the alpha of this texture is below `cutout`
-    double cutout;               // 0: it is everywhere
-    bool cutout_blends;          // its format blends by this alpha
-    bool ignores_alpha;          // its format defines what becomes of the alpha of `texture`
+    // A texture whose colors are the shading normal, its place relative to the other textures' (rows of u and
+    // v), and by how much its parts along the surface count.
+    uint32_t normal_texture;
+    double normal_rows[2][3], normal_strength;
+    TextureWrap normal_wrap[2];
+    uint32_t cutout_texture; // the surface is not there where the alpha of this texture is below `cutout`
+    double cutout;           // 0: it is everywhere
+    bool cutout_blends;      // its format blends by this alpha
+    bool ignores_alpha;      // its format defines what becomes of the alpha of `texture`
 } Material;
 
 // Returns the texture whose place on a surface is that of all textures of its material, or 0.
 static inline uint32_t material_any_texture(const Material *material)
 {
-    return material->texture > 0 ? material->texture : material->cutout_texture;
+    if (material->texture > 0) return material->texture;
+    return material->cutout_texture > 0 ? material->cutout_texture : material->normal_texture;
 }
 
 // The cutout for images by whose alpha other programs blend.
@@ -113,13 +119,17 @@ static inline uint32_t material_any_texture(const Material *material)
 // The largest number of texels of all images: coarser levels add a third, and kernels count in 32 bits.
 enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
+// What an image's values are: colors; the same, and where all pixels are opaque, their luminance is the
+// alpha; or normals, which no transfer curve has changed.
+typedef enum { TEXTURE_COLORS, TEXTURE_OPACITY, TEXTURE_NORMALS } TextureContent;
+
 typedef struct {
-    char *path;              // of the image's file; where it has `bytes`, only for messages
-    char *layer;             // of an EXR file; NULL: its default layer, or its only one with colors
-    size_t offset;           // of its name in the scene's text
-    Text bytes;              // of an image within another file, until it is decoded; else empty
-    bool alpha_by_luminance; // where all pixels are opaque, the luminance is the alpha
-    Image image;             // decoded; its colors are finite
+    char *path;    // of the image's file; where it has `bytes`, only for messages
+    char *layer;   // of an EXR file; NULL: its default layer, or its only one with colors
+    size_t offset; // of its name in the scene's text
+    Text bytes;    // of an image within another file, until it is decoded; else empty
+    TextureContent content;
+    Image image; // decoded; its colors are finite
 } SceneTexture;
 
 // Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
@@ -301,7 +311,7 @@ enum { SCENE_TEXTURES_MAX = 1000 };
 
 // Returns what a material's `texture` is for the image, which materials with the same image share, or 0 if
 // the scene has too many. `layer` may be NULL, as in SceneTexture.
-uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, bool alpha_by_luminance,
+uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, TextureContent content,
                            size_t offset);
 
 // Adds an object with a separate material.

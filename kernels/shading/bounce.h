@@ -139,7 +139,7 @@ static inline mask vector_refract(Vector direction, Vector normal, mask entering
 static inline Vector surface_reflect(const Surface *surface, Vector direction)
 {
     Vector reflected = vector_reflect(direction, surface->shading_normal);
-    if (!HAS_TRIANGLES) return reflected;
+    if (!HAS_SHADING_NORMALS) return reflected;
     mask inward = vector_dot(reflected, surface->normal) <= (real)(0);
     return vector_select(inward, vector_reflect(direction, surface->normal), reflected);
 }
@@ -150,7 +150,7 @@ static inline mask surface_refract(const Surface *surface, Vector direction, Vec
 {
     mask total =
         vector_refract(direction, surface->shading_normal, surface->entering, surface->ior, refracted);
-    if (!HAS_TRIANGLES) return total;
+    if (!HAS_SHADING_NORMALS) return total;
     mask outward = !total & (vector_dot(*refracted, surface->normal) >= (real)(0));
     if (!lanes_any(outward)) return total;
     Vector plain;

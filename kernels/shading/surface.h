@@ -3,6 +3,7 @@
 #define SURFACE_H
 
 #include "shading/chords.h"
+#include "shading/normal_map.h"
 #include "shading/texture.h"
 #include "traversal/traversal.h"
 
@@ -24,7 +25,7 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
 typedef struct {
     integer object; // its id; -1 if nothing is hit
     Vector position;
-    Vector normal;         // geometric, unit, facing the ray; only with triangles: surface_normal
+    Vector normal;         // geometric, unit, facing the ray; with HAS_SHADING_NORMALS: surface_normal
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
     Vector lift;           // with HAS_SMOOTH_NORMALS, as in a SurfacePoint
@@ -61,7 +62,7 @@ static inline mask surface_found(const Surface *surface)
 // Returns the geometric normal, facing the ray.
 static inline Vector surface_normal(const Surface *surface)
 {
-    return HAS_TRIANGLES ? surface->normal : surface->shading_normal;
+    return HAS_SHADING_NORMALS ? surface->normal : surface->shading_normal;
 }
 
 static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, uint index, const Ray *ray,
@@ -96,6 +97,7 @@ typedef struct {
     mask lanes;
     SurfacePoint point;
     TextureCoordinates coordinates; // only for triangles
+    Tangents tangents;              // with HAS_NORMAL_MAPS, only for triangles
 } LaneSurfacePoints;
 
 // Sets the chord's end where rays hit a sphere.
@@ -159,10 +161,8 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         ray_prepare(&own);
         weights = triangle_weights(corners, &own);
         hit.point = instance_surface_point(&instance, corners, normal, weights);
-        if (smooth) {
-            normals = instance_normals(&instance, normals);
-            corners = instance_corners(&instance, corners);
-        }
+        if (smooth) normals = instance_normals(&instance, normals);
+        if (smooth || HAS_NORMAL_MAPS) corners = instance_corners(&instance, corners);
         if (HAS_IMAGES)
             density =
                 real_divide(density, lanes_select(hit.lanes, instance_stretch(&instance, normal), (real)(1)));
@@ -186,6 +186,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, uvs);
         hit.coordinates = (TextureCoordinates){uv.x, uv.y, density};
+        if (HAS_NORMAL_MAPS) hit.tangents = triangle_tangents(corners, uvs);
     }
     return hit;
 }
@@ -264,6 +265,13 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
     return real_floor(halved) != halved;
 }
 
+static inline TextureCoordinates hit_coordinates(const Scene *scene, uint4 entry, const Material *material,
+                                                 const LaneSurfacePoints *hit)
+{
+    if (entry.x == KIND_TRIANGLES) return hit->coordinates;
+    return texture_coordinates(scene, entry.x, entry.y, material, &hit->point);
+}
+
 // Returns the object's color at the hit: plain, checkered or textured. `entry` is the object's
 // kind_index_material.
 static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
@@ -277,12 +285,24 @@ static inline Color3 object_color(const Scene *scene, uint4 entry, const Materia
         color = vector_select(odd, vector_of(material->other_color), color);
     }
     if (HAS_IMAGES && material->texture.x > 0) {
-        TextureCoordinates coordinates =
-            entry.x == KIND_TRIANGLES ? hit->coordinates
-                                      : texture_coordinates(scene, entry.x, entry.y, material, &hit->point);
-        color = texture_color(scene, entry.x, material, coordinates, &hit->point, ray, travelled, hit->lanes);
+        TextureCoordinates coordinates = hit_coordinates(scene, entry, material, hit);
+        color = texture_color(scene, entry.x, material->texture, coordinates, &hit->point, ray, travelled,
+                              hit->lanes);
     }
     return color;
+}
+
+// Tilts the shading normals of the hit by the material's normal map.
+static inline void hit_tilt_normals(const Scene *scene, uint4 entry, const Material *material,
+                                    LaneSurfacePoints *hit, const Ray *ray, real travelled)
+{
+    if (material->normal_map.x == 0) return;
+    TextureCoordinates coordinates = hit_coordinates(scene, entry, material, hit);
+    Tangents tangents = entry.x == KIND_TRIANGLES
+                            ? hit->tangents
+                            : shape_tangents(scene, entry.x, entry.y, hit->point.normal);
+    hit->point.shading_normal = normal_tilted(scene, entry.x, material, tangents, coordinates, &hit->point,
+                                              ray, travelled, hit->lanes);
 }
 
 static inline void surface_set_material(Surface *surface, const Scene *scene, mask lanes,
@@ -358,7 +378,7 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
     if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
     Vector normal = vector_select(along, vector_negate(point->normal), point->normal);
-    if (HAS_TRIANGLES) surface->normal = normal;
+    if (HAS_SHADING_NORMALS) surface->normal = normal;
     mask opposite = vector_dot(point->shading_normal, normal) < (real)(0);
     surface->shading_normal =
         vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
@@ -428,8 +448,9 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         }
         at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
 #endif
-        surface_point_replace(&point, found.lanes, &found.point);
         Material material = scene->materials[entry.z];
+        if (HAS_NORMAL_MAPS) hit_tilt_normals(scene, entry, &material, &found, ray, surface.travelled);
+        surface_point_replace(&point, found.lanes, &found.point);
         mask doubt;
         // stored in every surface, the zeros would cost frames 2 %
         Color3 color =

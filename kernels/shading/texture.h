@@ -79,8 +79,10 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ki
 {
     if (HAS_SPHERES && kind == KIND_SPHERES) {
         Sphere sphere = scene->spheres[index];
+        uint first_level = material->texture.x;
+        if (HAS_NORMAL_MAPS && first_level == 0) first_level = material->normal_map.x;
         return sphere_texture_coordinates(&sphere, point->normal,
-                                          scene->texture_levels[material->texture.x - 1].place);
+                                          scene->texture_levels[first_level - 1].place);
     }
     GridCoordinates grid = grid_coordinates(scene, kind, index, point->position);
     return (TextureCoordinates){grid.u, grid.v, (real)(material->reflection_transmission_ior.w)};
@@ -191,16 +193,16 @@ static inline Vector sky_image_color(const Scene *scene, Vector direction, mask 
 
 // Returns the texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance
 // `travelled` from the eye. At a grazing angle the footprint grows by at most 2^10.
-static inline Vector texture_color(const Scene *scene, uint kind, const Material *material,
+static inline Vector texture_color(const Scene *scene, uint kind, uint4 texture,
                                    TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
                                    real travelled, mask wanted)
 {
     real cosine = real_max(fabs(vector_dot(point->normal, ray->direction)), (real)(0x1p-10f));
     real width = travelled * (real)(scene->header->sample.x);
     if (HAS_ORTHOGRAPHIC && scene->header->sample.z > 0) width = (real)(scene->header->sample.z);
-    return texture_lookup(scene, material->texture, coordinates.u, coordinates.v,
+    return texture_lookup(scene, texture, coordinates.u, coordinates.v,
                           real_divide(width * coordinates.density, cosine),
-                          kind == KIND_SPHERES ? WRAP_CLAMPED : material->texture.w, wanted);
+                          kind == KIND_SPHERES ? WRAP_CLAMPED : texture.w, wanted);
 }
 
 #endif

@@ -8,10 +8,12 @@
 // the true surface by less than POINT_SCALE_ERROR u rounding_scale + POINT_POSITION_ERROR u |position|.
 enum { POINT_SCALE_ERROR = 16, POINT_POSITION_ERROR = 4 };
 
+#define HAS_SHADING_NORMALS (HAS_TRIANGLES || HAS_NORMAL_MAPS)
+
 typedef struct {
     Vector position;
     Vector normal;         // geometric, unit, to either side
-    Vector shading_normal; // unit; differs on smooth triangles
+    Vector shading_normal; // unit; differs only with HAS_SHADING_NORMALS
     real rounding_scale;
     Vector lift; // with HAS_SMOOTH_NORMALS, from the position to where rays to lights start
     // At `certified`, how fast the shading normal turns along the surface, and a bound on its error. For a

@@ -120,11 +120,11 @@ static uint32_t texture_add(const Importer *importer, const char *name, const ch
         // glint reads no image that is not compressed
         const Source bytes = {.bytes = (const char *)embedded->pcData,
                               .length = embedded->mHeight == 0 ? embedded->mWidth : 0};
-        return draft_add_embedded_texture(draft, &bytes, name);
+        return draft_add_embedded_texture(draft, &bytes, TEXTURE_COLORS, name);
     }
     bool is_moved;
     char *path = draft_find_file(draft->import->path, name, strlen(name), &is_moved);
-    const uint32_t texture = draft_add_texture(draft, path, owner);
+    const uint32_t texture = draft_add_texture(draft, path, TEXTURE_COLORS, owner);
     if (is_moved && texture > 0) draft_warn(draft, "%s: no '%.100s': '%.100s' is used", owner, name, path);
     free(path);
     return texture;

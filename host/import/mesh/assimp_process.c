@@ -228,9 +228,9 @@ static bool textures_read(MeshDraft *draft, FILE *reply, uint64_t count,
         snprintf(owner, sizeof owner, "image %u", (unsigned)i);
         if (is_whole && bytes.count > 0)
             textures[i] = draft_add_embedded_texture(
-                draft, &(Source){.bytes = bytes.items, .length = bytes.count}, owner);
+                draft, &(Source){.bytes = bytes.items, .length = bytes.count}, TEXTURE_COLORS, owner);
         else if (is_whole)
-            textures[i] = draft_add_texture(draft, from.path, owner);
+            textures[i] = draft_add_texture(draft, from.path, TEXTURE_COLORS, owner);
         text_free(&bytes);
         if (!is_whole) return false;
     }

@@ -130,32 +130,33 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
     return *is_moved ? near : path;
 }
 
-static uint32_t texture_add(MeshDraft *draft, const char *path, const char *owner)
+static uint32_t texture_add(MeshDraft *draft, const char *path, TextureContent content, const char *owner)
 {
-    const uint32_t texture = scene_add_texture(draft->scene, path, NULL, false, draft->import->offset);
+    const uint32_t texture = scene_add_texture(draft->scene, path, NULL, content, draft->import->offset);
     if (texture == 0) draft_warn(draft, "%s: too many images in one scene: the color is used", owner);
     return texture;
 }
 
-uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner)
+uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent content, const char *owner)
 {
     const SceneOptions *options = draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);
     const char *obstacle = file_obstacle(path);
-    if (!obstacle && image_is_known(path)) return texture_add(draft, path, owner);
+    if (!obstacle && image_is_known(path)) return texture_add(draft, path, content, owner);
     draft_warn(draft, "%s: cannot read '%.100s': %s: the color is used", owner, path,
                obstacle ? obstacle : "not a PNG, JPEG, PPM or EXR");
     return 0;
 }
 
-uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, const char *owner)
+uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, TextureContent content,
+                                    const char *owner)
 {
     if (!image_bytes_are_known(bytes->bytes, bytes->length)) {
         draft_warn(draft, "%s: not a PNG, JPEG, PPM or EXR: the color is used", owner);
         return 0;
     }
     char *path = text_format("%s: %s", draft->import->path, owner);
-    const uint32_t texture = texture_add(draft, path, owner);
+    const uint32_t texture = texture_add(draft, path, content, owner);
     free(path);
     Text *copy = texture > 0 ? &draft->scene->textures.items[texture - 1].bytes : NULL;
     if (copy && copy->count == 0) text_append(copy, bytes->bytes, bytes->length);

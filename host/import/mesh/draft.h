@@ -126,8 +126,9 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
 
 // Adds an image to the scene's textures, from a file or from bytes, which are copied. Returns 0 with a
 // warning at `owner` if the image cannot be used.
-uint32_t draft_add_texture(MeshDraft *draft, const char *path, const char *owner);
-uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, const char *owner);
+uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent content, const char *owner);
+uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, TextureContent content,
+                                    const char *owner);
 
 // Ends the face at the corners since the last one; points and lines are skipped. Returns false if there are
 // too many corners.

@@ -26,7 +26,7 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
     [GLTF_UNLIT_TINT] = "the factors of an emitted texture become their mean",
     [GLTF_METAL_TEXTURE] = "the texture of metal and roughness is not used: the factors are",
     [GLTF_METAL_COLOR] = "reflections of metals do not have the colors of a texture",
-    [GLTF_NORMAL_TEXTURE] = "normal textures are not used: the normals of the vertices are",
+    [GLTF_NORMAL_TEXTURE_PLACE] = "the normal texture has other coordinates than the color: it is not used",
     [GLTF_OCCLUSION_TEXTURE] = "occlusion textures are not used: the lights' shadows are",
     [GLTF_TEXTURE_PLACE] = "the mesh lacks the texture's coordinates: the color is used",
     [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
@@ -266,8 +266,8 @@ static void gltf_open(Gltf *gltf)
     gltf->buffers = memory_allocate_zeroed(gltf->buffer_count + 1, sizeof *gltf->buffers);
     gltf->materials = memory_allocate_zeroed(material_count, sizeof *gltf->materials);
     const size_t image_count = gltf_count(gltf, "images");
-    gltf->images = memory_allocate(image_count + 1, sizeof *gltf->images);
-    memset(gltf->images, 0xff, image_count * sizeof *gltf->images);
+    gltf->images = memory_allocate(2 * image_count + 1, sizeof *gltf->images);
+    memset(gltf->images, 0xff, 2 * image_count * sizeof *gltf->images);
     gltf->is_visited = memory_allocate_zeroed(gltf_count(gltf, "nodes") + 1, sizeof *gltf->is_visited);
 }
 

@@ -22,14 +22,19 @@ typedef struct {
 
 enum { UV_SETS_MAX = 255 };
 
+// Where a material's texture lies.
+typedef struct {
+    uint32_t number; // of the scene; 0: none
+    size_t uv_set;
+    double uv_rows[2][3]; // from the file's texture coordinates to those of the texture
+    TextureWrap wraps[2]; // along u and v
+} GltfTexture;
+
 // A material. Primitives that have its set of texture coordinates show its texture.
 typedef struct {
     Material look;
     bool is_read;
-    uint32_t texture; // of the scene; 0: none
-    size_t uv_set;
-    double uv_rows[2][3];    // from the file's texture coordinates to those of the texture
-    TextureWrap wraps[2];    // along u and v
+    GltfTexture texture, normals;
     double textured_ambient; // the ambient factor with the texture
     bool texture_emits;      // by that factor, in place of the emission
     uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
@@ -51,7 +56,7 @@ typedef enum {
     GLTF_UNLIT_TINT,
     GLTF_METAL_TEXTURE,
     GLTF_METAL_COLOR,
-    GLTF_NORMAL_TEXTURE,
+    GLTF_NORMAL_TEXTURE_PLACE,
     GLTF_OCCLUSION_TEXTURE,
     GLTF_TEXTURE_PLACE,
     GLTF_NEAREST,
@@ -67,10 +72,10 @@ typedef struct {
     size_t buffer_count;
     size_t byte_count, element_count; // of the buffers, and of the accessors as often as they are read
     GltfMaterial *materials;          // one for each of the file's, then the default
-    uint32_t *images;                 // the texture of each image; DRAFT_NONE: not read yet
-    bool *is_visited;                 // by node
-    unsigned losses;                  // bits
-    bool is_optional;                 // errors in what is read now are warnings
+    uint32_t *images; // the texture of each image as colors and as normals; DRAFT_NONE: not read yet
+    bool *is_visited; // by node
+    unsigned losses;  // bits
+    bool is_optional; // errors in what is read now are warnings
 } Gltf;
 
 // Reports an error at the item, or a warning while `is_optional` is set. Always returns false.

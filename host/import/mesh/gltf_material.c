@@ -69,7 +69,6 @@ static void surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
         const char *key;
         GltfLoss loss;
     } losses[] = {{&pbr, "metallicRoughnessTexture", GLTF_METAL_TEXTURE},
-                  {item, "normalTexture", GLTF_NORMAL_TEXTURE},
                   {item, "occlusionTexture", GLTF_OCCLUSION_TEXTURE}};
     for (size_t i = 0; i < sizeof losses / sizeof *losses; i++) {
         const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
@@ -78,7 +77,7 @@ static void surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
 }
 
 // Adds the image to the scene's textures. Returns 0 with a warning if it cannot be used.
-static uint32_t image_add(Gltf *gltf, const GltfItem *image)
+static uint32_t image_add(Gltf *gltf, const GltfItem *image, TextureContent content)
 {
     MeshDraft *draft = gltf->draft;
     const GltfItem uri = gltf_member(image, "uri");
@@ -86,7 +85,7 @@ static uint32_t image_add(Gltf *gltf, const GltfItem *image)
     if (text && strncmp(text, "data:", 5) != 0) {
         char *path = gltf_path(gltf, &uri);
         if (!path) gltf_warn(gltf, &uri, "must be a relative path or base64 data: the color is used");
-        const uint32_t texture = path ? draft_add_texture(draft, path, image->path) : 0;
+        const uint32_t texture = path ? draft_add_texture(draft, path, content, image->path) : 0;
         free(path);
         return texture;
     }
@@ -100,7 +99,7 @@ static uint32_t image_add(Gltf *gltf, const GltfItem *image)
     if (!text) gltf_view_read(gltf, image, "bufferView", &bytes, &stride);
     if (text && gltf_data_decode(&decoded, text))
         bytes = (Source){.bytes = text_c(&decoded), .length = decoded.count};
-    const uint32_t texture = draft_add_embedded_texture(draft, &bytes, image->path);
+    const uint32_t texture = draft_add_embedded_texture(draft, &bytes, content, image->path);
     text_free(&decoded);
     return texture;
 }
@@ -116,21 +115,21 @@ static bool wrap_read(Gltf *gltf, const GltfItem *sampler, const char *key, Text
     return true;
 }
 
-static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfMaterial *material)
+static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfTexture *place)
 {
     enum { NEAREST = 9728 };
     size_t index = SIZE_MAX;
     if (!gltf_index(gltf, texture, "sampler", "samplers", &index) || index == SIZE_MAX) return;
     const GltfItem sampler = gltf_entry(gltf, "samplers", index), filter = gltf_member(&sampler, "magFilter");
-    wrap_read(gltf, &sampler, "wrapS", &material->wraps[0]);
-    wrap_read(gltf, &sampler, "wrapT", &material->wraps[1]);
+    wrap_read(gltf, &sampler, "wrapS", &place->wraps[0]);
+    wrap_read(gltf, &sampler, "wrapT", &place->wraps[1]);
     if (json_integer_value(filter.json) == NEAREST) gltf_lose(gltf, GLTF_NEAREST, &filter);
 }
 
 // KHR_texture_transform: scales, turns counterclockwise as the image is seen, with v downward, and moves. The
 // GLSL listing of its specification turns the other way (KhronosGroup/glTF, issue 1563); its text, its sample
 // model and other programs turn this way.
-static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfMaterial *material)
+static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfTexture *place)
 {
     const GltfItem transform = gltf_extension(info, "KHR_texture_transform");
     double offset[2] = {0, 0}, scale[2] = {1, 1}, angle = 0;
@@ -138,15 +137,15 @@ static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfMaterial *ma
         !gltf_numbers(gltf, &transform, "scale", 2, scale) ||
         !gltf_numbers(gltf, &transform, "rotation", 1, &angle))
         return;
-    gltf_integer(gltf, &transform, "texCoord", 0, UV_SETS_MAX, &material->uv_set);
+    gltf_integer(gltf, &transform, "texCoord", 0, UV_SETS_MAX, &place->uv_set);
     const double c = cos(angle), s = sin(angle);
     const double rows[2][3] = {{c * scale[0], s * scale[1], offset[0]},
                                {-s * scale[0], c * scale[1], offset[1]}};
-    memcpy(material->uv_rows, rows, sizeof rows);
+    memcpy(place->uv_rows, rows, sizeof rows);
 }
 
 // Sets the texture that a material names, unless it cannot be used.
-static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *material)
+static void texture_read(Gltf *gltf, const GltfItem *info, TextureContent content, GltfTexture *place)
 {
     size_t index = SIZE_MAX, source = SIZE_MAX;
     if (!info->json || !gltf_index(gltf, info, "index", "textures", &index) || index == SIZE_MAX) return;
@@ -156,13 +155,13 @@ static void texture_read(Gltf *gltf, const GltfItem *info, GltfMaterial *materia
         gltf_warn(gltf, &texture, "has no PNG or JPEG image: the color is used");
         return;
     }
-    if (!gltf_integer(gltf, info, "texCoord", 0, UV_SETS_MAX, &material->uv_set)) return;
-    uv_transform_read(gltf, info, material);
-    sampler_read(gltf, &texture, material);
+    if (!gltf_integer(gltf, info, "texCoord", 0, UV_SETS_MAX, &place->uv_set)) return;
+    uv_transform_read(gltf, info, place);
+    sampler_read(gltf, &texture, place);
     const GltfItem image = gltf_entry(gltf, "images", source);
-    uint32_t *known = &gltf->images[source];
-    if (*known == DRAFT_NONE) *known = image_add(gltf, &image);
-    material->texture = *known;
+    uint32_t *known = &gltf->images[2 * source + (content == TEXTURE_NORMALS)];
+    if (*known == DRAFT_NONE) *known = image_add(gltf, &image, content);
+    place->number = *known;
 }
 
 static double mean_of(const double color[3])
@@ -219,8 +218,8 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surfac
     look->ambient = gltf->draft->import->view ? 0 : look->diffuse.x;
     material->textured_ambient = look->ambient * mean_of(base);
     if (surface->is_unlit) {
-        if (material->texture > 0 && !texture_can_emit(gltf, item, material, mean_of(base))) return;
-        if (material->texture > 0 && (base[0] != base[1] || base[1] != base[2]))
+        if (material->texture.number > 0 && !texture_can_emit(gltf, item, material, mean_of(base))) return;
+        if (material->texture.number > 0 && (base[0] != base[1] || base[1] != base[2]))
             gltf_lose(gltf, GLTF_UNLIT_TINT, item);
         look->emission = look->color;
         look->ambient = look->specular = look->reflection = 0;
@@ -235,8 +234,9 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surfac
         look->emission = emission;
         return;
     }
-    if (!other && mean_of(base) == 0) texture_read(gltf, &surface->emissive_texture, material);
-    if (material->texture == 0 || (other && !json_equal(own, other))) {
+    if (!other && mean_of(base) == 0)
+        texture_read(gltf, &surface->emissive_texture, TEXTURE_COLORS, &material->texture);
+    if (material->texture.number == 0 || (other && !json_equal(own, other))) {
         gltf_lose(gltf, GLTF_EMISSIVE_TEXTURE, item);
     } else if (texture_can_emit(gltf, item, material,
                                 mean_of((double[]){emission.x, emission.y, emission.z}))) {
@@ -283,6 +283,45 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
     }
 }
 
+// Returns an affine map of the plane after another.
+static void rows_multiply(double after[2][3], double first[2][3], double product[2][3])
+{
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 3; k++)
+            product[i][k] =
+                after[i][0] * first[0][k] + after[i][1] * first[1][k] + (k == 2 ? after[i][2] : 0);
+}
+
+// Sets the normal texture. A mesh has the texture coordinates of the color's, upward, from which those of the
+// normals follow if both are in one set.
+static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
+{
+    double upward[2][3] = {{1, 0, 0}, {0, -1, 1}};
+    const GltfItem info = gltf_member(item, "normalTexture");
+    GltfTexture *normals = &material->normals, *color = &material->texture;
+    Material *look = &material->look;
+    texture_read(gltf, &info, TEXTURE_NORMALS, normals);
+    if (normals->number == 0) return;
+    if (color->number == 0) {
+        *color = *normals;
+        color->number = 0;
+    }
+    double(*c)[3] = color->uv_rows;
+    const double area = c[0][0] * c[1][1] - c[0][1] * c[1][0];
+    if (normals->uv_set != color->uv_set || area == 0) {
+        gltf_lose(gltf, GLTF_NORMAL_TEXTURE_PLACE, &info);
+        normals->number = 0;
+        return;
+    }
+    double back[2][3] = {{c[1][1] / area, -c[0][1] / area, (c[0][1] * c[1][2] - c[1][1] * c[0][2]) / area},
+                         {-c[1][0] / area, c[0][0] / area, (c[1][0] * c[0][2] - c[0][0] * c[1][2]) / area}};
+    double rows[2][3], from_upward[2][3];
+    rows_multiply(back, upward, from_upward);
+    rows_multiply(normals->uv_rows, from_upward, rows);
+    rows_multiply(upward, rows, look->normal_rows);
+    gltf_numbers(gltf, &info, "scale", 1, &look->normal_strength);
+}
+
 static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
 {
     Surface surface;
@@ -290,17 +329,19 @@ static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *materi
     surface_read(gltf, item, &surface);
     *material = (GltfMaterial){.look = material_default(),
                                .is_read = true,
-                               .uv_rows = {{1, 0, 0}, {0, 1, 0}},
+                               .texture = {.uv_rows = {{1, 0, 0}, {0, 1, 0}}},
+                               .normals = {.uv_rows = {{1, 0, 0}, {0, 1, 0}}},
                                .scene_index = {DRAFT_NONE, DRAFT_NONE}};
     Material *look = &material->look;
     look->ignores_alpha = true; // alphaMode decides
     for (int i = 0; i < 4; i++)
         surface.base[i] = fmax(surface.base[i], 0);
-    texture_read(gltf, &surface.base_texture, material);
+    texture_read(gltf, &surface.base_texture, TEXTURE_COLORS, &material->texture);
     look->color = (Color){surface.base[0], surface.base[1], surface.base[2]};
     gloss_set(gltf, item, &surface, look);
     emission_set(gltf, item, &surface, material);
     transparency_set(gltf, item, &surface, material);
+    normals_set(gltf, item, material);
     gltf->is_optional = false;
 }
 
@@ -323,12 +364,17 @@ uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_texture
     uint32_t *index = &material->scene_index[is_textured];
     if (*index != DRAFT_NONE) return *index;
     Material look = material->look;
-    if (!is_textured) look.cutout = 0;
-    if (is_textured) {
-        look.texture = look.cutout_texture = material->texture;
+    const bool is_colored = is_textured && material->texture.number > 0;
+    if (!is_colored) look.cutout = 0;
+    if (is_textured && material->normals.number > 0) {
+        look.normal_texture = material->normals.number;
+        memcpy(look.normal_wrap, material->normals.wraps, sizeof look.normal_wrap);
+    }
+    if (is_colored) {
+        look.texture = look.cutout_texture = material->texture.number;
         look.ambient = material->textured_ambient;
         if (material->texture_emits) look.emission = vector_all(0);
-        memcpy(look.texture_wrap, material->wraps, sizeof look.texture_wrap);
+        memcpy(look.texture_wrap, material->texture.wraps, sizeof look.texture_wrap);
         look.diffuse = (Color){look.diffuse.x * look.color.x, look.diffuse.y * look.color.y,
                                look.diffuse.z * look.color.z};
     }

@@ -80,7 +80,7 @@ static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMater
         !gltf_accessor_read(gltf, primitive, "indices", 1, &vertices->indices))
         return false;
     char uvs[24];
-    snprintf(uvs, sizeof uvs, "TEXCOORD_%zu", material ? material->uv_set : 0);
+    snprintf(uvs, sizeof uvs, "TEXCOORD_%zu", material ? material->texture.uv_set : 0);
     attribute_read(gltf, &attributes, "NORMAL", 3, &vertices->positions, &vertices->normals);
     attribute_read(gltf, &attributes, uvs, 2, &vertices->positions, &vertices->uvs);
     for (size_t i = 0; i < vertices->indices.count; i++) {
@@ -98,7 +98,7 @@ static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfM
                          const Affine *affine)
 {
     static const double plain[2][3] = {{1, 0, 0}, {0, 1, 0}};
-    const double(*rows)[3] = material ? material->uv_rows : plain;
+    const double(*rows)[3] = material ? material->texture.uv_rows : plain;
     const Affine for_normals = affine_for_normals(affine);
     if (vertices->normals.count > 0) draft_share_part(draft, DRAFT_NORMAL, vertices->first);
     if (vertices->uvs.count > 0) draft_share_part(draft, DRAFT_UV, vertices->first);
@@ -157,9 +157,10 @@ static bool primitive_add(Gltf *gltf, const GltfItem *primitive, const Affine *a
     Vertices vertices;
     const bool read = vertices_read(gltf, primitive, material, &vertices);
     if (read && material) {
-        const uint32_t index =
-            gltf_material_index(gltf, material, material->texture > 0 && vertices.uvs.count > 0);
-        if (material->texture > 0 && vertices.uvs.count == 0) gltf_lose(gltf, GLTF_TEXTURE_PLACE, primitive);
+        const bool has_texture = material->texture.number > 0 || material->normals.number > 0,
+                   has_uvs = vertices.uvs.count > 0;
+        const uint32_t index = gltf_material_index(gltf, material, has_texture && has_uvs);
+        if (has_texture && !has_uvs) gltf_lose(gltf, GLTF_TEXTURE_PLACE, primitive);
         array_push(draft->materials, ((DraftMaterialRun){draft->face_start, index}));
     }
     if (read) {

@@ -390,15 +390,14 @@ static int name_compare(const void *name, const void *material)
 
 // Adds an image to the scene. Returns 0 with a warning if it cannot be used.
 static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const char *image,
-                          bool alpha_by_luminance)
+                          TextureContent content)
 {
     if (!draft_has(draft, DRAFT_UV)) {
         draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", image,
                    material->name);
         return 0;
     }
-    const uint32_t texture =
-        scene_add_texture(draft->scene, image, NULL, alpha_by_luminance, draft->import->offset);
+    const uint32_t texture = scene_add_texture(draft->scene, image, NULL, content, draft->import->offset);
     if (texture == 0)
         draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
                    material->name);
@@ -412,14 +411,16 @@ static void textures_use(MeshDraft *draft, MtlMaterial *material)
     Material *look = &material->material;
     const bool is_one_file =
         material->image && material->opacity_image && strcmp(material->image, material->opacity_image) == 0;
-    if (material->image) look->texture = image_add(draft, material, material->image, is_one_file);
+    if (material->image)
+        look->texture =
+            image_add(draft, material, material->image, is_one_file ? TEXTURE_OPACITY : TEXTURE_COLORS);
     if (look->texture > 0) {
         look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
                                 look->diffuse.z * look->color.z};
         look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
     }
     if (material->opacity_image)
-        look->cutout_texture = image_add(draft, material, material->opacity_image, true);
+        look->cutout_texture = image_add(draft, material, material->opacity_image, TEXTURE_OPACITY);
     if (look->cutout_texture == 0) return;
     look->cutout = CUTOUT_OF_BLENDED;
     look->cutout_blends = true;

@@ -142,7 +142,8 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 }
 
 // Reads the name of a file, or a mapping of a file and its layer.
-bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+static bool content_read(YamlReader *reader, const Field *field, const YamlNode *node, TextureContent content,
+                         uint32_t *target)
 {
     typedef struct {
         const YamlNode *file, *layer;
@@ -161,12 +162,22 @@ bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, 
     if (!path) return false;
     node = names.file;
     const char *layer = names.layer ? yaml_text(&reader->tree, names.layer) : NULL;
-    const uint32_t texture = scene_add_texture(reader->scene, path, layer, false, node->offset);
+    const uint32_t texture = scene_add_texture(reader->scene, path, layer, content, node->offset);
     free(path);
     if (texture == 0)
         report_error(&reader->report, node->offset, "more than %d textures", SCENE_TEXTURES_MAX);
-    *(uint32_t *)target = texture;
+    *target = texture;
     return texture > 0;
+}
+
+bool read_texture(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return content_read(reader, field, node, TEXTURE_COLORS, target);
+}
+
+static bool read_normal_map(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return content_read(reader, field, node, TEXTURE_NORMALS, target);
 }
 
 // Takes a factor or a color in the field's range. Sets the largest channel and the tint.
@@ -224,14 +235,30 @@ static void energy_check(YamlReader *reader, const Material *material, const Yam
                                                : "");
 }
 
+// Reports keys that only textures give a meaning.
+static void textures_check(YamlReader *reader, const Material *material, const YamlNode *node)
+{
+    const YamlNode *size = field_node(reader, node, "size"),
+                   *strength = field_node(reader, node, "normal_strength");
+    if (size != node && material->texture == 0 && material->normal_texture == 0)
+        report_error(&reader->report, size->offset, "'size' is that of an 'image' or a 'normal_map'");
+    if (strength != node && material->normal_texture == 0)
+        report_error(&reader->report, strength->offset, "'normal_strength' is that of a 'normal_map'");
+}
+
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
         {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL, NULL},
         {"checker", read_checker, 0, FORM_SECOND, OPTIONAL, NULL},
         {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED, NULL},
-        {"size", read_number, offsetof(Material, texture_size), FORM_THIRD, OPTIONAL, &range_positive},
+        {"size", read_number, offsetof(Material, texture_size), FORM_FIRST | FORM_THIRD, OPTIONAL,
+         &range_positive},
         {"cutout", read_number, offsetof(Material, cutout), FORM_THIRD, OPTIONAL, &range_unit},
+        {"normal_map", read_normal_map, offsetof(Material, normal_texture), FORM_FIRST | FORM_THIRD, OPTIONAL,
+         NULL},
+        {"normal_strength", read_number, offsetof(Material, normal_strength), FORM_FIRST | FORM_THIRD,
+         OPTIONAL, &range_not_negative},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
         {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
         {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
@@ -254,6 +281,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     }
     const bool is_read =
         node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
+    if (is_read) textures_check(reader, &material, node);
     if (material.cutout > 0) material.cutout_texture = material.texture;
     if (conductor != node && (material.fresnel || material.transmission > 0))
         report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",

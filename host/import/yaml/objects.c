@@ -207,7 +207,7 @@ static const Shape shapes[SHAPE_MESH] = {
 
 bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *node)
 {
-    if (reader->scene->materials.items[object->material].texture == 0) return true;
+    if (material_any_texture(&reader->scene->materials.items[object->material]) == 0) return true;
     if (object->kind == SHAPE_MESH)
         return reader->scene->meshes.items[object->as.mesh.index].uvs ||
                report_error(&reader->report, node->offset, "the mesh has no uv for the material's image");
