@@ -334,6 +334,9 @@ static void images_of_materials_are_used(void **state)
         {"map_Kd C:/none.png\n",
          "a.mtl:2:8: warning: cannot read 'C:/none.png': No such file or directory: the color is used\n"},
         {"map_Kd -s 2 2 1 -clamp on -bm 3 a.ppm\n", "a.mtl:2:8: warning: options of textures are not used\n"},
+        {"map_bump -bm 3 none.png\n",
+         "a.mtl:2:16: warning: cannot read 'none.png': No such file or directory: normals are not tilted\n"},
+        {"norm a.ppm\n", ""},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         Text mtl = {0};
@@ -347,13 +350,44 @@ static void images_of_materials_are_used(void **state)
     }
 }
 
+// Heights are white 1/50 of the image's width above black; a colored image of map_Bump has normals, as that
+// of norm. -bm multiplies either.
+static void bumps_are_normals(void **state)
+{
+    (void)state;
+    const char *ramp = "P3 5 1 255 0 0 0 51 51 51 102 102 102 51 51 51 0 0 0\n",
+               *colors = "P3 2 1 255 0 51 102 153 204 255\n";
+    for (int i = 0; i < 4; i++) {
+        Text mtl = {0};
+        const bool is_ramp = i < 2;
+        file_write("a.ppm", is_ramp ? ramp : colors);
+        text_appendf(&mtl, "newmtl red\n%s -bm -2.5 a.ppm\n", i % 2 ? "norm" : i == 0 ? "map_Bump" : "bump");
+        file_write("a.mtl", text_c(&mtl));
+        Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", "");
+        const Material *red = triangle_material(&scene, 0);
+        assert_int_equal(red->normal_texture, 1);
+        assert_number(red->normal_strength, -2.5);
+        assert_int_equal(scene.textures.items[0].content, i % 2 ? TEXTURE_NORMALS : TEXTURE_BUMPS);
+        const float *values = scene.textures.items[0].image.values;
+        const double slope = 0.2 * 5 / 50, length = sqrt(1 + slope * slope);
+        const Vector3 rising = {0.5 - 0.5 * slope / length, 0.5, 0.5 + 0.5 / length}, gray = {0.2, 0.2, 0.2},
+                      first = {0, 0.2, 0.4};
+        const Vector3 expected = i == 0 ? rising : i == 1 ? gray : first;
+        const size_t at = is_ramp ? 3 : 0;
+        const Vector3 got = {values[at], values[at + 1], values[at + 2]};
+        assert_true(vector_length(vector_subtract(got, expected)) < 1e-6);
+        scene_free(&scene);
+        text_free(&mtl);
+    }
+}
+
 static void what_is_not_used_is_reported_once(void **state)
 {
     (void)state;
     file_write(
         "a.mtl",
-        "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf xyz 1\nmap_Bump b.png\n"
-        "newmtl more\nTf 1 0 0\nmap_Bump b.png\nPr 0.5\n");
+        "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf xyz 1\nmap_refl b.png\n"
+        "newmtl more\nTf 1 0 0\nmap_refl b.png\nPr 0.5\n");
     Scene scene = scene_of_obj(
         "mtllib a.mtl\nusemtl red\nv 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nvt nan 0\nvt 0 1e31\nvn 0 inf 0\n"
         "f 1/1/1 2/2/1 3/1/1\nl 1 2\np 1\nl 2 3\ncstype bezier\n",
@@ -367,7 +401,7 @@ static void what_is_not_used_is_reported_once(void **state)
         "a.mtl:6:4: warning: no number up to 1e+30: the default is used\n"
         "a.mtl:7:4: warning: must be 0 or more, not -1: the default is used\n"
         "a.mtl:8:4: warning: no number up to 1e+30: the default is used\n"
-        "a.mtl:9:1: warning: 'map_Bump' is not used\n"
+        "a.mtl:9:1: warning: 'map_refl' is not used\n"
         "a.mtl:13:1: warning: 'Pr' is not used\n"
         "a.obj:3:11: warning: colors of vertices are not used\n"
         "a.obj:10:1: warning: 'l' is not used\n"
@@ -573,6 +607,7 @@ int main(void)
         cmocka_unit_test(materials_are_those_of_their_faces),
         cmocka_unit_test(missing_materials_are_reported),
         cmocka_unit_test(images_of_materials_are_used),
+        cmocka_unit_test(bumps_are_normals),
         cmocka_unit_test(what_is_not_used_is_reported_once),
         cmocka_unit_test(missing_parts_are_dropped),
         cmocka_unit_test(files_have_each_message_once),

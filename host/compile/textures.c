@@ -154,7 +154,7 @@ static void texels_flatten(CompiledScene *compiled, const Scene *scene)
         const Image *image = &scene->textures.items[i].image;
         Texel *fine = texels + level->place.x;
         level_fill(fine, image,
-                   image->display && scene->textures.items[i].content != TEXTURE_NORMALS &&
+                   image->display && scene->textures.items[i].content < TEXTURE_NORMALS &&
                        scene->color_meaning != COLORS_DISPLAY);
         texture->largest_texel = largest_texel(fine, (size_t)image->width * image->height);
         texture->sky_mean = sky_mean(fine, image->width, image->height);

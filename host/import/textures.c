@@ -18,6 +18,46 @@ static void alpha_by_luminance(Image *image)
     }
 }
 
+static float height_at(const Image *image, size_t x, size_t y)
+{
+    return image->values[(y * image->width + x) * image->channels];
+}
+
+static bool image_is_gray(const Image *image)
+{
+    const size_t count = image->channels < 3 ? 0 : (size_t)image->width * image->height;
+    for (size_t i = 0; i < count; i++) {
+        const float *value = image->values + i * image->channels;
+        if (fabsf(value[0] - value[1]) > 0x1p-7F || fabsf(value[1] - value[2]) > 0x1p-7F) return false;
+    }
+    return true;
+}
+
+// Replaces heights, of which white is 1/50 of the image's width above black, by the normals of their slopes,
+// the difference of the two neighbors (Blinn, Simulation of wrinkled surfaces, SIGGRAPH 1978).
+static void normals_of_heights(Image *image)
+{
+    const size_t width = image->width, height = image->height;
+    const double scale = (double)width / 50 / 2;
+    float *normals = memory_allocate(3 * width * height, sizeof *normals);
+    for (size_t y = 0; y < height; y++)
+        for (size_t x = 0; x < width; x++) {
+            const float right = height_at(image, (x + 1) % width, y),
+                        left = height_at(image, (x + width - 1) % width, y),
+                        above = height_at(image, x, (y + height - 1) % height),
+                        below = height_at(image, x, (y + 1) % height);
+            const Vector3 normal = vector_normalize(
+                (Vector3){scale * ((double)left - right), scale * ((double)below - above), 1});
+            float *encoded = normals + 3 * (y * width + x);
+            encoded[0] = (float)(0.5 + 0.5 * normal.x);
+            encoded[1] = (float)(0.5 + 0.5 * normal.y);
+            encoded[2] = (float)(0.5 + 0.5 * normal.z);
+        }
+    free(image->values);
+    image->values = normals;
+    image->channels = 3;
+}
+
 static bool texture_read(SceneTexture *texture, MessageList *messages)
 {
     const Text *bytes = &texture->bytes;
@@ -70,6 +110,7 @@ static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *r
     if (!is_usable) return false;
     *texel_count += (size_t)image->width * image->height;
     if (!image->alpha && texture->content == TEXTURE_OPACITY) alpha_by_luminance(&texture->image);
+    if (texture->content == TEXTURE_BUMPS && image_is_gray(image)) normals_of_heights(&texture->image);
     return true;
 }
 

@@ -120,8 +120,9 @@ static inline uint32_t material_any_texture(const Material *material)
 enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
 // What an image's values are: colors; the same, and where all pixels are opaque, their luminance is the
-// alpha; or normals, which no transfer curve has changed.
-typedef enum { TEXTURE_COLORS, TEXTURE_OPACITY, TEXTURE_NORMALS } TextureContent;
+// alpha; normals, which no transfer curve has changed; or the same or, if they are gray, heights, of which
+// decoding makes normals.
+typedef enum { TEXTURE_COLORS, TEXTURE_OPACITY, TEXTURE_NORMALS, TEXTURE_BUMPS } TextureContent;
 
 typedef struct {
     char *path;    // of the image's file; where it has `bytes`, only for messages

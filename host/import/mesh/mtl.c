@@ -15,6 +15,8 @@ typedef struct {
     Material material;
     char *image;           // of map_Kd, or NULL
     char *opacity_image;   // of map_d, or NULL
+    char *normal_image;    // of norm or map_Bump, or NULL
+    bool has_bumps;        // it is that of map_Bump
     uint32_t scene_index;  // DRAFT_NONE: not in the scene yet
     double dissolve;       // d: the opacity; NAN: not given
     double transparency;   // Tr: 1 - d; NAN: not given
@@ -190,8 +192,9 @@ static void illumination_read(MtlReader *reader, MtlMaterial *material)
     number_of_line(reader, &range_illumination, &material->illumination);
 }
 
-// Skips an option of a texture, which starts with `-` and has up to three numbers or one word.
-static bool texture_option_skip(Scan *scan)
+// Reads an option of a texture, which starts with `-` and has up to three numbers or one word. That of -bm is
+// stored where `multiplier` is not NULL, others are skipped: *is_used tells.
+static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
 {
     Scan ahead = *scan;
     const Word word = scan_word(&ahead);
@@ -199,20 +202,24 @@ static bool texture_option_skip(Scan *scan)
     if (word.length < 2 || word.text[0] != '-') return false;
     *scan = ahead;
     int count = 0;
+    *is_used =
+        multiplier && word_is(word, "-bm") && scan_more(scan) && scan_number(scan, multiplier) == NUMBER_READ;
+    if (*is_used) return true;
     while (count < 3 && scan_more(scan) && scan_number(scan, &number) == NUMBER_READ)
         count++;
     if (count == 0) scan_word(scan);
     return true;
 }
 
-// Reads the name of an image. `otherwise` is what is used if it cannot be read.
-static void image_read_name(MtlReader *reader, const char *otherwise, char **image)
+// Reads the name of an image. `otherwise` is what is used if it cannot be read, `multiplier` where the value
+// of -bm belongs, or NULL.
+static void image_read_name(MtlReader *reader, const char *otherwise, char **image, double *multiplier)
 {
     scan_more(&reader->scan);
     const size_t offset = scan_offset(&reader->scan);
-    bool has_options = false;
-    while (texture_option_skip(&reader->scan))
-        has_options = true;
+    bool has_options = false, is_used;
+    while (texture_option_read(&reader->scan, multiplier, &is_used))
+        has_options |= !is_used;
     if (has_options) report_warning(&reader->report, offset, "options of textures are not used");
     const Word name = scan_rest(&reader->scan);
     bool is_moved;
@@ -237,12 +244,25 @@ static void image_read_name(MtlReader *reader, const char *otherwise, char **ima
 
 static void texture_read(MtlReader *reader, MtlMaterial *material)
 {
-    image_read_name(reader, "the color is used", &material->image);
+    image_read_name(reader, "the color is used", &material->image, NULL);
 }
 
 static void opacity_texture_read(MtlReader *reader, MtlMaterial *material)
 {
-    image_read_name(reader, "nothing is cut out", &material->opacity_image);
+    image_read_name(reader, "nothing is cut out", &material->opacity_image, NULL);
+}
+
+static void normal_texture_read(MtlReader *reader, MtlMaterial *material)
+{
+    image_read_name(reader, "normals are not tilted", &material->normal_image,
+                    &material->material.normal_strength);
+    material->has_bumps = false;
+}
+
+static void bump_texture_read(MtlReader *reader, MtlMaterial *material)
+{
+    normal_texture_read(reader, material);
+    material->has_bumps = true;
 }
 
 static void nothing_read(MtlReader *reader, MtlMaterial *material)
@@ -268,6 +288,10 @@ static const struct {
     {"Ke", emission_read},
     {"Tf", filter_read},
     {"map_d", opacity_texture_read},
+    {"norm", normal_texture_read},
+    {"map_Bump", bump_texture_read},
+    {"map_bump", bump_texture_read},
+    {"bump", bump_texture_read},
 };
 
 static void line_read(MtlReader *reader)
@@ -419,6 +443,9 @@ static void textures_use(MeshDraft *draft, MtlMaterial *material)
                                 look->diffuse.z * look->color.z};
         look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
     }
+    if (material->normal_image)
+        look->normal_texture = image_add(draft, material, material->normal_image,
+                                         material->has_bumps ? TEXTURE_BUMPS : TEXTURE_NORMALS);
     if (material->opacity_image)
         look->cutout_texture = image_add(draft, material, material->opacity_image, TEXTURE_OPACITY);
     if (look->cutout_texture == 0) return;
@@ -461,6 +488,7 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
         free(reader.materials.items[i].name);
         free(reader.materials.items[i].image);
         free(reader.materials.items[i].opacity_image);
+        free(reader.materials.items[i].normal_image);
     }
     free(reader.materials.items);
     free(reader.files.items);
