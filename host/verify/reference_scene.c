@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A normal that is zero is that of the triangle.
+// One with a vertex without a normal is flat.
 static Object mesh_triangle(const Mesh *mesh, const Object *whole, size_t part)
 {
     const MeshTriangle triangle = mesh_triangle_at(mesh, whole, part);
@@ -14,12 +14,9 @@ static Object mesh_triangle(const Mesh *mesh, const Object *whole, size_t part)
     Object object = {.kind = SHAPE_TRIANGLE, .material = materials ? materials[part] : whole->material};
     Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
     memcpy(vertices, triangle.vertices, sizeof triangle.vertices);
-    const Vector3 flat = triangle_normal(vertices[0], vertices[1], vertices[2]);
-    for (int i = 0; i < 3; i++) {
-        normals[i] = mesh->normals ? triangle.normals[i] : flat;
-        if (vector_dot(normals[i], normals[i]) == 0) normals[i] = flat;
-    }
-    object.as.triangle.smooth = mesh->normals != NULL;
+    memcpy(normals, triangle.normals, sizeof triangle.normals);
+    object.as.triangle.smooth = mesh->normals && !vector_is_zero(normals[0]) && !vector_is_zero(normals[1]) &&
+                                !vector_is_zero(normals[2]);
     return object;
 }
 
