@@ -463,6 +463,7 @@ static void normal_maps_tilt_normals(void **state)
     check_shade(FRONT, SQUARE, "", up, from_up, toward);
     check_shade(FRONT, SQUARE, "", right, "[0.6, 0, -0.8]", away);
     check_shade(FRONT, SQUARE, ", normal_strength: 2", right, from_right, (0.6 + 0.8) / sqrt(2));
+    check_shade(FRONT, SQUARE, ", normal_strength: 1e30", right, from_right, 0.6);
     check_shade(FRONT, SQUARE, ", normal_strength: 0", right, from_right, 0.8);
     // a mirrored mesh mirrors its map, and from behind the map's bumps are hollows
     check_shade(FRONT, SQUARE " transform: {scale: [-1, 1, 1]},", "", right, from_right, away);

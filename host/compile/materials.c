@@ -66,7 +66,10 @@ static void normal_map_set(FlatMaterial *flat, const CompiledScene *compiled, co
     const double area = fabs(rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]),
                  texels = (double)map->width * map->height / ((double)any->width * any->height);
     flat->normal_map = texture_of(compiled, material->normal_texture, material->normal_wrap);
-    flat->normal_u = (scalar4){rows[0][0], rows[0][1], rows[0][2], material->normal_strength};
+    // with more, whose squares would overflow, normals lie in the surface as they do with the largest
+    const double strength_max = 1e8,
+                 strength = fmax(fmin(material->normal_strength, strength_max), -strength_max);
+    flat->normal_u = (scalar4){rows[0][0], rows[0][1], rows[0][2], strength};
     flat->normal_v = (scalar4){rows[1][0], rows[1][1], rows[1][2], sqrt(area * texels)};
 }
 
