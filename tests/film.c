@@ -32,7 +32,8 @@ RenderSettings film_settings(uint32_t width, uint32_t height, Precision precisio
 {
     RenderSettings settings = settings_of_image(width, height, precision);
     settings.bounce_count = 5;
-    settings.extra_features = tests_are_long() ? 0 : FEATURE_ALL;
+    if (!tests_are_long())
+        settings.extra_features = precision == PRECISION_CERTIFIED ? CERTIFIED_FEATURES : FEATURE_ALL;
     settings.shift_to_eye = true;
     return settings;
 }

@@ -11,9 +11,17 @@ bool tests_are_long(void);
 // that is 1; in long tests those of 1, 4, 8 and 16 that the device runs.
 const uint32_t *tested_lanes(const Device *device);
 
+// The features of the scenes that tests render at certified, which share its programs. With every other
+// feature their build would take half as long again.
+#define CERTIFIED_FEATURES                                                                                   \
+    (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_BOXES | FEATURE_CYLINDERS | FEATURE_CONES |  \
+     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS |                       \
+     FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION |             \
+     FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
+
 // Returns settings for the whole image, one sample per pixel, with the defaults of glint render except for
-// the features: unless tests are long, all are built in, so that all tests of a run share one program per
-// precision.
+// the features: unless tests are long, all are built in, at certified CERTIFIED_FEATURES, so that all tests
+// of a run share one program per precision.
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
 
 // Renders with the settings. Fails the test if they do not fit the device.

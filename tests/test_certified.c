@@ -281,18 +281,10 @@ static const FeatureSet family_features[FAMILY_COUNT] = {
     FEATURE_BVH | FEATURE_PLANES | FEATURE_CYLINDERS | FEATURE_CONES | FEATURE_PARABOLOIDS | FEATURE_TORI,
     FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_SPHERES | FEATURE_CYLINDERS, FEATURE_BVH};
 
-// The features of all scenes of the short test, which one program serves. With every other feature its build
-// would take half as long again.
-#define COMMON_FEATURES                                                                                      \
-    (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_BOXES | FEATURE_CYLINDERS | FEATURE_CONES |  \
-     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS |                       \
-     FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION |             \
-     FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
-
 // Returns the features that are built in whether a scene needs them or not.
 static FeatureSet extra_features(void)
 {
-    return tests_are_long() ? FEATURE_ALL : COMMON_FEATURES;
+    return tests_are_long() ? FEATURE_ALL : CERTIFIED_FEATURES;
 }
 
 // Renderers at each precision. Their kernels serve scene after scene.

@@ -5,6 +5,7 @@
 #include "host/cli/commands.h"
 #include "host/render/renderer.h"
 #include "tests/child.h"
+#include "tests/film.h"
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,7 +55,9 @@ Renderer *__wrap_renderer_open(Compute *compute, const Scene *scene, const Rende
     for (size_t i = 0; i < count && wrong.change == THE_CHECKER; i++)
         changed.materials.items[i].checker_size *= 1.5;
     changed.objects.count -= wrong.change == A_SHADOW; // the last is the disc
-    return __real_renderer_open(compute, &changed, settings, messages);
+    RenderSettings shared = *settings;
+    shared.extra_features = CERTIFIED_FEATURES; // of other tests' programs
+    return __real_renderer_open(compute, &changed, &shared, messages);
 }
 
 static void certify(void *context)

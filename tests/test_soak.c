@@ -107,7 +107,9 @@ static Scene soak_scene(Random *random)
 
 static RenderSettings soak_settings(Random *random)
 {
-    const Precision precision = (Precision)random_index(random, PRECISION_COUNT);
+    // certified in long tests alone: its kernels with all features take half a minute to build
+    const Precision precision =
+        (Precision)random_index(random, tests_are_long() ? PRECISION_COUNT : PRECISION_CERTIFIED);
     RenderSettings settings = film_settings(
         16, 12, probe_compute.device->fp64 || precision < PRECISION_DOUBLE ? precision : PRECISION_SINGLE);
     settings.extra_features = FEATURE_ALL; // one kernel for all
