@@ -281,12 +281,6 @@ static const FeatureSet family_features[FAMILY_COUNT] = {
     FEATURE_BVH | FEATURE_PLANES | FEATURE_CYLINDERS | FEATURE_CONES | FEATURE_PARABOLOIDS | FEATURE_TORI,
     FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_SPHERES | FEATURE_CYLINDERS, FEATURE_BVH};
 
-// Returns the features that are built in whether a scene needs them or not.
-static FeatureSet extra_features(void)
-{
-    return tests_are_long() ? FEATURE_ALL : CERTIFIED_FEATURES;
-}
-
 // Renderers at each precision. Their kernels serve scene after scene.
 static Renderer *painters[PRECISION_COUNT];
 
@@ -341,11 +335,11 @@ static void check_family(Family family)
         assert_true(certify_sample_open(&reference, &scene, WIDTH, HEIGHT, WIDTH * HEIGHT,
                                         (ReferencePath){.bounce_count = bounce_counts[family]}, NULL));
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
-        settings.extra_features =
-            tests_are_long() ? family_features[family] : extra_features(); // one program
+        if (tests_are_long()) settings.extra_features = family_features[family]; // one program
         settings.bounce_count = bounce_counts[family];
         single_wrong += answer(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
+        if (!tests_are_long()) settings.extra_features = CERTIFIED_FEATURES;
         for (unsigned run = 0; run < 3; run++) {
             settings.bvh = run == 1 ? BVH_OFF : BVH_ON;
             settings.perturb_seed = run == 2 ? 1 + seed % PERTURB_SEEDS : 0;
@@ -452,7 +446,7 @@ static RenderSettings small_settings(uint32_t bounce_count)
 {
     RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);
     settings.bounce_count = bounce_count;
-    settings.extra_features = extra_features();
+    if (tests_are_long()) settings.extra_features = FEATURE_ALL;
     return settings;
 }
 
@@ -662,7 +656,6 @@ static void thin_walls_are_decided(void **state)
         for (Precision precision = PRECISION_SINGLE; precision <= last; precision++) {
             RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, precision);
             settings.bounce_count = 6;
-            settings.extra_features = extra_features();
             const Answer found = answer(&scene, &reference, &settings);
             assert_int_equal(found.wrong == 0, i == 0);
         }
@@ -685,7 +678,6 @@ static void needles_have_an_area(void **state)
                    ((Object){.kind = SHAPE_TRIANGLE,
                              .as.triangle.vertices = {{far, far, -1}, {0, 0, -1}, {0.25, 0, -1}}}));
         RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_DOUBLE);
-        if (!tests_are_long()) settings.extra_features = extra_features();
         Film film = film_render(&probe_compute, &scene, &settings, 0);
         size_t seen = 0;
         for (size_t i = 0; i < SMALL_SIDE * SMALL_SIDE; i++)
