@@ -105,6 +105,20 @@ static void panoramas_are_right(void **state)
     scene_free(&scene);
 }
 
+// The reference knows the ambient light that is the mean of a sky's image.
+static void skies_light_the_reference(void **state)
+{
+    (void)state;
+    Scene scene = scene_of_text("sky.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
+                                            "background: {image: scenes/images/globe.png, intensity: 0.7}\n"
+                                            "lights: [{directional: {direction: [1, -1, 2]}}]\n"
+                                            "objects: [{sphere: {center: [0, 0, 0], radius: 2}}]\n");
+    assert_true(vector_largest(scene.ambient) > 0.1);
+    const CertifyErrors errors = certify(&scene, PRECISION_STRICT, 1, PIXELS, NULL);
+    assert_int_equal(errors.color, 0);
+    scene_free(&scene);
+}
+
 static void colors_compare(const Scene *scene, uint32_t scale)
 {
     const size_t count = PIXELS * (size_t)scale * scale;
@@ -160,7 +174,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_best_precision_is_right), cmocka_unit_test(panoramas_are_right),
-        cmocka_unit_test(tilted_normals_are_decided), cmocka_unit_test(colors_of_certified_are_exact),
-        cmocka_unit_test(there_are_no_false_alarms)};
+        cmocka_unit_test(tilted_normals_are_decided),  cmocka_unit_test(colors_of_certified_are_exact),
+        cmocka_unit_test(there_are_no_false_alarms),   cmocka_unit_test(skies_light_the_reference)};
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

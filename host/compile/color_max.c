@@ -7,12 +7,6 @@
 // What the rounding of shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
 
-Color scene_ambient(const CompiledScene *compiled, const Scene *scene)
-{
-    if (!scene->sky.is_ambient) return scene->ambient;
-    return vector_scale(compiled->textures[scene->sky.texture - 1].sky_mean, scene->sky.intensity);
-}
-
 static Color background_max(const CompiledScene *compiled, const Scene *scene)
 {
     if (scene->sky.texture > 0)
@@ -27,8 +21,7 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
     Color color = material->color;
     if (material->checker) color = vector_max(material->checker_colors[0], material->checker_colors[1]);
     if (material->texture > 0) color = vector_all(compiled->textures[material->texture - 1].largest_texel);
-    const Color ambient =
-        vector_scale(vector_multiply(scene_ambient(compiled, scene), color), material->ambient);
+    const Color ambient = vector_scale(vector_multiply(scene->ambient, color), material->ambient);
     const Color factor =
         vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular));
     return vector_add(vector_add(material->emission, ambient), vector_multiply(light_sum, factor));

@@ -32,7 +32,6 @@ typedef enum {
 typedef struct CompiledTexture {
     uint32_t width, height, first_level, level_count;
     float largest_texel;
-    Color sky_mean; // over all directions, of which it is an image
 } CompiledTexture;
 
 typedef struct {

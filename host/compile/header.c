@@ -44,7 +44,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         scene->camera.orthographic ? vector_add(compiled->eye_offset, basis.shift) : compiled->eye_offset;
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
-        .ambient = scalar4_of(scene_ambient(compiled, scene), 0),
+        .ambient = scalar4_of(scene->ambient, 0),
         .sky_up = scalar4_of(has_sky ? vector_normalize(scene->sky.up) : scene->sky.up,
                              fmax(vector_largest(above), vector_largest(below))),
         .sky_above = scalar4_of(above, 0),

@@ -14,9 +14,6 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
 // units.c: scene units per unit of length on the device, a power of two; 1 for most scenes.
 double scene_unit(const Scene *scene, const CompileSettings *settings);
 
-// color_max.c: the ambient light, which a sky's image gives if the scene's file does not.
-Color scene_ambient(const CompiledScene *compiled, const Scene *scene);
-
 // limits.c: false with a message if `certified` has no error bounds for a feature of the scene.
 bool features_fit(const Scene *scene, const CompileSettings *settings, MessageList *messages);
 

@@ -2,7 +2,6 @@
 
 #include "host/base/memory.h"
 #include "host/image/srgb.h"
-#include "host/scene/portable.h"
 #include <math.h>
 #include <string.h>
 
@@ -105,24 +104,6 @@ static float largest_texel(const Texel *texels, size_t count)
     return largest;
 }
 
-// A row's share of the directions is the difference of the sines of its edges' latitudes.
-static Color sky_mean(const Texel *texels, uint32_t width, uint32_t height)
-{
-    Color mean = {0};
-    double below = 1;
-    for (uint32_t y = 0; y < height; y++) {
-        const double above = below;
-        below = portable_cosine((y + 1) * M_PI / height);
-        const double share = (above - below) / 2 / width;
-        for (uint32_t x = 0; x < width; x++) {
-            float color[3];
-            texel_color(&texels[(size_t)y * width + x], color);
-            mean = vector_add(mean, vector_scale((Color){color[0], color[1], color[2]}, share));
-        }
-    }
-    return mean;
-}
-
 // Lists the levels of each texture, down to a single texel. Returns how many texels they have in all.
 static size_t levels_flatten(CompiledScene *compiled, size_t texture_count)
 {
@@ -157,7 +138,6 @@ static void texels_flatten(CompiledScene *compiled, const Scene *scene)
                    image->display && scene->textures.items[i].content < TEXTURE_NORMALS &&
                        scene->color_meaning != COLORS_DISPLAY);
         texture->largest_texel = largest_texel(fine, (size_t)image->width * image->height);
-        texture->sky_mean = sky_mean(fine, image->width, image->height);
         for (uint32_t k = 1; k < texture->level_count; k++)
             level_halve(texels + level[k].place.x, texels + level[k - 1].place.x, level[k - 1].place.y,
                         level[k - 1].place.z);

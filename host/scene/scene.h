@@ -252,7 +252,7 @@ typedef struct {
         uint32_t texture;
         Vector3 forward;
         double intensity;
-        bool is_ambient; // its mean replaces `ambient`
+        bool is_ambient; // its mean becomes `ambient` when the image is decoded
     } sky;
     struct {
         Light *items;
