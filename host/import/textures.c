@@ -96,7 +96,7 @@ static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *r
 {
     MessageList problems = {0};
     const size_t offset = texture->offset;
-    bool is_usable = texture_read(texture, &problems);
+    bool is_usable = texture->image.values || texture_read(texture, &problems);
     for (size_t i = 0; i < problems.count; i++) {
         const Message *message = &problems.items[i];
         if (message->severity == MESSAGE_ERROR)

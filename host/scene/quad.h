@@ -11,8 +11,8 @@ __extension__ typedef __float128 Quad;
 enum { QUAD_BITS = 113 };
 #define QUAD_CALL(function) function##f128
 // glibc has these functions on every x86, but its header does not declare them for clang.
-Quad acosf128(Quad), cosf128(Quad), floorf128(Quad), fmodf128(Quad, Quad), log2f128(Quad),
-    powf128(Quad, Quad), roundf128(Quad), sinf128(Quad), sqrtf128(Quad), tanf128(Quad);
+Quad acosf128(Quad), atan2f128(Quad, Quad), cosf128(Quad), floorf128(Quad), fmodf128(Quad, Quad),
+    log2f128(Quad), powf128(Quad, Quad), roundf128(Quad), sinf128(Quad), sqrtf128(Quad), tanf128(Quad);
 #else
 typedef long double Quad;
 enum { QUAD_BITS = LDBL_MANT_DIG };

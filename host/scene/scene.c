@@ -77,8 +77,8 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
 static bool texture_is(const SceneTexture *texture, const char *path, const char *layer,
                        TextureContent content)
 {
-    return texture->content == content && strcmp(texture->path, path) == 0 && !texture->layer == !layer &&
-           (!layer || strcmp(texture->layer, layer) == 0);
+    return !texture->image.values && texture->content == content && strcmp(texture->path, path) == 0 &&
+           !texture->layer == !layer && (!layer || strcmp(texture->layer, layer) == 0);
 }
 
 uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, TextureContent content,

@@ -125,12 +125,12 @@ enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 typedef enum { TEXTURE_COLORS, TEXTURE_OPACITY, TEXTURE_NORMALS, TEXTURE_BUMPS } TextureContent;
 
 typedef struct {
-    char *path;    // of the image's file; where it has `bytes`, only for messages
+    char *path;    // of the image's file; where it has `bytes` or no file, only for messages
     char *layer;   // of an EXR file; NULL: its default layer, or its only one with colors
     size_t offset; // of its name in the scene's text
     Text bytes;    // of an image within another file, until it is decoded; else empty
     TextureContent content;
-    Image image; // decoded; its colors are finite
+    Image image; // decoded, or made without a file; its colors are finite
 } SceneTexture;
 
 // Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),

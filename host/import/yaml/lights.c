@@ -5,7 +5,7 @@
 #include <string.h>
 
 static const Range range_half_turn = {0, 180, true, "greater than 0 and less than 180"};
-static const Range range_sky_angle = {0, 90, false, "from 0 to 90"};
+const Range range_disc_angle = {0, 90, false, "from 0 to 90"};
 
 typedef struct {
     Light light;
@@ -52,7 +52,7 @@ static const Field point_fields[] = {
 
 static const Field directional_fields[] = {
     {"direction", read_direction, offsetof(LightFields, light.direction), FORM_ANY, REQUIRED, NULL},
-    {"angle", read_number, offsetof(LightFields, angle), FORM_ANY, OPTIONAL, &range_sky_angle},
+    {"angle", read_number, offsetof(LightFields, angle), FORM_ANY, OPTIONAL, &range_disc_angle},
     COLOR,
 };
 
@@ -124,14 +124,20 @@ static void across_set(Vector3 across[2], Vector3 direction, double length)
     across[1] = vector_scale(vector_cross(axis, u), length);
 }
 
+void light_set_angle(Light *light, double degrees)
+{
+    if (degrees == 0) return;
+    const double length = vector_length(light->direction);
+    across_set(light->across, light->direction, length * portable_tangent(degrees * (M_PI / 360)));
+    light->area = AREA_ELLIPSE;
+}
+
 // Sets the light's area.
 static void area_set(LightFields *read)
 {
     Light *light = &read->light;
-    if (light->kind == LIGHT_DIRECTIONAL && read->angle > 0) {
-        const double length = vector_length(light->direction);
-        across_set(light->across, light->direction, length * portable_tangent(read->angle * (M_PI / 360)));
-        light->area = AREA_ELLIPSE;
+    if (light->kind == LIGHT_DIRECTIONAL) {
+        light_set_angle(light, read->angle);
     } else if (light->area == AREA_ELLIPSE) {
         across_set(light->across, read->normal, light->radius);
     } else if (light->area == AREA_RECTANGLE) {

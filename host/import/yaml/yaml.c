@@ -10,12 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Turns a vector about a unit axis, counterclockwise seen from the axis' tip.
-static Vector3 vector_turned(Vector3 v, Vector3 axis, double degrees)
-{
-    return vector_rotated(v, axis, fmod(degrees, 360) * (M_PI / 180));
-}
-
 typedef struct {
     Camera camera;
     double fov_degrees, focal_length, frame[2], height, aperture, turn;
@@ -101,65 +95,6 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
     }
 }
 
-typedef struct {
-    Color horizon;
-    Vector3 up;
-    Color zenith, nadir;
-    uint32_t texture;
-    double intensity, turn;
-} Background;
-
-// Takes a color, or those of the sky.
-static bool read_background(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    static const Field fields[] = {
-        {"horizon", read_strength, offsetof(Background, horizon), FORM_FIRST, REQUIRED, NULL},
-        {"zenith", read_strength, offsetof(Background, zenith), FORM_FIRST, REQUIRED, NULL},
-        {"nadir", read_strength, offsetof(Background, nadir), FORM_FIRST, OPTIONAL, NULL},
-        {"image", read_texture, offsetof(Background, texture), FORM_SECOND, REQUIRED, NULL},
-        {"intensity", read_number, offsetof(Background, intensity), FORM_SECOND, OPTIONAL,
-         &range_not_negative},
-        {"turn", read_number, offsetof(Background, turn), FORM_SECOND, OPTIONAL, NULL},
-        {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL, NULL},
-    };
-    Background *background = target;
-    if (node->kind != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
-    background->up = (Vector3){0, 1, 0};
-    background->nadir = vector_all(NAN);
-    background->intensity = 1;
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), background, NULL)) return false;
-    if (isnan(background->nadir.x)) background->nadir = background->horizon;
-    return true;
-}
-
-// Returns the mean of the colors over all directions.
-static Color background_mean(const Background *background)
-{
-    if (vector_is_zero(background->up)) return vector_all(0);
-    const Color poles = vector_add(background->zenith, background->nadir);
-    return vector_add(vector_scale(background->horizon, 0.5), vector_scale(poles, 0.25));
-}
-
-// Sets the background and, unless it is given, the ambient light.
-static void scene_set_background(Scene *scene, const Background *background, Color ambient)
-{
-    const bool has_ambient = !isnan(ambient.x);
-    scene->background = background->horizon;
-    scene->sky.up = background->up;
-    scene->sky.zenith = background->zenith;
-    scene->sky.nadir = background->nadir;
-    scene->ambient = has_ambient ? ambient : background_mean(background);
-    if (background->texture == 0) return;
-    scene->sky.texture = background->texture;
-    scene->sky.is_ambient = !has_ambient;
-    scene->sky.intensity = background->intensity;
-    // -z, or where that lies along `up`, -x
-    const Vector3 up = vector_normalize(background->up);
-    Vector3 right = vector_cross((Vector3){0, 0, -1}, up);
-    if (vector_length(right) < 1e-6) right = vector_cross((Vector3){-1, 0, 0}, up);
-    scene->sky.forward = vector_turned(vector_cross(up, right), up, background->turn);
-}
-
 // Takes what --set adds, since files are included before values are set.
 static bool read_include(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
@@ -202,7 +137,7 @@ static void document_read(YamlReader *reader)
     const YamlNode *root = reader->tree.nodes.items;
     fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document, NULL);
     reader->scene->frame_count = document.frame_count;
-    scene_set_background(reader->scene, &document.background, document.ambient);
+    yaml_set_background(reader, &document.background, document.ambient);
     if (document.camera)
         yaml_read_camera(reader, document.camera);
     else if (!reader->options->camera && root->kind == YAML_MAPPING)

@@ -4,6 +4,7 @@
 #include "host/import/load.h"
 #include "host/import/yaml/fields.h"
 #include "host/scene/affine.h"
+#include "host/scene/daylight.h"
 
 // Reads the `materials` mapping; read_material then knows their names.
 void yaml_read_materials(YamlReader *reader, const YamlNode *node);
@@ -24,8 +25,36 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 // Reads a transform, or a list of them that are applied in order, into an Affine that has an inverse.
 FieldReader read_transform;
 
+typedef struct {
+    const YamlNode *node; // NULL: there is none
+    SunPosition position;
+    double angle; // of its disc
+    bool shines;  // is a light
+} Sun;
+
+typedef struct {
+    Color horizon;
+    Vector3 up;
+    Color zenith, nadir;
+    uint32_t texture;
+    Sun sun;
+    double turbidity;
+    Color ground;
+    double intensity, turn;
+} Background;
+
+// Reads a color or a sky into a Background.
+FieldReader read_background;
+
+// Sets the scene's background, adds the light of its sun and, where `ambient` is NaN, sets the ambient light.
+// Nothing after an error.
+void yaml_set_background(YamlReader *reader, const Background *background, Color ambient);
+
 void yaml_read_camera(YamlReader *reader, const YamlNode *node);
 void yaml_read_lights(YamlReader *reader, const YamlNode *node);
+extern const Range range_disc_angle;
+// Makes a directional light that of a disc in the sky, of an angle in degrees, unless that is 0.
+void light_set_angle(Light *light, double degrees);
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping); // the value of `mesh:`
 
 // Reads the list of objects of a scene, which shows progress, of a group or of a definition.
