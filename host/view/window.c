@@ -55,12 +55,15 @@ static void facts_exchange(Window *window)
     window->redraws = true;
 }
 
+// Called again and again: as the event of a new size comes, SDL 2 on SDL 3 still has the old one.
 static void size_read(Window *window)
 {
     int width = 1, height = 1;
     SDL_GetRendererOutputSize(window->target, &width, &height);
-    if (width < 1 || height < 1) return;
-    window->size = (ImageSize){(uint32_t)width, (uint32_t)height};
+    const ImageSize size = {(uint32_t)width, (uint32_t)height};
+    if (width < 1 || height < 1 || (size.width == window->size.width && size.height == window->size.height))
+        return;
+    window->size = size;
     window->image_changed = true;
 }
 
@@ -88,7 +91,6 @@ static void event_handle(Window *window, const SDL_Event *event)
         window->closes = true;
         break;
     case SDL_WINDOWEVENT:
-        if (event->window.event == SDL_WINDOWEVENT_SIZE_CHANGED) size_read(window);
         window->redraws = true;
         break;
     case SDL_MOUSEBUTTONDOWN:
@@ -174,6 +176,7 @@ static WindowEnd events_run(Window *window)
         for (int had = SDL_WaitEventTimeout(&event, wait); had; had = SDL_PollEvent(&event))
             event_handle(window, &event);
         if (window->options->stop()) return WINDOW_STOPPED;
+        size_read(window);
         if (window->drag == DRAG_LOOK) fly(window);
         work_exchange(window);
         if (!window->is_loaded && is_refused(window)) {
