@@ -365,6 +365,10 @@ class Images(CliTestCase):
         self.assertSameBytes("a1.ppm", "b1.ppm")
         write("bad.yaml", camera.replace("fov", "fow"))
         self.refuses("render objects.yaml --camera bad.yaml", "^bad.yaml:1:[0-9]+: error: unknown camera key 'fow'")
+        self.refuses("render whole.yaml --camera shot.yaml --set camera.fov=9", "--set camera.fov=9: the camera is that of --camera")
+        self.refuses("render objects.yaml --camera -", "--camera: expected the name of a file")
+        write("far.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0], height: 1e30, shift: [1e30, 0]}\n")
+        self.refuses("render objects.yaml --camera far.yaml", "does not fit precision single")
         self.refuses("render objects.yaml", "^objects.yaml:1:1: error: scene lacks 'camera'")
         write("shot.ppm", "begin_scene\nresolution 80 60\ncamera zoom 1 aspectratio 1 antialiasing 0 raydepth 8\n"
               "center 1 2 3 viewdir -1 -2 -3 updir 0 1 0\nend_camera\nend_scene\n")

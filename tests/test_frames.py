@@ -63,11 +63,13 @@ class Frames(TestCase):
         write("moving.yaml", f"frames: 3\n{moving}")
         write("still.yaml", SPHERE)
         for options, count in ("moving.yaml --frames all", 3), ("still.yaml --camera moving.yaml --frames all", 3), \
-                ("moving.yaml --set frames=2 --frames all", 2), ("moving.yaml --frames all --frames 1", 1):
+                ("moving.yaml --set frames=2 --frames all", 2), ("moving.yaml --frames all --frames 1", 1), \
+                ("moving.yaml --frames 1-2 --frames all", 3):
             with self.subTest(options):
                 self.glint(f"render {options} {RENDER} -o all%d.ppm")
                 names = sorted(Path().glob("all*.ppm"))
                 self.assertEqual(len(names), count)
+                self.assertEqual(names[0].name, "all1.ppm" if options.endswith(" 1") else "all0.ppm")
                 for name in names:
                     name.unlink()
 
@@ -146,10 +148,10 @@ class Frames(TestCase):
             "--frames 0-3 -o %d/a.png": "or have a place for the number",
             "--frames 0-3 -o %5d.png": "or have a place for the number",
             "--frames 0-3 -o %d-%02d.png": "more than one place",
-            "--frames 3-2": "--frames: expected A, A-B or all",
-            "--frames -1": "--frames: expected A, A-B or all",
-            "--frames 1x": "--frames: expected A, A-B or all",
-            "--frames 0-1000000": "--frames: expected A, A-B or all",
+            "--frames 3-2": "--frames: expected all, or A or A-B",
+            "--frames -1": "--frames: expected all, or A or A-B",
+            "--frames 1x": "--frames: expected all, or A or A-B",
+            "--frames 0-1000000": "--frames: expected all, or A or A-B",
             "--frames all": "--frames all: 'moving.yaml' has no 'frames'; name them, such as 0-47",
             "--frames all -o a.png": "or have a place for the number",
             "--frames 0-3 still.yaml": "--frames takes one scene",

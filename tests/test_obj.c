@@ -337,6 +337,8 @@ static void images_of_materials_are_used(void **state)
         {"map_bump -bm 3 none.png\n",
          "a.mtl:2:16: warning: cannot read 'none.png': No such file or directory: normals are not tilted\n"},
         {"norm a.ppm\n", ""},
+        {"map_Bump -bm 9 a.ppm\nnorm a.ppm\n",
+         "a.mtl:3:6: warning: a second map of normals or heights: it replaces the first\n"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         Text mtl = {0};
@@ -361,9 +363,15 @@ static void bumps_are_normals(void **state)
         Text mtl = {0};
         const bool is_ramp = i < 2;
         file_write("a.ppm", is_ramp ? ramp : colors);
-        text_appendf(&mtl, "newmtl red\n%s -bm -2.5 a.ppm\n", i % 2 ? "norm" : i == 0 ? "map_Bump" : "bump");
+        text_appendf(&mtl, "newmtl red\n%s%s -bm -2.5 a.ppm\n", i == 3 ? "bump -bm 9 a.ppm\n" : "",
+                     i % 2    ? "norm"
+                     : i == 0 ? "map_Bump"
+                              : "bump");
         file_write("a.mtl", text_c(&mtl));
-        Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", "");
+        Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n",
+                                   i == 3 ? "a.mtl:3:6: warning: a second map of normals or heights: it "
+                                            "replaces the first\n"
+                                          : "");
         const Material *red = triangle_material(&scene, 0);
         assert_int_equal(red->normal_texture, 1);
         assert_number(red->normal_strength, -2.5);

@@ -568,7 +568,7 @@ static void scene_faults_are_reported(void **state)
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
                     "4:21: error: 'color' cannot be combined with 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n",
-                    "4:13: error: 'size' is that of an 'image' or a 'normal_map'\n");
+                    "4:13: error: 'size' needs an 'image' or a 'normal_map'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, size: 0}\n",
                     "4:27: error: 'size' must be greater than 0\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, cutout: 50}\n",
@@ -576,14 +576,14 @@ static void scene_faults_are_reported(void **state)
     assert_messages("s.yaml", MATERIALS "  a: {cutout: 0.5}\n", "4:6: error: material lacks 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {image: [1, 2]}\n",
                     "4:14: error: 'image' must be the name of a file, not a list of 2\n");
-    assert_messages("s.yaml",
-                    MATERIALS
-                    "  a: {image: a.png}\nobjects: [{box: {min: [0, 0, 0], max: [1, 1, 1], material: a}}]\n",
-                    "5:60: error: an image lies on a sphere, plane, disc or mesh, not on a box\n");
+    assert_messages(
+        "s.yaml",
+        MATERIALS "  a: {image: a.png}\nobjects: [{box: {min: [0, 0, 0], max: [1, 1, 1], material: a}}]\n",
+        "5:60: error: images and normal maps lie on a sphere, plane, disc or mesh, not on a box\n");
     assert_messages("s.yaml",
                     MATERIALS
                     "  a: {image: a.png}\nobjects: [{mesh: {file: tests/textures/bare.obj, material: a}}]\n",
-                    "5:60: error: the mesh has no uv for the material's image\n");
+                    "5:60: error: the mesh has no uv for the material's images\n");
 }
 
 // Checks the message about the texture, at its place in the scene file.

@@ -237,6 +237,8 @@ bool option_common(CommonOptions *common, int option, const char *value, bool *v
         return true;
     case OPTION_CAMERA:
         common->camera = value;
+        *valid = strcmp(value, "-") != 0;
+        if (!*valid) fputs("glint: --camera: expected the name of a file, not \"-\"\n", stderr);
         return true;
     case OPTION_MAX_PIXELS:
         *valid = option_max_pixels(value);

@@ -85,8 +85,7 @@ static const char help_text[] =
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command resumes where an earlier one ended\n"
-                    "      --frames A-B|all  render these frames of an animation; -o has %d or %04d for the "
-                    "number\n"
+                    "      --frames A[-B]    render these frames, or all; -o has %d or %04d for the number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
                     "      --format F        format of --output -: png, ppm or npy\n"
@@ -126,6 +125,7 @@ static bool frame_read(const char **at, uint32_t *frame)
 static bool frames_read(const char *value, RenderOptions *options)
 {
     options->has_all_frames = strcmp(value, "all") == 0;
+    options->first_frame = 0;
     options->frame_count = 1; // until the scene is read
     if (options->has_all_frames) return true;
     const char *at = value;
@@ -137,8 +137,8 @@ static bool frames_read(const char *value, RenderOptions *options)
     }
     options->frame_count = last - options->first_frame + 1;
     if (is_valid && *at == '\0' && last >= options->first_frame) return true;
-    fprintf(stderr, "glint: --frames: expected A, A-B or all with 0 <= A <= B < %d, not \"%s\"\n", FRAMES_MAX,
-            value);
+    fprintf(stderr, "glint: --frames: expected all, or A or A-B with 0 <= A <= B < %d, not \"%s\"\n",
+            FRAMES_MAX, value);
     return false;
 }
 

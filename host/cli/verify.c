@@ -392,7 +392,7 @@ static int verification_work(void *context)
     return device_close(&open, device_verify(verification, &open.compute));
 }
 
-static bool nothing_take(void *context, const VerifyResult *result)
+static bool result_discard(void *context, const VerifyResult *result)
 {
     (void)context, (void)result;
     return true;
@@ -406,10 +406,12 @@ static void builder_start(const VerifyOptions *options)
     static char name[] = "P6";
     char *const names[] = {name};
     const VerifyChoice choice = {names, 1};
-    const VerifySink sink = {.take = nothing_take};
+    const VerifySink sink = {.take = result_discard};
+    const pid_t parent = getpid();
     fflush(stdout); // otherwise each process would print the contents of the buffer
     if (fork() != 0) return;
     prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (getppid() != parent) _exit(EXIT_INTERRUPTED);
     if (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)) _exit(EXIT_USER);
     OpenDevice open;
     if (!device_open(&open, &options->common)) _exit(EXIT_USER);

@@ -13,7 +13,7 @@ CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
     double half_pixel_up = camera->equirectangular ? M_PI / 2 / height : half_pixel;
     CameraBasis basis = {
         forward, vector_scale(right, half_pixel), vector_scale(up, half_pixel_up), forward, {0}};
-    if (camera->shift[0] != 0 || camera->shift[1] != 0) { // else a zero might change its sign
+    if (camera->shift[0] != 0 || camera->shift[1] != 0) { // adding 0 could change the sign of a zero
         const double frame = 2 * camera->half_tangent;
         basis.shift = vector_add(vector_scale(right, camera->shift[0] * frame),
                                  vector_scale(up, camera->shift[1] * frame));

@@ -11,7 +11,7 @@
 enum { FEATURE_LIST(FEATURE_BIT_INDEX) FEATURE_COUNT };
 #undef FEATURE_BIT_INDEX
 
-// An extension, since the constants of ISO C's enumerations are int.
+// Uses a GNU extension, because enumeration constants are int in ISO C.
 #define FEATURE_BIT(name, ...) FEATURE_##name = UINT64_C(1) << FEATURE_INDEX_##name,
 __extension__ typedef enum {
     FEATURE_LIST(FEATURE_BIT) FEATURE_ALL = (UINT64_C(1) << FEATURE_COUNT) - 1

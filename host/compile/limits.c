@@ -115,8 +115,11 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
                                  unbounded[i].text);
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     if (settings->certifies && camera_direction_error(&basis) > CAMERA_DIRECTION_ERROR_MAX)
-        return message_error(messages, "the camera's 'shift' is so large that its rays have no error bound: "
-                                       "choose a precision other than certified");
+        return message_error(
+            messages,
+            "'shift' moves the middle of the frame to %.3g focal lengths from the eye, where "
+            "certified has error bounds up to 4.33: choose another precision",
+            vector_length(basis.middle));
     if (settings->certifies && materials_union(scene, material_shadow))
         return message_error(messages, "a material has 'shadow: false', which has no error bound: choose a "
                                        "precision other than certified");
@@ -178,7 +181,8 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
     bool fits = vector_is_within(scene->background, largest) && vector_is_within(scene->ambient, largest) &&
                 vector_is_within(scene->sky.zenith, largest) && vector_is_within(scene->sky.nadir, largest) &&
                 vector_is_within(basis.middle, largest) && vector_is_within(basis.right, largest) &&
-                vector_is_within(basis.up, largest);
+                vector_is_within(basis.up, largest) &&
+                vector_is_within(vector_add(compiled->eye_offset, basis.shift), largest);
     for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)
         fits = !compiled->changed[kind] || array_fits(&compiled->arrays[kind], largest);
     if (fits) return true;

@@ -57,7 +57,7 @@ static uint4 texture_of(const CompiledScene *compiled, uint32_t number, const Te
     return (uint4){1 + texture->first_level, texture->level_count, wraps[0], wraps[1]};
 }
 
-// `any`: the texture of whose texels the surface's densities are.
+// `any` is the texture whose texels define the surface's texel density.
 static void normal_map_set(FlatMaterial *flat, const CompiledScene *compiled, const Material *material,
                            const CompiledTexture *any)
 {
@@ -66,7 +66,7 @@ static void normal_map_set(FlatMaterial *flat, const CompiledScene *compiled, co
     const double area = fabs(rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]),
                  texels = (double)map->width * map->height / ((double)any->width * any->height);
     flat->normal_map = texture_of(compiled, material->normal_texture, material->normal_wrap);
-    // with more, whose squares would overflow, normals lie in the surface as they do with the largest
+    // larger ones would overflow when squared; with this one, the normal already lies in the surface
     const double strength_max = 1e8,
                  strength = fmax(fmin(material->normal_strength, strength_max), -strength_max);
     flat->normal_u = (scalar4){rows[0][0], rows[0][1], rows[0][2], strength};

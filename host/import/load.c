@@ -106,10 +106,13 @@ static bool file_load(Scene *scene, const char *path, const SceneOptions *option
     return read;
 }
 
-// Replaces the camera by that of another scene. That scene's file counts as included. Its warnings, which are
-// not about what is rendered, are left out.
+// Replaces the camera by that of another scene. That scene's file counts as included. Its warnings, nearly
+// all about what is not rendered, are left out.
 static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *messages)
 {
+    for (size_t i = 0; i < options->override_count; i++)
+        if (strncmp(options->overrides[i], "camera", 6) == 0 && strchr(".[=", options->overrides[i][6]))
+            return message_error(messages, "--set %s: the camera is that of --camera", options->overrides[i]);
     SceneOptions own = *options;
     own.camera = NULL;
     own.override_count = 0;

@@ -94,8 +94,8 @@ typedef struct {
     uint32_t texture;            // in place of color: 1 + index into the scene's textures; 0: none
     double texture_size;         // width of a texture on a plane or disc, > 0, in scene units
     TextureWrap texture_wrap[2]; // along u and v, on a mesh
-    // A texture whose colors are the shading normal, its place relative to the other textures' (rows of u and
-    // v), and by how much its parts along the surface count.
+    // A normal map, the affine map from the other textures' coordinates to its own (one row each for u and
+    // v), and the factor of its tangential components.
     uint32_t normal_texture;
     double normal_rows[2][3], normal_strength;
     TextureWrap normal_wrap[2];
@@ -119,10 +119,13 @@ static inline uint32_t material_any_texture(const Material *material)
 // The largest number of texels of all images: coarser levels add a third, and kernels count in 32 bits.
 enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
-// What an image's values are: colors; the same, and where all pixels are opaque, their luminance is the
-// alpha; normals, which no transfer curve has changed; or the same or, if they are gray, heights, of which
-// decoding makes normals.
-typedef enum { TEXTURE_COLORS, TEXTURE_OPACITY, TEXTURE_NORMALS, TEXTURE_BUMPS } TextureContent;
+// What an image's values are.
+typedef enum {
+    TEXTURE_COLORS,
+    TEXTURE_OPACITY, // colors; if every pixel is opaque, decoding sets alpha to the luminance
+    TEXTURE_NORMALS, // stored without a transfer curve
+    TEXTURE_BUMPS    // normals or, if the image is gray, heights, which decoding converts to normals
+} TextureContent;
 
 typedef struct {
     char *path;    // of the image's file; where it has `bytes` or no file, only for messages

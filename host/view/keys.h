@@ -14,7 +14,7 @@
     KEY("T", "show or hide times, device and samples")                                                       \
     KEY("I", "show or hide what the pixel under the cursor sees; print it")                                  \
     KEY("R", "reset the camera")                                                                             \
-    KEY("C", "print the camera as YAML; --write-camera: into the scene, too")                                \
+    KEY("C", "print the camera as YAML; with --write-camera, write it into its file")                        \
     KEY("S", "save the image, once complete, as PNG; Shift S: EXR")                                          \
     KEY("F", "full screen")                                                                                  \
     KEY("H", "show or hide this list")                                                                       \

@@ -124,8 +124,8 @@ static void triangle_keep_attributes(Triangle *triangle, const Triangle *moved)
     triangle->id.z = moved->id.z;
 }
 
-// What a triangle's id.y holds; a triangle with a vertex without a normal is flat. Normals on both sides of
-// it are those of no surface near it.
+// What a triangle's id.y holds; a triangle with a vertex without a normal is flat. If the normals lie on
+// different sides of the triangle, no nearby smooth surface has them, and shadow rays start on the triangle.
 static uint32_t normals_add(Flattening *flattening, const Vector3 vertices[3], Vector3 a, Vector3 b,
                             Vector3 c)
 {

@@ -130,10 +130,17 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
     return *is_moved ? near : path;
 }
 
+const char *texture_fallback(TextureContent content)
+{
+    return content == TEXTURE_NORMALS || content == TEXTURE_BUMPS ? "normals are not tilted"
+                                                                  : "the color is used";
+}
+
 static uint32_t texture_add(MeshDraft *draft, const char *path, TextureContent content, const char *owner)
 {
     const uint32_t texture = scene_add_texture(draft->scene, path, NULL, content, draft->import->offset);
-    if (texture == 0) draft_warn(draft, "%s: too many images in one scene: the color is used", owner);
+    if (texture == 0)
+        draft_warn(draft, "%s: too many images in one scene: %s", owner, texture_fallback(content));
     return texture;
 }
 
@@ -143,8 +150,8 @@ uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent co
     if (options && options->file_named) options->file_named(options->context, path);
     const char *obstacle = file_obstacle(path);
     if (!obstacle && image_is_known(path)) return texture_add(draft, path, content, owner);
-    draft_warn(draft, "%s: cannot read '%.100s': %s: the color is used", owner, path,
-               obstacle ? obstacle : "not a PNG, JPEG, PPM or EXR");
+    draft_warn(draft, "%s: cannot read '%.100s': %s: %s", owner, path,
+               obstacle ? obstacle : "not a PNG, JPEG, PPM or EXR", texture_fallback(content));
     return 0;
 }
 
@@ -152,7 +159,7 @@ uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, Textu
                                     const char *owner)
 {
     if (!image_bytes_are_known(bytes->bytes, bytes->length)) {
-        draft_warn(draft, "%s: not a PNG, JPEG, PPM or EXR: the color is used", owner);
+        draft_warn(draft, "%s: not a PNG, JPEG, PPM or EXR: %s", owner, texture_fallback(content));
         return 0;
     }
     char *path = text_format("%s: %s", draft->import->path, owner);

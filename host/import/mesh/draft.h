@@ -124,6 +124,9 @@ static inline bool draft_has(const MeshDraft *draft, DraftPart part)
 // and sets *is_moved. The caller frees it.
 char *draft_find_file(const char *from, const char *name, size_t length, bool *is_moved);
 
+// Returns what is used in place of a texture, for messages.
+const char *texture_fallback(TextureContent content);
+
 // Adds an image to the scene's textures, from a file or from bytes, which are copied. Returns 0 with a
 // warning at `owner` if the image cannot be used.
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent content, const char *owner);

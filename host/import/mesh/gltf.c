@@ -28,7 +28,7 @@ static const char *const loss_texts[GLTF_LOSS_COUNT] = {
     [GLTF_METAL_COLOR] = "reflections of metals do not have the colors of a texture",
     [GLTF_NORMAL_TEXTURE_PLACE] = "the normal texture has other coordinates than the color: it is not used",
     [GLTF_OCCLUSION_TEXTURE] = "occlusion textures are not used: the lights' shadows are",
-    [GLTF_TEXTURE_PLACE] = "the mesh lacks the texture's coordinates: the color is used",
+    [GLTF_TEXTURE_PLACE] = "the mesh lacks the texture's coordinates: it is not used",
     [GLTF_NEAREST] = "filtering by the nearest texel is not used: texels are interpolated",
     [GLTF_GLASS_COLOR] = "transmitted light does not have the colors of a texture",
 };

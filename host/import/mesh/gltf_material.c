@@ -84,13 +84,14 @@ static uint32_t image_add(Gltf *gltf, const GltfItem *image, TextureContent cont
     const char *text = json_string_value(uri.json);
     if (text && strncmp(text, "data:", 5) != 0) {
         char *path = gltf_path(gltf, &uri);
-        if (!path) gltf_warn(gltf, &uri, "must be a relative path or base64 data: the color is used");
+        if (!path)
+            gltf_warn(gltf, &uri, "must be a relative path or base64 data: %s", texture_fallback(content));
         const uint32_t texture = path ? draft_add_texture(draft, path, content, image->path) : 0;
         free(path);
         return texture;
     }
     if (!text && !json_object_get(image->json, "bufferView")) {
-        gltf_warn(gltf, image, "has no 'uri' or 'bufferView': the color is used");
+        gltf_warn(gltf, image, "has no 'uri' or 'bufferView': %s", texture_fallback(content));
         return 0;
     }
     Source bytes = {.bytes = ""};
@@ -152,7 +153,7 @@ static void texture_read(Gltf *gltf, const GltfItem *info, TextureContent conten
     const GltfItem texture = gltf_entry(gltf, "textures", index);
     if (!gltf_index(gltf, &texture, "source", "images", &source)) return;
     if (source == SIZE_MAX) {
-        gltf_warn(gltf, &texture, "has no PNG or JPEG image: the color is used");
+        gltf_warn(gltf, &texture, "has no PNG or JPEG image: %s", texture_fallback(content));
         return;
     }
     if (!gltf_integer(gltf, info, "texCoord", 0, UV_SETS_MAX, &place->uv_set)) return;

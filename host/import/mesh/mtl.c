@@ -192,8 +192,9 @@ static void illumination_read(MtlReader *reader, MtlMaterial *material)
     number_of_line(reader, &range_illumination, &material->illumination);
 }
 
-// Reads an option of a texture, which starts with `-` and has up to three numbers or one word. That of -bm is
-// stored where `multiplier` is not NULL, others are skipped: *is_used tells.
+// Reads an option of a texture, which starts with `-` and has up to three numbers or one word. Stores the
+// value of -bm in *multiplier unless that is NULL, and skips other options. Sets *is_used to whether the
+// value was stored.
 static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
 {
     Scan ahead = *scan;
@@ -254,6 +255,11 @@ static void opacity_texture_read(MtlReader *reader, MtlMaterial *material)
 
 static void normal_texture_read(MtlReader *reader, MtlMaterial *material)
 {
+    scan_more(&reader->scan);
+    if (material->normal_image)
+        report_warning(&reader->report, scan_offset(&reader->scan),
+                       "a second map of normals or heights: it replaces the first");
+    material->material.normal_strength = 1;
     image_read_name(reader, "normals are not tilted", &material->normal_image,
                     &material->material.normal_strength);
     material->has_bumps = false;

@@ -241,7 +241,7 @@ static void textures_check(YamlReader *reader, const Material *material, const Y
     const YamlNode *size = field_node(reader, node, "size"),
                    *strength = field_node(reader, node, "normal_strength");
     if (size != node && material->texture == 0 && material->normal_texture == 0)
-        report_error(&reader->report, size->offset, "'size' is that of an 'image' or a 'normal_map'");
+        report_error(&reader->report, size->offset, "'size' needs an 'image' or a 'normal_map'");
     if (strength != node && material->normal_texture == 0)
         report_error(&reader->report, strength->offset, "'normal_strength' is that of a 'normal_map'");
 }

@@ -210,10 +210,10 @@ bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode
     if (material_any_texture(&reader->scene->materials.items[object->material]) == 0) return true;
     if (object->kind == SHAPE_MESH)
         return reader->scene->meshes.items[object->as.mesh.index].uvs ||
-               report_error(&reader->report, node->offset, "the mesh has no uv for the material's image");
+               report_error(&reader->report, node->offset, "the mesh has no uv for the material's images");
     return shapes[object->kind].takes_texture ||
            report_error(&reader->report, node->offset,
-                        "an image lies on a sphere, plane, disc or mesh, not on a %s",
+                        "images and normal maps lie on a sphere, plane, disc or mesh, not on a %s",
                         shape_names[object->kind]);
 }
 
