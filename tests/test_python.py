@@ -85,6 +85,10 @@ class Images(unittest.TestCase):
             path.write_text(json.dumps(moving))
             np.testing.assert_array_equal(image(glint.load(path, frame=2)), large)
             np.testing.assert_array_equal(image(glint.load(path, {"objects[0].sphere.radius": 1.5})), large)
+            shot = Path(folder, "shot.json")
+            shot.write_text(json.dumps({"camera": {**SPHERE["camera"], "fov": 20}, "frames": 3}))
+            np.testing.assert_array_equal(image(glint.load(path, camera=shot)), image(glint.Scene(SPHERE, overrides={"camera.fov": 20})))
+            self.assertEqual([glint.load(path).frame_count, glint.load(path, camera=shot).frame_count], [0, 3])
         for overrides, reason in ({"camera.zoom.x": 1}, "has no 'zoom'"), ({"camera.fov": "wide"}, "overrides:1:12: error: .*fov"):
             with self.assertRaisesRegex(glint.SceneError, reason):
                 glint.Scene(SPHERE, overrides=overrides)

@@ -86,6 +86,8 @@ typedef struct {
     const char *const *overrides;
     size_t override_count;
     double frame; // the frame of an animated scene
+    // The path of another scene, whose camera replaces the scene's, or NULL. Only glint_scene_load uses it.
+    const char *camera;
 } GlintSceneOptions;
 
 // Reads a scene, mesh or glTF file. `options` may be NULL. Sets *scene to NULL on failure. Formats that
@@ -115,6 +117,8 @@ void glint_scene_free(GlintScene *scene); // accepts NULL
 // Returns the number of objects; each triangle of a mesh counts as one.
 size_t glint_scene_object_count(const GlintScene *scene);
 size_t glint_scene_light_count(const GlintScene *scene);
+// Returns the number of frames that an animated scene names, or 0.
+uint32_t glint_scene_frame_count(const GlintScene *scene);
 // Sets the size that the scene's file asks for, otherwise one that is 1280 pixels wide and has the camera's
 // aspect ratio.
 void glint_scene_image_size(const GlintScene *scene, uint32_t *width, uint32_t *height);

@@ -32,6 +32,7 @@ static bool options_read(SceneOptions *options, const GlintSceneOptions *given, 
     options->override_name = "overrides";
     options->override_count = own.override_count;
     options->frame = own.frame;
+    options->camera = own.camera;
     return true;
 }
 
@@ -52,7 +53,10 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
     Scene read = {0};
     SceneOptions own;
     const Source source = {.file = name, .bytes = text, .length = length};
-    const bool is_read = options_read(&own, options, &list) && scene_read_yaml(&read, &source, &own, &list);
+    bool is_read = options_read(&own, options, &list);
+    if (is_read && own.camera)
+        is_read = message_error(&list, "only glint_scene_load takes the camera of another scene");
+    is_read = is_read && scene_read_yaml(&read, &source, &own, &list);
     return scene_give(scene, &read, is_read, &list, messages);
 }
 
@@ -125,6 +129,11 @@ size_t glint_scene_object_count(const GlintScene *scene)
 size_t glint_scene_light_count(const GlintScene *scene)
 {
     return scene->scene.lights.count;
+}
+
+uint32_t glint_scene_frame_count(const GlintScene *scene)
+{
+    return scene->scene.frame_count;
 }
 
 void glint_scene_image_size(const GlintScene *scene, uint32_t *width, uint32_t *height)

@@ -13,6 +13,7 @@
 #include "host/scene/describe.h"
 #include <ctype.h>
 #include <getopt.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -81,6 +82,7 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
     else
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
     if (facts->unbounded_count > 0) printf(", plus %zu unbounded", facts->unbounded_count);
+    if (scene->frame_count > 0) printf("\n  frames     %" PRIu32, scene->frame_count);
     printf("\n  features  ");
     for (unsigned i = 0; i < FEATURE_COUNT; i++) {
         if (!(facts->features >> i & 1)) continue;
@@ -136,6 +138,7 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         json_int64(json, "unbounded", (int64_t)facts.unbounded_count);
         json_int64(json, "lights", (int64_t)scene->lights.count);
         json_int64(json, "materials", (int64_t)scene->materials.count);
+        json_int64(json, "frames", scene->frame_count);
         if (bounds_is_empty(&facts.bounds)) {
             json_none(json, "bounds");
         } else {

@@ -285,7 +285,7 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *su
 }
 
 // Returns an affine map of the plane after another.
-static void rows_multiply(double after[2][3], double first[2][3], double product[2][3])
+static void rows_multiply(double (*after)[3], double (*first)[3], double (*product)[3])
 {
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 3; k++)

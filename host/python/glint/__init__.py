@@ -187,9 +187,9 @@ def _yaml(value: Any) -> str:
     return json.dumps(value, default=lambda array: array.tolist())
 
 
-def _options(overrides: Optional[Mapping[str, Any]], frame: float) -> Any:
+def _options(overrides: Optional[Mapping[str, Any]], frame: float, camera: Optional[bytes] = None) -> Any:
     texts = [f"{path}={value if isinstance(value, str) else _yaml(value)}".encode() for path, value in (overrides or {}).items()]
-    return _c.SceneOptions(ctypes.sizeof(_c.SceneOptions), (ctypes.c_char_p * len(texts))(*texts), len(texts), frame)
+    return _c.SceneOptions(ctypes.sizeof(_c.SceneOptions), (ctypes.c_char_p * len(texts))(*texts), len(texts), frame, camera)
 
 
 class Scene:
@@ -224,6 +224,11 @@ class Scene:
     @property
     def light_count(self) -> int:
         return _c.library.glint_scene_light_count(self._handle)
+
+    @property
+    def frame_count(self) -> int:
+        """The number of frames that an animated scene names, or 0."""
+        return _c.library.glint_scene_frame_count(self._handle)
 
     def render(self, width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5, precision: str = "single",
                device: Union[None, int, str] = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None,
@@ -333,9 +338,11 @@ def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) ->
     _c.library.glint_scene_free(handle)
 
 
-def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0) -> Scene:
-    """Reads a scene, mesh or glTF file. overrides, frame: of a YAML scene, as for Scene."""
-    options = _options(overrides, frame)
+def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,
+         camera: Union[None, str, os.PathLike[str]] = None) -> Scene:
+    """Reads a scene, mesh or glTF file. overrides, frame: of a YAML scene, as for Scene. camera: another scene's file, whose
+    camera replaces the scene's."""
+    options = _options(overrides, frame, None if camera is None else os.fsencode(camera))
     scene = Scene.__new__(Scene)
     scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
     return scene
