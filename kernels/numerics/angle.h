@@ -39,19 +39,28 @@ static inline real real_turns(real x, real y)
 static inline real real_sine_of_turns(real turns)
 {
 #if IS_DOUBLE
+#define ONE 1.0
     const real turn = (real)(0x1.921fb54442d18p+2);
 #else
+#define ONE 1.0f
     const real turn = (real)(0x1.921fb6p+2f);
 #endif
-    const scalar one = 1; // the factors are those from term to term, 1 / (n (n - 1)), without the first
-    const scalar factors[] = {one / 420, one / 342, one / 272, one / 210, one / 156,
-                              one / 110, one / 72,  one / 42,  one / 20};
     const real angle = turns * turn, squared = angle * angle;
     real series = (real)(1);
-#pragma unroll
-    for (uint i = 0; i < 9; i++)
-        series = real_fma(-squared * (real)(factors[i]), series, (real)(1));
-    return real_fma(-angle * squared * (real)(one / 6), series, angle);
+    // Of a term to the next one; with literals, since a device's quotients may be inexact.
+#define SERIES_STEP(n) series = real_fma(-squared * (real)(ONE / n), series, (real)(1))
+    SERIES_STEP(420);
+    SERIES_STEP(342);
+    SERIES_STEP(272);
+    SERIES_STEP(210);
+    SERIES_STEP(156);
+    SERIES_STEP(110);
+    SERIES_STEP(72);
+    SERIES_STEP(42);
+    SERIES_STEP(20);
+#undef SERIES_STEP
+    return real_fma(-angle * squared * (real)(ONE / 6), series, angle);
+#undef ONE
 }
 
 #endif
