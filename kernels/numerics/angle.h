@@ -47,7 +47,7 @@ static inline real real_sine_of_turns(real turns)
 #endif
     const real angle = turns * turn, squared = angle * angle;
     real series = (real)(1);
-    // Of a term to the next one; with literals, since a device's quotients may be inexact.
+    // The factor from a term to the next one, from literals, since a device's quotients may be inexact.
 #define SERIES_STEP(n) series = real_fma(-squared * (real)(ONE / n), series, (real)(1))
     SERIES_STEP(420);
     SERIES_STEP(342);
