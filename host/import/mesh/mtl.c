@@ -245,7 +245,7 @@ static void image_read_name(MtlReader *reader, const char *otherwise, char **ima
 
 static void texture_read(MtlReader *reader, MtlMaterial *material)
 {
-    image_read_name(reader, "the color is used", &material->image, NULL);
+    image_read_name(reader, texture_fallback(TEXTURE_COLORS), &material->image, NULL);
 }
 
 static void opacity_texture_read(MtlReader *reader, MtlMaterial *material)
@@ -260,7 +260,7 @@ static void normal_texture_read(MtlReader *reader, MtlMaterial *material)
         report_warning(&reader->report, scan_offset(&reader->scan),
                        "a second map of normals or heights: it replaces the first");
     material->material.normal_strength = 1;
-    image_read_name(reader, "normals are not tilted", &material->normal_image,
+    image_read_name(reader, texture_fallback(TEXTURE_NORMALS), &material->normal_image,
                     &material->material.normal_strength);
     material->has_bumps = false;
 }
