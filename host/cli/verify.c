@@ -15,10 +15,8 @@
 #include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/prctl.h>
 #include <unistd.h>
 
 enum { OPTION_LEAN = OPTION_OWN, OPTION_QUICK };
@@ -410,8 +408,7 @@ static void builder_start(const VerifyOptions *options)
     const pid_t parent = getpid();
     fflush(stdout); // otherwise each process would print the contents of the buffer
     if (fork() != 0) return;
-    prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (getppid() != parent) _exit(EXIT_INTERRUPTED);
+    child_end_with(parent);
     if (!freopen("/dev/null", "w", stdout) || !freopen("/dev/null", "w", stderr)) _exit(EXIT_USER);
     OpenDevice open;
     if (!device_open(&open, &options->common)) _exit(EXIT_USER);

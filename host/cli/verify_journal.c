@@ -42,11 +42,16 @@ static void crash_record(VerifyJournal *journal, CaseRecord *record, int status)
     journal->crash[0] = '\0';
 }
 
-// Ignores the signals that end a group of processes. The parent receives them and ends this process.
-static void child_begin(VerifyJournal *journal, pid_t parent)
+void child_end_with(pid_t parent)
 {
     prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (getppid() != parent) _exit(EXIT_INTERRUPTED);
+}
+
+// Ignores the signals that end a group of processes. The parent receives them and ends this process.
+static void child_begin(VerifyJournal *journal, pid_t parent)
+{
+    child_end_with(parent);
     signal(SIGINT, SIG_IGN);
     signal(SIGTERM, SIG_IGN);
     signal(SIGHUP, SIG_IGN);

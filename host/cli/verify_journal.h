@@ -4,6 +4,7 @@
 
 #include "host/base/fault.h"
 #include "host/verify/verify.h"
+#include <sys/types.h>
 
 typedef enum { CASE_PENDING, CASE_RUNNING, CASE_DONE, CASE_CRASHED } CaseState;
 
@@ -29,6 +30,9 @@ typedef struct {
     char crash[CRASH_TEXT_SIZE];
     PrecisionRecord precisions[ARITHMETIC_COUNT];
 } VerifyJournal;
+
+// Lets this process, a child of `parent`, end with it.
+void child_end_with(pid_t parent);
 
 // Returns a zeroed journal, which lives until the process ends.
 VerifyJournal *verify_journal_open(void);
