@@ -18,7 +18,8 @@ bool tests_are_long(void)
 const uint32_t *tested_lanes(const Device *device)
 {
     static uint32_t lanes[LANES_MAX];
-    const unsigned usual = device_lanes(device, false, 0), few = usual > 1 ? usual : 4;
+    const unsigned usual = device_lanes(device, false, 0);
+    const unsigned few = usual > 1 || (device->type & CL_DEVICE_TYPE_GPU) ? usual : 4;
     size_t count = 0;
     for (unsigned requested = 1; requested <= LANES_MAX; requested *= requested == 1 ? 4 : 2) {
         const bool is_tested = requested == 1 || requested == few || tests_are_long();
