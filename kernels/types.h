@@ -100,13 +100,20 @@ typedef struct {
 } TriangleNormals;
 
 // At `certified`, the neighbors of a triangle: the ids of the triangles across the edges opposite a, b and c,
-// and 3 bits for each, from the lowest on, which are set if signs of exact arithmetic on the scene's vertices
-// prove it. The array has an element for every object, whose id is the index.
+// and NEIGHBOR_SIDES_BITS bits for each, from the lowest on, which are set if signs of exact arithmetic on
+// the scene's vertices prove it, the last if the neighbor's normals lift its points away from the plane of
+// this triangle. The array has an element for every object, whose id is the index.
 typedef struct {
     uint4 ids_sides;
 } TriangleNeighbors;
 
-enum { NEIGHBOR_HAS_THIS_BEHIND = 1, NEIGHBOR_IN_FRONT = 2, NEIGHBOR_BEHIND = 4, NEIGHBOR_SIDES_BITS = 3 };
+enum {
+    NEIGHBOR_HAS_THIS_BEHIND = 1,
+    NEIGHBOR_IN_FRONT = 2,
+    NEIGHBOR_BEHIND = 4,
+    NEIGHBOR_LIFTS_AWAY = 8,
+    NEIGHBOR_SIDES_BITS = 4
+};
 #define NO_NEIGHBOR 0xfffffffeu
 
 // Texture coordinates.

@@ -10,8 +10,11 @@
 #define NONE UINT32_MAX
 
 typedef struct {
+    const Scene *scene;
     Mesh all; // triangles, with equal vertices joined
     uint32_t *ids;
+    uint32_t *owners;    // of each triangle, the index of its object
+    uint32_t *first_ids; // of each object
     uint32_t *across; // of each half-edge, 3 triangle + corner opposite: the other one of its edge, or NONE
     TriangleNeighbors *neighbors;
 } Triangles;
@@ -56,13 +59,18 @@ static Triangles triangles_open(const Scene *scene)
         vertex_count +=
             has_vertices ? scene->meshes.items[object->as.mesh.index].vertex_count : 3 * triangle_count;
     }
-    Triangles triangles = {.ids = memory_allocate(count, sizeof *triangles.ids)};
+    Triangles triangles = {.scene = scene,
+                           .ids = memory_allocate(count, sizeof *triangles.ids),
+                           .owners = memory_allocate(count, sizeof *triangles.owners),
+                           .first_ids = memory_allocate(scene->objects.count, sizeof *triangles.first_ids)};
     triangles.all.vertices = memory_allocate(vertex_count, sizeof *triangles.all.vertices);
     triangles.all.triangles = memory_allocate(count, sizeof *triangles.all.triangles);
     uint32_t id = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
+        const size_t first = triangles.all.triangle_count;
+        triangles.first_ids[i] = id;
         if (mesh && object->as.mesh.is_instance)
             instance_add(&triangles, mesh, object, id);
         else if (mesh)
@@ -75,6 +83,8 @@ static Triangles triangles_open(const Scene *scene)
                            .triangle_count = 1};
             triangles_add(&triangles, &single, id);
         }
+        for (size_t k = first; k < triangles.all.triangle_count; k++)
+            triangles.owners[k] = (uint32_t)i;
         id += (uint32_t)object_primitive_count(scene, object);
     }
     mesh_join_vertices(&triangles.all);
@@ -85,6 +95,8 @@ static void triangles_close(Triangles *triangles)
 {
     mesh_free(&triangles->all);
     free(triangles->ids);
+    free(triangles->owners);
+    free(triangles->first_ids);
     free(triangles->across);
 }
 
@@ -175,6 +187,36 @@ static Side side_of(const Triangles *triangles, const uint32_t *corners, uint32_
     return side_of_quad(a, b, c, p);
 }
 
+static MeshTriangle triangle_at(const Triangles *triangles, size_t index)
+{
+    const Scene *scene = triangles->scene;
+    const uint32_t owner = triangles->owners[index];
+    const Object *object = &scene->objects.items[owner];
+    if (object->kind == SHAPE_MESH)
+        return mesh_triangle_at(&scene->meshes.items[object->as.mesh.index], object,
+                                triangles->ids[index] - triangles->first_ids[owner]);
+    MeshTriangle triangle;
+    memcpy(triangle.vertices, object->as.triangle.vertices, sizeof triangle.vertices);
+    for (int i = 0; i < 3; i++)
+        triangle.normals[i] = vector_normalize(object->as.triangle.normals[i]);
+    return triangle;
+}
+
+// Returns whether triangle_lift (kernels/shapes/triangle.h) moves points of the neighbor, seen from its
+// front, away from the plane of this triangle on a side of it, 1 in front or -1 behind: whether the
+// neighbor's normals, turned to its front, point there by more than roundings.
+static bool lifts_away(const Triangles *triangles, size_t this, size_t neighbor, double side)
+{
+    const MeshTriangle plane = triangle_at(triangles, this), lifted = triangle_at(triangles, neighbor);
+    const Vector3 normal = triangle_normal(plane.vertices[0], plane.vertices[1], plane.vertices[2]),
+                  front = triangle_normal(lifted.vertices[0], lifted.vertices[1], lifted.vertices[2]);
+    for (int i = 0; i < 3; i++) {
+        const double facing = vector_dot(lifted.normals[i], front) > 0 ? side : -side;
+        if (!(facing * vector_dot(lifted.normals[i], normal) > 1e-5)) return false;
+    }
+    return true;
+}
+
 static void sides_find(void *context, size_t begin, size_t end)
 {
     const Triangles *triangles = context;
@@ -190,6 +232,9 @@ static void sides_find(void *context, size_t begin, size_t end)
             if (of_this == BEHIND) sides |= NEIGHBOR_HAS_THIS_BEHIND;
             if (of_neighbor == IN_FRONT) sides |= NEIGHBOR_IN_FRONT;
             if (of_neighbor == BEHIND) sides |= NEIGHBOR_BEHIND;
+            if ((of_neighbor == IN_FRONT || of_neighbor == BEHIND) &&
+                lifts_away(triangles, i, across / 3, of_neighbor))
+                sides |= NEIGHBOR_LIFTS_AWAY;
             if (sides == 0) continue;
             found[k] = triangles->ids[across / 3];
             found[3] |= sides << (NEIGHBOR_SIDES_BITS * k);

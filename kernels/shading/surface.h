@@ -170,7 +170,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         weights = triangle_weights(corners, ray);
         hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
     }
-    TriangleHeights heights = {(real)(0), (real)(0), (real)(0)};
+    TriangleHeights heights = {(real)(0), (real)(0), (real)(0), (real)(0)};
     if (smooth) {
         triangle_smooth(normals, weights, &hit.point);
         mask along = vector_dot(hit.point.normal, ray->direction) > (real)(0),

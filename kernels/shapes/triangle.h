@@ -266,9 +266,10 @@ static inline void triangle_smooth(Corners normals, TriangleWeights weights, Sur
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
-// How far each corner's tangent plane is above the point, 0 if it is below.
+// How far each corner's tangent plane is above the point, 0 if it is below; and how far at most a corner's
+// two edges together rise over its tangent plane or fall below it.
 typedef struct {
-    real a, b, c;
+    real a, b, c, steepest;
 } TriangleHeights;
 
 // Moves the start of rays to lights to the curved surface that the normals of the corners suggest, which a
@@ -280,13 +281,16 @@ static inline TriangleHeights triangle_lift(Corners corners, Corners normals, Tr
 {
     Vector ab = vector_subtract(corners.a, corners.b), bc = vector_subtract(corners.b, corners.c),
            ca = vector_subtract(corners.c, corners.a);
-    real from_ab = weights.b * vector_dot(ab, normals.a), from_ac = weights.c * vector_dot(ca, normals.a);
-    real from_bc = weights.c * vector_dot(bc, normals.b), from_ba = weights.a * vector_dot(ab, normals.b);
-    real from_ca = weights.a * vector_dot(ca, normals.c), from_cb = weights.b * vector_dot(bc, normals.c);
+    real ab_a = vector_dot(ab, normals.a), ca_a = vector_dot(ca, normals.a);
+    real bc_b = vector_dot(bc, normals.b), ab_b = vector_dot(ab, normals.b);
+    real ca_c = vector_dot(ca, normals.c), bc_c = vector_dot(bc, normals.c);
     const real zero = (real)(0);
-    TriangleHeights heights = {real_max(side * (from_ab - from_ac), zero),
-                               real_max(side * (from_bc - from_ba), zero),
-                               real_max(side * (from_ca - from_cb), zero)};
+    TriangleHeights heights = {real_max(side * (weights.b * ab_a - weights.c * ca_a), zero),
+                               real_max(side * (weights.c * bc_b - weights.a * ab_b), zero),
+                               real_max(side * (weights.a * ca_c - weights.b * bc_c), zero), zero};
+    if (IS_CERTIFIED)
+        heights.steepest =
+            real_max(real_max(fabs(ab_a) + fabs(ca_a), fabs(bc_b) + fabs(ab_b)), fabs(ca_c) + fabs(bc_c));
     point->lift = triangle_blend((TriangleWeights){side * weights.a * heights.a, side * weights.b * heights.b,
                                                    side * weights.c * heights.c},
                                  normals);
@@ -451,15 +455,22 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
 static inline void triangle_set_lift_error(Corners corners, TriangleHeights heights, real side, real slimness,
                                            real place_error, SurfacePoint *point)
 {
-    real moved = real_fma((real)(36 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(corners)), place_error);
-    real error = real_fma(moved * slimness, heights.a + heights.b + heights.c + (real)(3) * moved, moved);
+    real size = vector_norm1(corners_max_abs(corners));
+    Corners edges = {vector_subtract(corners.a, corners.b), vector_subtract(corners.b, corners.c),
+                     vector_subtract(corners.c, corners.a)};
+    real rounded = real_fma((real)(16 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(edges)),
+                            (real)(4 * UNIT_ROUNDOFF) * size);
+    real weight_error = real_fma((real)(36 * UNIT_ROUNDOFF), size, place_error) * slimness;
+    real height_error = real_fma(weight_error, heights.steepest, rounded);
+    real heights_sum = heights.a + heights.b + heights.c;
+    real error = real_fma(weight_error, heights_sum + (real)(3) * height_error, height_error);
     point->lift_error = lanes_select(side == (real)(0), (real)(0), error);
 }
 
 // Returns the lanes whose rays leave a neighbor of this triangle for good. Their start is on the neighbor or,
 // if lifted, in front of it. So they cannot hit this triangle if it lies behind the neighbor's plane and they
-// leave to its front, nor, unless lifted, if they run to the side of this triangle's plane that the neighbor
-// is on.
+// leave to its front, nor if they run to the side of this triangle's plane that the neighbor is on, unless
+// they may be lifted across that plane.
 static inline mask triangle_left_behind(const Triangle *triangle, const TriangleNeighbors *neighbors,
                                         const Ray *ray, mask lanes)
 {
@@ -470,12 +481,15 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
          over_c = lanes & (ray->left == by_c);
     if (!lanes_any(over_a | over_b | over_c)) return mask_none();
     const integer none = (integer)(0);
-    integer sides = lanes_select(over_a, (integer)((scalar_integer)(ids_sides.w & 7)), none);
-    sides = lanes_select(over_b, (integer)((scalar_integer)(ids_sides.w >> NEIGHBOR_SIDES_BITS & 7)), sides);
-    sides = lanes_select(over_c, (integer)((scalar_integer)(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 7)),
+    integer sides = lanes_select(over_a, (integer)((scalar_integer)(ids_sides.w & 15)), none);
+    sides = lanes_select(over_b, (integer)((scalar_integer)(ids_sides.w >> NEIGHBOR_SIDES_BITS & 15)), sides);
+    sides = lanes_select(over_c, (integer)((scalar_integer)(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 15)),
                          sides);
     mask is_behind = (sides & (integer)(NEIGHBOR_HAS_THIS_BEHIND)) != none;
-    if (HAS_SMOOTH_NORMALS) sides = lanes_select(ray->is_lifted, none, sides);
+    if (HAS_SMOOTH_NORMALS) {
+        mask lifts_away = ray->leaves_outward & ((sides & (integer)(NEIGHBOR_LIFTS_AWAY)) != none);
+        sides = lanes_select(ray->is_lifted & !lifts_away, none, sides);
+    }
     mask in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
          behind = (sides & (integer)(NEIGHBOR_BEHIND)) != none;
     Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
