@@ -48,10 +48,10 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
 }
 
 kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
-                global int *doubts, global const uint *pixels, uint light_count)
+                global int *doubts, uint light_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, pixels};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, doubts};
     const HitLayers hit_layers = {HIT_AOV_LIST(LAYER_POINTER)};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);

@@ -7,7 +7,7 @@
 typedef struct {
     uint first_x, first_y, width, height; // in the whole image; in a list, 0, 0, its length and 1
     uint cell;                            // 1, or the side of the squares that have one pixel each
-    global const uint *pixels;            // in a list, x and y of each pixel in the whole image
+    global const int *list; // in a list, of each pixel x and y in the whole image and its index in the band
 } Band;
 
 typedef struct {
@@ -54,10 +54,10 @@ static inline Tile list_tile(const Band *band, uint which)
         uint at = min(first + lane, band->width - 1);
         inside.each[lane] = first + lane < band->width ? 1 : 0;
         index.each[lane] = at;
-        x.each[lane] = band->pixels[2 * at];
-        y.each[lane] = band->pixels[2 * at + 1];
+        x.each[lane] = band->list[3 * at];
+        y.each[lane] = band->list[3 * at + 1];
     }
-    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), false, index.all, 0, 0, 0};
+    Tile tile = {{x.all, y.all}, inside.all != (integer)(0), false, index.all, 0, band->width, 0};
     if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
@@ -195,16 +195,31 @@ static inline void film_store_tiles(global scalar *film, const Tile *tiles, cons
         film_store_color(film, &tiles[i], colors[i]);
 }
 
-// Records the uncertain lanes: in a word per tile, as bits; in a list, in the pixels' counts. `is_first`
-// means that nothing has been recorded there yet.
+// Stores the colors of a list's pixels in the film of their band.
+static inline void film_merge(global float *band_film, const Band *band, const Tile *tile, Vector color)
+{
+    RealLanes x = {color.x}, y = {color.y}, z = {color.z};
+    IntegerLanes inside = {tile->inside}, index = {tile->index};
+    for (uint lane = 0; lane < LANES; lane++) {
+        if (!inside.each[lane]) continue;
+        global float *pixel = band_film + 3 * (size_t)band->list[3 * index.each[lane] + 2];
+        pixel[0] = (float)x.each[lane];
+        pixel[1] = (float)y.each[lane];
+        pixel[2] = (float)z.each[lane];
+    }
+}
+
+// Records the uncertain lanes: as bits, all of which were 0 before; in a list, in the pixels' counts, which
+// follow its pixels. `is_first` means that a count has no value yet.
 static inline void film_note_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
 {
-    if (!is_first && !lanes_any(doubt)) return;
+    if (!(IS_PIXEL_LIST && is_first) && !lanes_any(doubt)) return;
     if (!IS_PIXEL_LIST) {
-        int before = is_first ? 0 : doubts[tile->number];
-        doubts[tile->number] = before | (int)lanes_bits(doubt & tile->inside);
+        uint first = tile->number * LANES;
+        atomic_or(&doubts[first >> 5], (int)(lanes_bits(doubt & tile->inside) << (first & 31)));
         return;
     }
+    doubts += 3 * (size_t)tile->width;
     IntegerLanes counted = {doubt}, inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;

@@ -17,11 +17,11 @@ static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile
 }
 
 kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
-                 global int *doubts, global const uint *pixels)
+                 global int *doubts)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     global int *paths = (global int *)(film + (size_t)layers.path * ARENA_UNIT);
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, pixels};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, doubts};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
         if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths, doubts);

@@ -7,11 +7,12 @@
 // The last launch divides the sum by the number of samples. `offsets` has x and y of each sample in its
 // pixel, -1 to 1. `compensation` is the rounding error of the sum, which the next addition compensates and
 // which is kept between launches (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965). A
-// plain sum of a million equal samples would be off by 1 %.
+// plain sum of a million equal samples would be off by 1 %. The colors of a list also go to `band_film`,
+// unless it is NULL.
 static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
                                      global scalar *compensation, uint first_sample, uint last_sample,
-                                     global int *doubts)
+                                     global int *doubts, global float *band_film)
 {
     Tile tiles[PACKETS];
     Ray rays[PACKETS];
@@ -57,17 +58,19 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
                            real_divide(sums[i].z, divisor)};
     }
     film_store_tiles(film, tiles, sums);
+    for (uint i = 0; i < PACKETS && IS_PIXEL_LIST && band_film && last_sample == count; i++)
+        film_merge(band_film, band, &tiles[i], sums[i]);
 }
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *sample_offsets, global scalar *film,
                    uint4 band_pixels, uint first_sample, uint last_sample, global uint *ray_counts, uint cell,
-                   global int *doubts, global const uint *pixels)
+                   global int *doubts, global float *band_film)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, pixels};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, doubts};
     global scalar *compensation = film + (size_t)band.width * band.height * 3;
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
         tiles_render(&scene, &band, first_tile, sample_offsets, film, compensation, first_sample, last_sample,
-                     doubts);
+                     doubts, band_film);
 }

@@ -1,6 +1,8 @@
 #include "host/render/band.h"
 
 #include "host/base/array.h"
+#include "host/base/memory.h"
+#include <stdlib.h>
 
 enum { GROUPS_OF_UNIT_MIN = 4 }; // with fewer, the other compute units would idle while the last group ends
 
@@ -85,11 +87,16 @@ static size_t divide_up(uint32_t count, uint32_t by)
     return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
 }
 
-size_t film_tile_count(const Renderer *renderer, const Film *film)
+static size_t words_of_items(const size_t items[2], TileShape item)
 {
-    const uint32_t lanes = renderer->report.lanes;
-    const TileShape item = item_shape(lanes);
-    return divide_up(film->width, item.width) * divide_up(film->height, item.height) * lanes;
+    return (items[0] * items[1] * item.width * item.height + 31) / 32;
+}
+
+size_t film_doubt_words(const Renderer *renderer, const Film *film)
+{
+    const TileShape item = item_shape(renderer->report.lanes);
+    const size_t items[] = {divide_up(film->width, item.width), divide_up(film->height, item.height)};
+    return words_of_items(items, item);
 }
 
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
@@ -120,12 +127,11 @@ void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, 
     buffers->film = film_buffer(renderer, band_film_size(&film, aovs, buffers));
     buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = renderer->pass != PASS_ALL;
-    const size_t pixel_count = film_pixel_count(&film),
-                 doubt_count = is_list ? pixel_count : film_tile_count(renderer, &film),
-                 doubts_size = renderer->repeat ? doubt_count * sizeof(uint32_t) : 0;
-    buffers->doubts = film_buffer(renderer, doubts_size);
-    buffers->center_doubts = film_buffer(renderer, doubts_size);
-    buffers->pixels = film_buffer(renderer, is_list ? 2 * pixel_count * sizeof(uint32_t) : 0);
+    const size_t words = is_list            ? 4 * film_pixel_count(&film)
+                         : renderer->repeat ? film_doubt_words(renderer, &film)
+                                            : 0;
+    buffers->doubts = film_buffer(renderer, words * sizeof(uint32_t));
+    buffers->center_doubts = film_buffer(renderer, is_list ? 0 : words * sizeof(uint32_t));
 }
 
 void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
@@ -134,7 +140,6 @@ void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
     buffer_spare(renderer, buffers->ray_counts);
     buffer_spare(renderer, buffers->doubts);
     buffer_spare(renderer, buffers->center_doubts);
-    buffer_spare(renderer, buffers->pixels);
     *buffers = (BandBuffers){0};
 }
 
@@ -239,6 +244,16 @@ static bool place_launch(Renderer *renderer, KernelKind kind, const Place *place
     return true;
 }
 
+// Clears the flags of a band, which kernels only set.
+static void doubts_clear(Renderer *renderer, cl_mem doubts, const Place *place)
+{
+    if (!renderer->repeat || renderer->pass != PASS_ALL) return;
+    const size_t word_count = words_of_items(place->items, place->item);
+    uint32_t *words = memory_allocate_zeroed(word_count, sizeof *words);
+    buffer_write(renderer->compute, doubts, word_count * sizeof *words, words);
+    free(words);
+}
+
 static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
 {
     const uint32_t zeros[RAYS_COUNT] = {0};
@@ -267,7 +282,8 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 5, sizeof(cl_mem), &buffers->ray_counts);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 7, sizeof(cl_mem), &buffers->doubts);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 8, sizeof(cl_mem), &buffers->pixels);
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 8, sizeof(cl_mem), &buffers->band_film);
+    if (first == 0) doubts_clear(renderer, buffers->doubts, place);
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
     const bool go_on = place_launch(renderer, KERNEL_RENDER, place, last - first);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);
@@ -286,11 +302,13 @@ bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, 
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof place->band, &place->band);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof(cl_mem), &buffers->film);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof offsets, &offsets);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof(cl_mem), &buffers->center_doubts);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof(cl_mem), &buffers->pixels);
+    const bool is_list = renderer->pass != PASS_ALL;
+    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof(cl_mem),
+                    is_list ? &buffers->doubts : &buffers->center_doubts);
     const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
     if (kind == KERNEL_AOV)
-        kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 5, sizeof shadow_count, &shadow_count);
+        kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
+    doubts_clear(renderer, buffers->center_doubts, place);
     pace_begin_band(renderer_pace(renderer, kind));
     return place_launch(renderer, kind, place, 1);
 }

@@ -10,11 +10,11 @@ typedef struct {
     size_t layer_begins[LAYER_COUNT]; // offsets in the film, in bytes
     size_t layer_sizes[LAYER_COUNT];  // in bytes, for all rows
     cl_mem ray_counts;
-    // At `certified`, the pixels of each tile whose colors are uncertain, one bit per pixel. In a list, the
-    // number of uncertain samples per pixel.
+    // At `certified`, a bit for each pixel, tile by tile, set where its color is uncertain. In a list, x, y
+    // and the index in the band of each pixel, and then of each the number of its uncertain samples.
     cl_mem doubts;
-    cl_mem center_doubts; // the same for the AOVs' rays
-    cl_mem pixels;        // in a list, x and y of each pixel
+    cl_mem center_doubts; // the same bits for the AOVs' rays
+    cl_mem band_film;     // in a list, where its colors are to go, or NULL
     RepeatCounts repeats; // since the band's last delivery
 } BandBuffers;
 
@@ -49,8 +49,8 @@ Place band_place(const Renderer *renderer, BandRows rows);
 // the first step. Returns false after the last part.
 bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
 uint64_t place_pixels(const Place *place);
-// Returns the number of work-items, and so of tiles, that cover a film.
-size_t film_tile_count(const Renderer *renderer, const Film *film);
+// Returns the number of words of a band's doubts.
+size_t film_doubt_words(const Renderer *renderer, const Film *film);
 // Returns the place of a list's first `count` pixels.
 Place list_place(const Renderer *renderer, uint32_t count);
 

@@ -5,20 +5,20 @@
 #include <stdlib.h>
 #include <string.h>
 
+// A flagged pixel, as kernels read it (Band in kernels/film.h).
 typedef struct {
-    uint32_t *items;
-    size_t count, capacity;
-} Numbers;
+    uint32_t x, y;  // in the image
+    uint32_t index; // in the band
+} ListPixel;
 
-// A list of a band's pixels.
 typedef struct {
-    Numbers pixels; // x and y in the image
-    Numbers index;  // in the band
+    ListPixel *items;
+    size_t count, capacity;
 } PixelList;
 
 // Lists the flagged pixels of a band tile by tile, so that neighbors share packets.
 static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint32_t *doubts,
-                             size_t tile_count)
+                             size_t word_count)
 {
     const RenderSettings *settings = &renderer->settings;
     const uint32_t lanes = renderer->report.lanes, columns = MACRO_TILE_COLUMNS_OF(lanes),
@@ -26,21 +26,18 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
                    width = settings->region_width, cell = settings_cell(settings);
     const uint32_t items_of_row = (width + columns * tile_width - 1) / (columns * tile_width);
     PixelList list = {0};
-    for (size_t i = 0; i < tile_count; i++) {
-        if (doubts[i] == 0) continue;
-        const uint32_t item = (uint32_t)(i / lanes), which = (uint32_t)(i % lanes);
-        const uint32_t left = (item % items_of_row * columns + which % columns) * tile_width,
-                       top =
-                           (item / items_of_row * MACRO_TILE_ROWS_OF(lanes) + which / columns) * tile_height;
-        if (left >= width || top >= rows.row_count) continue; // the tile is outside the band
-        for (uint32_t bits = doubts[i], lane = 0; bits != 0; bits >>= 1, lane++) {
-            if (!(bits & 1)) continue;
-            const uint32_t x = left + lane % tile_width, y = top + lane / tile_width;
-            array_push(list.pixels, settings->region_x + x * cell);
-            array_push(list.pixels, settings->region_y + (rows.first_row + y) * cell);
-            array_push(list.index, y * width + x);
+    for (uint32_t i = 0; i < word_count; i++)
+        for (uint32_t bits = doubts[i]; bits != 0; bits &= bits - 1) {
+            const uint32_t number = 32 * i + (uint32_t)__builtin_ctz(bits), lane = number % lanes,
+                           tile = number / lanes, which = tile % lanes, item = tile / lanes;
+            const uint32_t x =
+                (item % items_of_row * columns + which % columns) * tile_width + lane % tile_width;
+            const uint32_t y =
+                (item / items_of_row * MACRO_TILE_ROWS_OF(lanes) + which / columns) * tile_height +
+                lane / tile_width;
+            array_push(list, ((ListPixel){settings->region_x + x * cell,
+                                          settings->region_y + (rows.first_row + y) * cell, y * width + x}));
         }
-    }
     return list;
 }
 
@@ -55,9 +52,9 @@ static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_l
     void *repeated = memory_allocate(of_list->layer_sizes[layer], 1);
     const bool is_read = renderer_read(repeat, of_list->film, of_list->layer_begins[layer],
                                        of_list->layer_sizes[layer], repeated);
-    for (size_t i = 0; i < list->index.count && values && is_read; i++)
+    for (size_t i = 0; i < list->count && values && is_read; i++)
         for (size_t k = 0; k < components; k++) {
-            const size_t from = i * components + k, to = list->index.items[i] * components + k;
+            const size_t from = i * components + k, to = list->items[i].index * components + k;
             if (layer_types[layer] == LAYER_TYPE_INTEGER)
                 ((uint32_t *)values)[to] = ((const uint32_t *)repeated)[from];
             else
@@ -108,8 +105,8 @@ static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const Pix
     const BandBuffers *buffers = band->buffers;
     if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
     uint32_t *values = band_map(renderer, buffers, LAYER_DOUBT, CL_MAP_READ | CL_MAP_WRITE);
-    for (size_t i = 0; values && i < list->index.count; i++) {
-        uint32_t *value = &values[list->index.items[i]];
+    for (size_t i = 0; values && i < list->count; i++) {
+        uint32_t *value = &values[list->items[i].index];
         if (*value < doubt) *value = doubt;
     }
     renderer_unmap(renderer, buffers->film, values);
@@ -134,25 +131,25 @@ static bool list_render(Renderer *renderer, const BandBuffers *buffers, const Pl
 static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
                         uint32_t *undecided)
 {
-    const Film film = {.width = (uint32_t)list->index.count,
+    const Film film = {.width = (uint32_t)list->count,
                        .height = 1,
                        .light_count = band->film.light_count,
                        .real_size = renderer_scalar_size(repeat)};
-    const Place place = list_place(repeat, (uint32_t)list->index.count);
+    const Place place = list_place(repeat, (uint32_t)list->count);
     BandBuffers repeated = {0};
     band_buffers_open(&repeated, repeat, band->aovs, film);
-    buffer_write(repeat->compute, repeated.pixels, list->pixels.count * sizeof *list->pixels.items,
-                 list->pixels.items);
+    repeated.band_film = repeat->compute == renderer->compute ? band->buffers->film : NULL;
+    buffer_write(repeat->compute, repeated.doubts, list->count * sizeof *list->items, list->items);
     const bool whole = band->kind == KERNEL_RENDER
                            ? list_render(repeat, &repeated, &place)
                            : band_fill(repeat, band->kind, &repeated, band->aovs, &place);
     for (Layer layer = 0; layer < LAYER_COUNT && whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
-            film_layer_size(&band->film, layer) > 0)
+            !(layer == LAYER_COLOR && repeated.band_film) && film_layer_size(&band->film, layer) > 0)
             layer_merge(renderer, layer, &repeated, band->buffers, list, &band->film);
     if (undecided && whole)
-        buffer_read(repeat->compute, band->kind == KERNEL_RENDER ? repeated.doubts : repeated.center_doubts,
-                    list->index.count * sizeof *undecided, undecided);
+        renderer_read(repeat, repeated.doubts, list->count * sizeof *list->items,
+                      list->count * sizeof *undecided, undecided);
     repeat_launches_take(&renderer->report, &repeat->report);
     band_buffers_close(&repeated, repeat);
     return compute_check_reference(renderer->compute) && whole;
@@ -163,16 +160,11 @@ static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
 {
     uint64_t samples = 0;
     size_t kept = 0;
-    uint32_t *pixels = list->pixels.items, *index = list->index.items;
-    for (size_t i = 0; i < list->index.count; i++) {
-        if (undecided[i] == 0) continue;
+    for (size_t i = 0; i < list->count; i++) {
         samples += undecided[i];
-        pixels[2 * kept] = pixels[2 * i];
-        pixels[2 * kept + 1] = pixels[2 * i + 1];
-        index[kept++] = index[i];
+        if (undecided[i] > 0) list->items[kept++] = list->items[i];
     }
-    list->pixels.count = 2 * kept;
-    list->index.count = kept;
+    list->count = kept;
     return samples;
 }
 
@@ -182,27 +174,26 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
     cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
     const RepeatedBand band = {kind, layers, aovs, buffers,
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
-    const size_t tile_count = film_tile_count(renderer, &band.film);
-    uint32_t *flags = memory_allocate(tile_count, sizeof *flags);
-    bool is_whole = renderer_read(renderer, doubts, 0, tile_count * sizeof *flags, flags);
+    const size_t word_count = film_doubt_words(renderer, &band.film);
+    uint32_t *words = memory_allocate(word_count, sizeof *words);
+    bool is_whole = renderer_read(renderer, doubts, 0, word_count * sizeof *words, words);
     PixelList list = {0};
-    if (is_whole) list = doubts_list(renderer, rows, flags, tile_count);
-    free(flags);
-    if (list.index.count > 0) {
+    if (is_whole) list = doubts_list(renderer, rows, words, word_count);
+    free(words);
+    if (list.count > 0) {
         RepeatCounts *counts = &buffers->repeats;
-        uint32_t *undecided = memory_allocate(list.index.count, sizeof *undecided);
+        uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
         counts->repeated +=
-            (uint64_t)list.index.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
+            (uint64_t)list.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
         doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
         is_whole = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
         if (is_whole) counts->undecided += list_keep_undecided(&list, undecided);
-        if (is_whole && list.index.count > 0) {
+        if (is_whole && list.count > 0) {
             doubts_raise(renderer, &band, &list, DOUBT_UNDECIDED);
             is_whole = list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
         }
         free(undecided);
     }
-    free(list.pixels.items);
-    free(list.index.items);
+    free(list.items);
     return is_whole;
 }
