@@ -600,7 +600,7 @@ class Test(TestCase):
 
     @skipUnless(SAMPLE_MODELS.is_dir(), "assimp-testmodels is not installed")
     def test_sample_models(self):
-        """Models of Khronos, by what docs/scene-format.md says of them."""
+        """Models of Khronos are shown, with warnings of what is not, or refused."""
         metal, alpha = "the texture of metal and roughness is not used", "does not blend: below 0.5"
         for name, *warnings in [
             ("BoxTextured-glTF/BoxTextured.gltf",),
