@@ -217,16 +217,16 @@ CLAIMS = [  # N stands for a number
      lambda: (*glint_peer_cases(), *peer_cases("POV-Ray")[:2], *peer_cases("Tachyon")[:2], *peer_cases("Embree")[:2])),
     ("CHANGELOG.md", "a million spheres take N ms at 1920x1080 on two CPU cores, a million triangles N ms",
      lambda: (frame("spheres-1000000"), frame("bunny-1000000"))),
-    ("docs/numerics.md", r"Among N million rays of all precisions N has a wrong hit or miss outside its band: at `(\w+)`, at a (\w+) "
-                         "N radii away", ladder_wrong),
-    ("docs/numerics.md", "At most N % of a shape's rays from one distance lie in the band up to 100,000 radii, N % at a million",
+    ("docs/measurements/README.md", r"Among N million rays of all precisions N has a wrong hit or miss outside its band: at `(\w+)`, at a (\w+) "
+                                    "N radii away", ladder_wrong),
+    ("docs/measurements/README.md", "At most N % of a shape's rays from one distance lie in the band up to 100,000 radii, N % at a million",
      lambda: (ladder_open(lambda d: d <= 1e5), ladder_open(lambda d: d == 1e6))),
-    ("docs/numerics.md", "The torus at its two nearest distances needs up to N times its bound", torus_beyond_its_bound),
-    ("docs/numerics.md", "are off by N ulp or more from a hundred radii on, and their hits and misses are wrong for N to N % of the rays at 10,000 and "
-                         "100,000 radii; those of tori for N to N % from 100 to 100,000", textbook),
-    ("docs/accuracy.md", "In trials of N scenes and N budgets every image keeps its budget. The N pilots took N s in the median.", budget_pilots),
-    ("docs/accuracy.md", "Where `double` takes more than 0.35 s, N of N trials found a faster precision and took N of the time of `double` in the "
-                         "median; the other N took N of it.", lambda: budget_long(0.35)),
+    ("docs/measurements/README.md", "The torus at its two nearest distances needs up to N times its bound", torus_beyond_its_bound),
+    ("docs/measurements/README.md", "are off by N ulp or more from a hundred radii on, and their hits and misses are wrong for N to N % of the rays at "
+                                    "10,000 and 100,000 radii; those of tori for N to N % from 100 to 100,000", textbook),
+    ("docs/measurements/README.md", "In trials of N scenes and N budgets every image keeps its budget. The N pilots took N s in the median.", budget_pilots),
+    ("docs/measurements/README.md", "Where `double` takes more than 0.35 s, N of N trials found a faster precision and took N of the time of `double` in "
+                                    "the median; the other N took N of it.", lambda: budget_long(0.35)),
     ("docs/measurements/README.md", r"2026-11-27 \| N \| all pass at `single`, `strict` and `double`, with PoCL's bits at `strict`",
      lambda: passed_elsewhere("verify-everywhere", "intel")[:1]),
     ("docs/measurements/README.md", r"2026-11-22 \| N of that day \| N pass, with PoCL's bits at `strict`; M6 takes N to N minutes",
