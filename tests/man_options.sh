@@ -1,6 +1,5 @@
 #!/bin/bash
-# The keys of the window are those of docs/guide.md. The options of each command are the same in its --help and in the manual pages, which
-# tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
+# The options of each command and the keys of the window are the same in its --help and in the manual pages, which tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 GLINT=${GLINT:-build/glint}
@@ -26,10 +25,6 @@ tools/man-options "$GLINT" "$pages"/*
 for subcommand in $subcommands; do grep -q "options $subcommand\$" "$pages"/* || { echo "no manual page has options of $subcommand"; failed=1; }; done
 tools/man-scene docs/scene-format.md >"$pages/glint-scene.5"
 for page in "$pages"/*; do diff "docs/${page##*/}" "$page" || failed=1; done
-
-# What mouse and keys do in the window.
-keys=$("$GLINT" view --help | sed -n '3,/^$/s/^  \(.*[^ ]\)   *\([^ ].*\)$/| \1 | \2 |/p' | sed 's/ * |/ |/')
-diff <(echo "$keys") <(sed -n '/^<!-- keys/,/^<!-- end/{/^| [^|]/p}' docs/guide.md) || failed=1
 
 listed=$("$GLINT" --help | sed -n 's/^  \([a-z][a-z]*\)  .*/\1/p' | xargs)
 if [ "$listed" != "$subcommands" ]; then
