@@ -43,10 +43,6 @@ def frame(scene, program="glint single"):
                 if rung["scene"] == scene)
 
 
-def to_glint(scene, program="Embree packets", name="bench-peers"):
-    return next(rung["programs"][program]["to_glint"] for rung in measured(name)["rungs"] if rung["scene"] == scene)
-
-
 def peer_cases(program):
     """Passed, all, and the names of those that failed."""
     asked = {case["case"]: case["programs"][program]["passed"] for case in measured("hard-cases-peers")["cases"]
@@ -238,13 +234,6 @@ CLAIMS = [  # N stands for a number
     ("docs/measurements/README.md", r"\| Embree, not robust \| N of N \|", lambda: peer_cases("Embree without its robust flag")[:2]),
     ("docs/measurements/README.md", r"\| POV-Ray \| N of N \|", lambda: peer_cases("POV-Ray")[:2]),
     ("docs/measurements/README.md", r"\| Tachyon \| N of N \|", lambda: peer_cases("Tachyon")[:2]),
-    ("docs/performance.md", "Embree's packets take N times glint's time on a mesh of 20,000 triangles and N times on one of a million; 16 to a million "
-                            "spheres take N to N times with our spheres",
-     lambda: (to_glint("bunny-20000"), to_glint("bunny-1000000"), to_glint("spheres-16", "Embree packets, our spheres"),
-              to_glint("spheres-1000000", "Embree packets, our spheres"))),
-    ("docs/performance.md", "eight lights and a directional light they take N to N times",
-     lambda: (min(to_glint(rung["scene"], name="bench-peers-more") for rung in measured("bench-peers-more")["rungs"]),
-              max(to_glint(rung["scene"], name="bench-peers-more") for rung in measured("bench-peers-more")["rungs"]))),
     ("docs/measurements/README.md", r"Tachyon truncates to 8 bits: a mean difference of N to N of 255 \(N in balls\)",
      lambda: (min(tachyon_means()), max(tachyon_means()), spd("balls", "Tachyon", "mean"))),
     ("docs/measurements/README.md", "past the last bounce Tachyon sees the background, glint and POV-Ray nothing: N% of the pixels",
@@ -255,10 +244,10 @@ CLAIMS = [  # N stands for a number
     ("docs/measurements/README.md", r"glint the fraction T \(0.8 here\): N%", lambda: (100 * spd("gears", "POV-Ray", "pixels_off"),)),
     ("docs/measurements/README.md", r"\(N ns per sample of `scenes/demo.yaml` on two cores, N ns per pixel for PNG\)",
      lambda: (1e9 * measured("scaling")["sample_seconds"], 1e9 * measured("scaling")["encode_seconds_per_pixel"])),
-    ("docs/performance.md", r"A million triangles build in N ms and render in N ms \(Embree: N and N ms\), ten million in N and N ms",
+    ("docs/measurements/README.md", r"A million triangles build in N ms and render in N ms \(Embree: N and N ms\), ten million in N and N ms",
      lambda: (*growth("glint", 10**6), *growth("Embree", 10**6), *growth("glint", 10**7))),
     ("docs/performance.md", r"N ranks render an (\w+) image with an efficiency of N", lambda: (100, "8K", scaling_cell("8K", 100))),
-    ("docs/performance.md", "one lane takes N ms for `spheres16.yaml` at `single`, 16 lanes take N ms", lambda: (lanes_frame(1), lanes_frame(16))),
+    ("docs/measurements/README.md", "one lane takes N ms for `spheres16.yaml` at `single`, 16 lanes take N ms", lambda: (lanes_frame(1), lanes_frame(16))),
 ]
 # Document, a sentence, and whether the measurements hold it up.
 FACTS = [
