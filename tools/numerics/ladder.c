@@ -56,8 +56,8 @@ typedef struct {
 
 // A tier's bounds: on t, in ulps plus a slack of size or distance over the cosine, and the band in which hit
 // or miss is undecided; in u. The hard cases allow tier B its slack below a cosine of 0.1 alone; here it is
-// allowed at every angle (tests/test_shapes.c says why, docs/numerics.md which rungs need it). The textbook
-// has no bounds.
+// allowed at every angle (tests/test_shapes.c says why, docs/measurements/README.md which rungs need it). The
+// textbook has no bounds.
 typedef struct {
     double ulps, slack, band;
     bool of_size; // else of the distance
