@@ -107,7 +107,7 @@ static void test_names_of_colors(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        {"test_yaml_examples", check_examples, NULL, NULL, &(Examples){"yaml", 3}},
+        {"test_yaml_examples", check_examples, NULL, NULL, &(Examples){"yaml", 2}},
         {"test_rt_examples", check_examples, NULL, NULL, &(Examples){"rt", 1}},
         {"test_cfg_examples", check_examples, NULL, NULL, &(Examples){"cfg", 1}},
         {"test_nff_examples", check_examples, NULL, NULL, &(Examples){"nff", 1}},
