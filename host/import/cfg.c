@@ -1,5 +1,5 @@
 // `.cfg`, the scenes of the program in Mouad Sidqi's Ray Tracing in C explained: blocks such as `=>sphere :`
-// with one key per line. docs/scene-format.md lists what is read and tolerated.
+// with one key per line. docs/scene-format.md lists what is read.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"

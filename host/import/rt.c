@@ -1,5 +1,5 @@
 // `.rt`, the scenes of miniRT: one element per line, fields separated by blanks, vectors by commas.
-// docs/scene-format.md lists what is read and tolerated.
+// docs/scene-format.md lists what is read.
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
