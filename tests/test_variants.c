@@ -441,10 +441,33 @@ static void mirror_gives_the_mirrored_image(void **state)
     scene_free(&mirrored);
 }
 
+// On a GPU, kernels with features that their scene does not need keep functions out of line.
+static void functions_stay_out_of_line(void **state)
+{
+    (void)state;
+    const Device *device = probe_compute.device;
+    Device gpu = *device;
+    gpu.type = CL_DEVICE_TYPE_GPU;
+    probe_compute.device = &gpu;
+    RenderSettings settings = settings_of_image(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.lanes = 1;
+    for (int i = 0; i < 2; i++) {
+        settings.extra_features = i == 0 ? 0 : FEATURE_ALL;
+        Renderer *renderer = probe_renderer(&sampled, &settings);
+        assert_non_null(renderer);
+        char *text = renderer_kernel_text(renderer);
+        assert_non_null(strstr(text, i == 0 ? "#define IS_OUT_OF_LINE 0" : "#define IS_OUT_OF_LINE 1"));
+        free(text);
+        renderer_close(renderer);
+    }
+    probe_compute.device = device;
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(scene_has_every_feature),
+        cmocka_unit_test(functions_stay_out_of_line),
         cmocka_unit_test(lanes_agree),
         cmocka_unit_test(lanes_agree_on_aovs),
         cmocka_unit_test(features_alone_and_all_together_agree),
