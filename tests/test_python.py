@@ -180,6 +180,49 @@ class Rays(unittest.TestCase):
         np.testing.assert_array_equal(found[0], found[2])
 
 
+class AllHits(unittest.TestCase):
+    def setUp(self):
+        spheres = [{"sphere": {"center": [0, 0, 0], "radius": radius}} for radius in range(1, 6)]
+        self.scene = glint.Scene({**SPHERE, "objects": spheres})
+
+    def test_order(self):
+        """Through concentric spheres, next to them, and from inside, in more rays than a batch has."""
+        count = 70000
+        origins = np.zeros((count, 3))
+        origins[:, 0] = np.random.default_rng(3).uniform(0, 6, count)
+        origins[::2, 2] = -8
+        found = self.scene.trace_all(origins, [0, 0, 2])
+        squares = np.arange(1, 6)[None, :] ** 2 - origins[:, :1] ** 2
+        roots = np.sqrt(np.maximum(squares, 0))
+        depths = np.concatenate([-roots[:, ::-1], roots], axis=1)  # of 5 entries, the largest sphere first, and 5 exits
+        is_hit = np.concatenate([squares[:, ::-1], squares], axis=1) > 0
+        is_hit &= depths > origins[:, 2:]
+        np.testing.assert_array_equal(found.ray, np.nonzero(is_hit)[0])
+        np.testing.assert_array_equal(found.object, np.tile([4, 3, 2, 1, 0, 0, 1, 2, 3, 4], (count, 1))[is_hit])
+        np.testing.assert_allclose(found.t, (0.5 * (depths - origins[:, 2:]))[is_hit], atol=1e-6)
+        np.testing.assert_allclose(found.position, np.stack([origins[found.ray, 0], 0 * found.t, depths[is_hit]], 1), atol=1e-6)
+        self.assertTrue(np.all(found.normal[:, 2] < 0))  # they face the rays
+        nearest = self.scene.trace(origins, [0, 0, 2], "double")
+        firsts = np.unique(found.ray, return_index=True)[1]
+        np.testing.assert_array_equal(found.t[firsts], nearest.t[nearest.hit])
+
+    def test_limits(self):
+        origins, directions = np.array([[0, 0, -8], [9, 0, 0]], np.float32), np.array([[0, 0, 1], [0, 0, 1]], np.float32)
+        for precision in "single", "strict", "double":
+            self.assertEqual(self.scene.trace_all(origins, directions, precision).ray.tolist(), [0] * 10)
+            found = self.scene.trace_all(origins, directions, precision, hits_max=3)
+            self.assertEqual((found.ray.tolist(), found.object.tolist(), found.t.tolist()), ([0] * 3, [4, 3, 2], [3, 4, 5]))
+        found = self.scene.trace_all(origins, directions, tmin=3.5, tmax=7.5)
+        self.assertEqual(found.object.tolist(), [3, 2, 1, 0])
+        for none in (self.scene.trace_all(origins, directions, hits_max=0), self.scene.trace_all(origins[1:], directions[1:]),
+                     self.scene.trace_all(origins[:0], directions[:0])):
+            self.assertEqual([array.shape for array in none], [(0,), (0,), (0,), (0, 3), (0, 3)])
+        with self.assertRaisesRegex(glint.SceneError, "all hits have no bounds"):
+            self.scene.trace_all(origins, directions, "certified")
+        with self.assertRaisesRegex(glint.SceneError, "ray 1: expected finite numbers"):
+            self.scene.trace_all(origins, [[0, 0, 1], [0, 0, 0]])
+
+
 class Trimesh(unittest.TestCase):
     def test_queries(self):
         intersector = glint.trimesh.RayMeshIntersector(Mesh)

@@ -210,6 +210,25 @@ typedef struct {
 // undefined.
 GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages);
 
+// Hits of many rays, sorted by ray and then by t. The library allocates the arrays.
+typedef struct {
+    size_t size;
+    size_t count;     // of all hits
+    size_t *ray;      // the index of each hit's ray
+    uint32_t *object; // these as in GlintHits
+    double *t;
+    double *normal;
+    double *position;
+} GlintAllHits;
+
+// Finds the hits of each ray, at most the nearest hits_max of it, each strictly behind the last one: of hits
+// at the same t only one. Sets the members of *hits, whose size the caller has set; free them by
+// glint_all_hits_free. A failure leaves count 0. Not at GLINT_CERTIFIED, whose bounds are those of a ray from
+// its origin.
+GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,
+                            char **messages);
+void glint_all_hits_free(GlintAllHits *hits);
+
 #ifdef __GNUC__
 #pragma GCC visibility pop
 #endif

@@ -43,3 +43,12 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
 // without one if the device failed.
 Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
                           MessageList *messages);
+
+enum { BATCH_RAYS = 1 << 16 }; // traced at once, which bounds the memory that rays take
+
+// Copies a caller's rays as struct_read does. Returns false with a message if they are invalid.
+bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);
+
+// Reads a ray and scales it (host/render/trace.h). Returns false with a message if it is invalid.
+bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index, GlintPrecision precision,
+              MessageList *messages);

@@ -6,8 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BATCH_RAYS = 1 << 16 };
-
 GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
                               const GlintTraceSettings *settings, GlintTracer **tracer, char **messages)
 {
@@ -49,9 +47,8 @@ static void reals_read(double *values, size_t count, GlintReal real, const void 
         values[i] = real_at(real, reals, first + i);
 }
 
-// Reads a ray and scales it. False with a message.
-static bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index,
-                     GlintPrecision precision, MessageList *messages)
+bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index, GlintPrecision precision,
+              MessageList *messages)
 {
     const double farthest =
         precision == GLINT_DOUBLE || precision == GLINT_CERTIFIED ? DBL_MAX : (double)FLT_MAX;
@@ -122,17 +119,22 @@ static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const GlintHi
     return is_sound;
 }
 
+bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages)
+{
+    if (!struct_read(own, sizeof *own, given, messages)) return false;
+    if (own->real != GLINT_FLOAT32 && own->real != GLINT_FLOAT64)
+        return message_error(messages, "rays are neither of 32 nor of 64 bits");
+    if (own->count > 0 && (!own->origins || !own->directions))
+        return message_error(messages, "rays need origins and directions");
+    return true;
+}
+
 GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages)
 {
     MessageList list = {0};
     GlintRays given;
     GlintHits arrays;
-    bool is_sound =
-        struct_read(&given, sizeof given, rays, &list) && struct_read(&arrays, sizeof arrays, hits, &list);
-    if (is_sound && given.real != GLINT_FLOAT32 && given.real != GLINT_FLOAT64)
-        is_sound = message_error(&list, "rays are neither of 32 nor of 64 bits");
-    if (is_sound && given.count > 0 && (!given.origins || !given.directions))
-        is_sound = message_error(&list, "rays need origins and directions");
+    bool is_sound = rays_read(&given, rays, &list) && struct_read(&arrays, sizeof arrays, hits, &list);
     if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     pthread_mutex_lock(&tracer->device->mutex);
     is_sound = rays_trace(tracer, &given, &arrays, &list);

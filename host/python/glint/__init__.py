@@ -23,7 +23,7 @@ import numpy as np
 
 from . import _library as _c
 
-__all__ = ["Device", "DeviceError", "GlintWarning", "Hits", "LAYERS", "MISS", "PRECISIONS", "Scene", "SceneError", "Stopped", "devices",
+__all__ = ["AllHits", "Device", "DeviceError", "GlintWarning", "Hits", "LAYERS", "MISS", "PRECISIONS", "Scene", "SceneError", "Stopped", "devices",
            "load", "load_mesh", "version"]
 
 MISS = 0xFFFFFFFF  #: the object of a miss
@@ -149,6 +149,15 @@ class Hits(NamedTuple):
     def certain(self) -> np.ndarray:
         """True where the object (or miss) and the bounds on t are proven."""
         return self.certainty != 0
+
+
+class AllHits(NamedTuple):
+    """All hits of rays: arrays with one row per hit, sorted by ray and then by t. The members are as in Hits."""
+    ray: np.ndarray  #: the index of each hit's ray
+    object: np.ndarray
+    t: np.ndarray
+    normal: np.ndarray
+    position: np.ndarray
 
 
 def _reals(array: Any, columns: int, count: Optional[int], name: str, dtype: Any) -> np.ndarray:
@@ -293,27 +302,42 @@ class Scene:
         origins, directions: (n, 3); directions may have any length but 0. Where all arrays are of float32 they
         are taken as they are, else as float64. At "certified" tmin must be 0. tmin, tmax: one number or n.
         """
-        given = [array for array in (origins, directions, tmin, tmax) if array is not None]
-        is_float = all(getattr(array, "dtype", None) == np.float32 for array in given)
-        dtype = np.float32 if is_float else np.float64
-        origins = _reals(origins, 3, None, "origins", dtype)
-        count = len(origins)
-        directions = _reals(directions, 3, count, "directions", dtype)
-        tmin = None if tmin is None else _reals(tmin, 1, count, "tmin", dtype)
-        tmax = None if tmax is None else _reals(tmax, 1, count, "tmax", dtype)
-        rays = _c.Rays(ctypes.sizeof(_c.Rays), count, 0 if is_float else 1, *map(_pointer, (origins, directions, tmin, tmax)))
+        rays, keep = _rays(origins, directions, tmin, tmax)
+        count = rays.count
         hits = Hits(np.empty(count, np.uint32), *(np.empty(count) for _ in range(3)), np.empty((count, 3)), np.empty((count, 3)),
                     np.empty(count, np.uint8))
         found = _c.Hits(ctypes.sizeof(_c.Hits), *map(_pointer, hits))
+        self._call(_c.library.glint_trace, device, precision, lanes, ctypes.byref(rays), ctypes.byref(found))
+        del keep
+        return hits
+
+    def trace_all(self, origins: Any, directions: Any, precision: str = "double", tmin: Any = None, tmax: Any = None,
+                  hits_max: Optional[int] = None, device: Union[None, int, str] = None, lanes: int = 0) -> AllHits:
+        """Finds all hits of each ray, or the nearest hits_max, sorted by ray and then by t: of hits at the same t only one.
+        Arguments are those of `trace`, but precision is not "certified"."""
+        rays, keep = _rays(origins, directions, tmin, tmax)
+        found = _c.AllHits(ctypes.sizeof(_c.AllHits))
+        most = ctypes.c_size_t(-1) if hits_max is None else _count("hits_max", hits_max)
+        self._call(_c.library.glint_trace_all, device, precision, lanes, ctypes.byref(rays), most, ctypes.byref(found))
+        del keep
+        count = found.count
+        try:
+            arrays = (_copied(found.ray, (count,), np.uintp), _copied(found.object, (count,), np.uint32),
+                      _copied(found.t, (count,), np.float64), _copied(found.normal, (count, 3), np.float64),
+                      _copied(found.position, (count, 3), np.float64))
+        finally:
+            _c.library.glint_all_hits_free(ctypes.byref(found))
+        return AllHits(arrays[0].astype(np.int64), *arrays[1:])
+
+    def _call(self, function: Any, device: Union[None, int, str], precision: str, lanes: int, *arguments: Any) -> None:
         messages = ctypes.c_void_p()
         key, tracer = self._tracer(device, precision, _count("lanes", lanes))
-        status = _c.library.glint_trace(tracer, ctypes.byref(rays), ctypes.byref(found), ctypes.byref(messages))
+        status = function(tracer, *arguments, ctypes.byref(messages))
         if status == 2:
             _OpenDevice.forget(device)
             with self._lock:
                 self._tracers.pop(key, None)
         _check(status, messages)
-        return hits
 
     def _tracer(self, device: Union[None, int, str], precision: str, lanes: int) -> tuple[Any, ctypes.c_void_p]:
         key = None if device is None else str(device), precision, lanes
@@ -330,6 +354,24 @@ class Scene:
             _OpenDevice.forget(device)
         _check(status, messages)
         return key, tracer
+
+
+def _rays(origins: Any, directions: Any, tmin: Any, tmax: Any) -> tuple[Any, Any]:
+    """Returns the rays, and the arrays that must live as long."""
+    given = [array for array in (origins, directions, tmin, tmax) if array is not None]
+    is_float = all(getattr(array, "dtype", None) == np.float32 for array in given)
+    dtype = np.float32 if is_float else np.float64
+    origins = _reals(origins, 3, None, "origins", dtype)
+    count = len(origins)
+    directions = _reals(directions, 3, count, "directions", dtype)
+    tmin = None if tmin is None else _reals(tmin, 1, count, "tmin", dtype)
+    tmax = None if tmax is None else _reals(tmax, 1, count, "tmax", dtype)
+    arrays = origins, directions, tmin, tmax
+    return _c.Rays(ctypes.sizeof(_c.Rays), count, 0 if is_float else 1, *map(_pointer, arrays)), arrays
+
+
+def _copied(pointer: Any, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+    return np.ctypeslib.as_array(pointer, shape).astype(dtype, copy=True) if shape[0] else np.empty(shape, dtype)
 
 
 def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) -> None:

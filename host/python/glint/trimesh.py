@@ -12,7 +12,7 @@ class RayMeshIntersector:
     """Ray queries on a trimesh.Trimesh, with the methods of trimesh.ray's classes.
 
     First and any hits are traced at `precision`. At `certified`, `hits` reports which of them are proven. Queries for all
-    hits are traced in double, from hit to hit, and are not certified. After the mesh has changed, make another intersector.
+    hits are traced in double and are not certified. After the mesh has changed, make another intersector.
     """
 
     def __init__(self, mesh: Any, precision: str = "certified", device: Union[None, int, str] = None):
@@ -45,35 +45,22 @@ class RayMeshIntersector:
         """Returns the triangles that rays hit and the indices of these rays, and with `return_locations` the hit points.
         A ray's hits are sorted by t. Of triangles hit at the same t only the first is returned."""
         origins, directions = (np.asarray(array, np.float64) for array in (ray_origins, ray_directions))
-        alive, tmin = np.arange(len(origins)), np.zeros(len(origins))
-        triangles, rays, locations = [], [], []
-        for number in range(max_hits if multiple_hits else 1):
-            if multiple_hits:
-                found = self._scene.trace(origins[alive], directions[alive], "double", tmin=tmin[alive], device=self._device)
-            else:
-                found = self.hits(origins, directions)
-            hit = found.hit
-            alive = alive[hit]
-            if not len(alive):
-                break
-            tmin[alive] = found.t[hit]
-            triangles.append(found.object[hit].astype(np.int64))
-            rays.append(alive)
-            locations.append(origins[alive] + found.t[hit][:, None] * directions[alive])
-        ray_of_each = np.concatenate(rays) if rays else np.zeros(0, np.int64)
-        order = np.argsort(ray_of_each, kind="stable")
-        result = [np.concatenate(triangles)[order] if rays else np.zeros(0, np.int64), ray_of_each[order]]
-        if return_locations:
-            result.append(np.concatenate(locations)[order] if rays else np.zeros((0, 3)))
-        return tuple(result)
+        if multiple_hits:
+            found = self._scene.trace_all(origins, directions, hits_max=max_hits, device=self._device)
+            rays, objects, t = found.ray, found.object, found.t
+        else:
+            nearest = self.hits(origins, directions)
+            rays, objects, t = np.flatnonzero(nearest.hit), nearest.object[nearest.hit], nearest.t[nearest.hit]
+        result = objects.astype(np.int64), rays
+        return (*result, origins[rays] + t[:, None] * directions[rays]) if return_locations else result
 
     def contains_points(self, points: Any) -> np.ndarray:
         """Returns whether each point lies inside the mesh, which must be watertight: a ray from an inside point leaves through
         an odd number of triangles. The direction avoids the edges of common models."""
         points = np.asarray(points, np.float64)
         directions = np.broadcast_to([0.4395064455, 0.617598629942, 0.652231566745], points.shape)
-        _, rays = self.intersects_id(points, directions, max_hits=1 << 20)
-        return np.bincount(rays, minlength=len(points)) % 2 == 1
+        found = self._scene.trace_all(points, directions, device=self._device)
+        return np.bincount(found.ray, minlength=len(points)) % 2 == 1
 
 
 __all__ = ["MISS", "RayMeshIntersector"]
