@@ -18,7 +18,8 @@ from pathlib import Path
 
 from glint import need_modules
 
-need_modules("numpy=numpy==2.4.6")
+IS_LONG = os.environ.get("GLINT_LONG_TESTS") == "1"
+need_modules("numpy=numpy==2.4.6", *(["matplotlib=matplotlib==3.11.2"] if IS_LONG else []))
 del sys.modules["glint"]  # the tests' own module, not the package
 ROOT = Path(__file__).resolve().parents[1]
 BUILD = ROOT / os.environ.get("BUILD", "build")
@@ -242,6 +243,28 @@ class Trimesh(unittest.TestCase):
         points = np.random.default_rng(2).uniform(-0.5, 1.5, (500, 3))
         inside = glint.trimesh.RayMeshIntersector(Mesh).contains_points(points)
         self.assertEqual(inside.tolist(), np.all((points > 0) & (points < 1), axis=1).tolist())
+
+
+@unittest.skipUnless(IS_LONG, "takes matplotlib")
+class Notebook(unittest.TestCase):
+    def test_results(self):
+        """The notebook's code runs, and has the errors that it shows."""
+        import matplotlib
+        matplotlib.use("Agg")
+        cells = json.loads((ROOT / "docs/notebook.ipynb").read_text(encoding="utf-8"))["cells"]
+        names, folder = {}, os.getcwd()
+        os.chdir(ROOT / "docs")
+        try:
+            for cell in cells:
+                if cell["cell_type"] == "code":
+                    exec("".join(cell["source"]), names)  # pylint: disable=exec-used
+        finally:
+            os.chdir(folder)
+        worst = names["worst"]
+        self.assertGreater(min(worst["textbook"][3:]), 1000)
+        self.assertLess(max(worst["single"]), 10)
+        self.assertLess(max(worst["strict"][2:]), 4)
+        self.assertEqual(names["image"].shape, (270, 480, 3))
 
 
 class Errors(unittest.TestCase):
