@@ -15,15 +15,7 @@ enum { COPIED_TRIANGLES_MAX = 1 << 18 };
 #define ENTRY_MAX          0x1p50
 #define LIGHT_DISTANCE_MAX 0x1p59
 
-// A map from a shared mesh's space to the scene's, without its translation, and its inverse.
-typedef struct {
-    double rows[3][3], inverses[3][3];
-    double determinant;
-} InstanceMap;
-
-// `is_exact`: the inverse is rounded once from quadruple precision. Otherwise it is off by some roundings of
-// a double times the condition, which floats do not resolve.
-static InstanceMap instance_map(const Affine *transform, double scale, bool is_exact)
+InstanceMap instance_map(const Affine *transform, double scale, bool is_exact)
 {
     InstanceMap map = {0};
     Vector3 rows[3];
@@ -47,8 +39,7 @@ static InstanceMap instance_map(const Affine *transform, double scale, bool is_e
     return map;
 }
 
-// The largest sum of a row of |map| |inverse|; NAN or infinite if the map has no inverse.
-static double map_condition(const InstanceMap *map)
+double map_condition(const InstanceMap *map)
 {
     double condition = 0;
     for (int i = 0; i < 3; i++) {

@@ -26,6 +26,19 @@ typedef struct InstancePlan {
     size_t hidden_counts[EXTENDED_COUNT]; // see shared_meshes_toggle
 } InstancePlan;
 
+// A map from a shared mesh's space to the scene's, without its translation, and its
+// inverse.
+typedef struct {
+    double rows[3][3], inverses[3][3];
+    double determinant;
+} InstanceMap;
+
+// `is_exact`: the inverse is rounded once from quadruple precision. Otherwise it is off by some roundings of
+// a double times the condition, which floats do not resolve.
+InstanceMap instance_map(const Affine *transform, double scale, bool is_exact);
+// Returns the largest sum of a row of |map| |inverse|; NAN or infinite if the map has no inverse.
+double map_condition(const InstanceMap *map);
+
 // Returns NULL if no mesh is shared.
 InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings);
 void instance_plan_free(InstancePlan *plan);

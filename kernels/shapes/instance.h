@@ -3,49 +3,31 @@
 #define INSTANCE_H
 
 #include "scene.h"
+#include "shapes/affine.h"
 #include "shapes/triangle.h"
-
-static inline real instance_row(scalar4 row, Vector v)
-{
-    return real_fma((real)(row.x), v.x, real_fma((real)(row.y), v.y, (real)(row.z) * v.z));
-}
 
 // Maps a vector to the mesh's space.
 static inline Vector instance_inward(const Instance *instance, Vector v)
 {
-    return (Vector){instance_row(instance->inverses[0], v), instance_row(instance->inverses[1], v),
-                    instance_row(instance->inverses[2], v)};
+    return affine_vector(instance->inverses, v);
 }
 
 // Returns the ray in the mesh's space, with the same t.
 static inline Ray instance_ray(const Instance *instance, const Ray *ray)
 {
-    const Vector center = {(real)(instance->rows[0].w), (real)(instance->rows[1].w),
-                           (real)(instance->rows[2].w)};
-    return ray_make(instance_inward(instance, vector_subtract(ray->origin, center)),
+    return ray_make(instance_inward(instance, vector_subtract(ray->origin, affine_place(instance->rows))),
                     instance_inward(instance, ray->direction), ray->tmin, ray->tmax, ray->active);
-}
-
-static inline real instance_coordinate(scalar4 row, Vector p)
-{
-    return real_fma((real)(row.x), p.x,
-                    real_fma((real)(row.y), p.y, real_fma((real)(row.z), p.z, (real)(row.w))));
 }
 
 static inline Vector instance_point(const Instance *instance, Vector p)
 {
-    return (Vector){instance_coordinate(instance->rows[0], p), instance_coordinate(instance->rows[1], p),
-                    instance_coordinate(instance->rows[2], p)};
+    return affine_point(instance->rows, p);
 }
 
 // Maps a normal of the mesh by the transposed inverse, which changes its length.
 static inline Vector instance_normal(const Instance *instance, Vector n)
 {
-    const Vector x = vector_of(instance->inverses[0]), y = vector_of(instance->inverses[1]),
-                 z = vector_of(instance->inverses[2]);
-    return (Vector){real_fma(x.x, n.x, real_fma(y.x, n.y, z.x * n.z)),
-                    real_fma(x.y, n.x, real_fma(y.y, n.y, z.y * n.z)),
-                    real_fma(x.z, n.x, real_fma(y.z, n.y, z.z * n.z))};
+    return affine_normal(instance->inverses, n);
 }
 
 // Maps the unit normals of a triangle's corners; those that are 0 stay 0.
@@ -69,10 +51,6 @@ static inline Corners instance_corners(const Instance *instance, Corners corners
                      instance_point(instance, corners.c)};
 }
 
-// A bound on what mapping adds to the error of a point and of the next ray's test, in units of 16 u of the
-// condition times the corners' largest coordinate from the instance's center.
-#define INSTANCE_POINT_ERROR ((real)(1.5f))
-
 // Returns the point of a triangle in the mesh's space, mapped to the eye's. The normal may have any length.
 static inline SurfacePoint instance_surface_point(const Instance *instance, Corners corners, Vector normal,
                                                   TriangleWeights weights)
@@ -83,13 +61,11 @@ static inline SurfacePoint instance_surface_point(const Instance *instance, Corn
     const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
     const real rounding_scale =
         real_fma((real)(0.25f), vector_norm1(p), vector_norm1_along(unit, max_abs)) * inverse;
-    const Vector reach = {instance_row(fabs(instance->rows[0]), max_abs),
-                          instance_row(fabs(instance->rows[1]), max_abs),
-                          instance_row(fabs(instance->rows[2]), max_abs)};
+    const Vector reach = affine_reach(instance->rows, max_abs);
     const real largest = real_max(real_max(reach.x, reach.y), reach.z);
     return surface_point_make(
         instance_point(instance, p), vector_scale(mapped, inverse),
-        real_fma(INSTANCE_POINT_ERROR * (real)(instance->extent.w), largest, rounding_scale));
+        real_fma(MAPPED_POINT_ERROR * (real)(instance->extent.w), largest, rounding_scale));
 }
 
 #endif

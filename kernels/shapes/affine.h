@@ -1,0 +1,56 @@
+// Affine maps between the space of a shape and that of the eye, as three rows of a matrix.
+#ifndef AFFINE_H
+#define AFFINE_H
+
+#include "numerics/vector.h"
+
+static inline real affine_row(scalar4 row, Vector v)
+{
+    return real_fma((real)(row.x), v.x, real_fma((real)(row.y), v.y, (real)(row.z) * v.z));
+}
+
+static inline Vector affine_vector(const scalar4 rows[3], Vector v)
+{
+    return (Vector){affine_row(rows[0], v), affine_row(rows[1], v), affine_row(rows[2], v)};
+}
+
+// Applies the magnitudes of a map to those of a vector, which bounds what its roundings grow with.
+static inline Vector affine_reach(const scalar4 rows[3], Vector v)
+{
+    const Vector size = {fabs(v.x), fabs(v.y), fabs(v.z)};
+    return (Vector){affine_row(fabs(rows[0]), size), affine_row(fabs(rows[1]), size),
+                    affine_row(fabs(rows[2]), size)};
+}
+
+static inline real affine_coordinate(scalar4 row, Vector p)
+{
+    return real_fma((real)(row.x), p.x,
+                    real_fma((real)(row.y), p.y, real_fma((real)(row.z), p.z, (real)(row.w))));
+}
+
+static inline Vector affine_point(const scalar4 rows[3], Vector p)
+{
+    return (Vector){affine_coordinate(rows[0], p), affine_coordinate(rows[1], p),
+                    affine_coordinate(rows[2], p)};
+}
+
+// Maps a normal by the transposed inverse, which changes its length.
+static inline Vector affine_normal(const scalar4 inverses[3], Vector n)
+{
+    const Vector x = vector_of(inverses[0]), y = vector_of(inverses[1]), z = vector_of(inverses[2]);
+    return (Vector){real_fma(x.x, n.x, real_fma(y.x, n.y, z.x * n.z)),
+                    real_fma(x.y, n.x, real_fma(y.y, n.y, z.y * n.z)),
+                    real_fma(x.z, n.x, real_fma(y.z, n.y, z.z * n.z))};
+}
+
+// A bound on what mapping adds to the error of a point and of the next ray's test, in units of 16 u of the
+// map's condition times the shape's largest coordinate from where 0 lies.
+#define MAPPED_POINT_ERROR ((real)(1.5f))
+
+// Returns where the rows map 0.
+static inline Vector affine_place(const scalar4 rows[3])
+{
+    return (Vector){(real)(rows[0].w), (real)(rows[1].w), (real)(rows[2].w)};
+}
+
+#endif
