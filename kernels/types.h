@@ -132,6 +132,19 @@ typedef struct {
     uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | HAS_POWER
 } Paraboloid;
 
+// A sphere, disc, cylinder, cone, torus or paraboloid that an affine map has made another shape, such as an
+// ellipsoid. The map leads from the space of a unit shape, around 0 and the axis z, to that of the eye.
+typedef struct {
+    scalar4 rows[3];     // of the map; w: where the unit shape's 0 lies
+    scalar4 inverses[3]; // rows of its inverse; w of the first: a bound on its norm; w of the second: below
+    scalar4 extent;      // half of the box around it, 0 if unbounded; w: its condition, as of an Instance
+    // The unit shape's numbers, x: the radius, a power of two; w: half the height where finite. y, z: of a
+    // cone the radius at the base and the slope, of a torus both radii, of a paraboloid k. Rays that start
+    // beyond twice inverses[1].w from 0 are moved to be mapped.
+    scalar4 sizes;
+    uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED, z: the unit shape's KIND_…
+} Oval;
+
 // Every shape: feature, struct, name, name of its array. Adding a shape begins here (docs/adding-a-shape.md).
 // clang-format off
 #define SHAPE_LIST(SHAPE)                           \
@@ -143,7 +156,8 @@ typedef struct {
     SHAPE(CONES,     Cone,     cone,     cones)     \
     SHAPE(TRIANGLES, Triangle, triangle, triangles) \
     SHAPE(TORI,      Torus,    torus,    tori)      \
-    SHAPE(PARABOLOIDS, Paraboloid, paraboloid, paraboloids)
+    SHAPE(PARABOLOIDS, Paraboloid, paraboloid, paraboloids) \
+    SHAPE(OVALS,     Oval,     oval,     ovals)
 // clang-format on
 
 // An instance of a mesh that instances share, a primitive of the scene's BVH with a BVH inside. It maps the

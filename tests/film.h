@@ -16,7 +16,7 @@ const uint32_t *tested_lanes(const Device *device);
 // feature their build would take half as long again.
 #define CERTIFIED_FEATURES                                                                                   \
     (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_BOXES | FEATURE_CYLINDERS | FEATURE_CONES |  \
-     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS |                       \
+     FEATURE_TRIANGLES | FEATURE_SMOOTH_NORMALS | FEATURE_TORI | FEATURE_PARABOLOIDS | FEATURE_OVALS |       \
      FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_CHECKERS | FEATURE_REFLECTION |             \
      FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
 

@@ -1,7 +1,9 @@
 #include "tests/random_scene.h"
 
 #include "host/base/array.h"
+#include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/scene/object_transform.h"
 
 Vector3 random_point(Random *random, double least, double most)
 {
@@ -39,8 +41,18 @@ static Material random_material(Random *random, size_t index)
     return material;
 }
 
+// Makes a shape an oval around the same point, if it is a kind that can be one.
+static void object_stretch(Scene *scene, Object *object, Vector3 center)
+{
+    if (object->kind == SHAPE_BOX || object->kind == SHAPE_PLANE || object->kind == SHAPE_TRIANGLE) return;
+    const Affine stretch = {
+        {{1, 0.3, 0, -0.3 * center.y}, {0, 0.75, 0, 0.25 * center.y}, {0, 0, 1.25, -0.25 * center.z}}};
+    const char *why = object_transform(scene, object, &stretch);
+    if (why) fault("a random object %s", why);
+}
+
 // Returns one object of each form, then bounded ones, none so large that it hides the rest.
-static Object random_object(Random *random, size_t index)
+static Object random_object(Scene *scene, Random *random, size_t index)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
@@ -55,6 +67,7 @@ static Object random_object(Random *random, size_t index)
         if (form->kind == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
         // the order of a triangle's vertices distinguishes glass from air, and the mirror reverses it
         object->material = (uint32_t)index % (form->kind == SHAPE_TRIANGLE ? 2 : 4);
+        if (!first && index % 4 == 0) object_stretch(scene, object, shape.center);
         return *object;
     }
 }
@@ -66,7 +79,7 @@ Scene random_scene(uint64_t seed, size_t object_count)
     for (size_t i = 0; i < 4; i++)
         array_push(scene.materials, random_material(&random, i));
     for (size_t i = 0; i < object_count; i++)
-        array_push(scene.objects, random_object(&random, i));
+        array_push(scene.objects, random_object(&scene, &random, i));
     // from where the plane is not in the way
     size_t plane = 0;
     while (scene.objects.items[plane].kind != SHAPE_PLANE)

@@ -57,6 +57,8 @@ typedef struct {
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[KIND_QUARTETS - 1])   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[0])               \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[KIND_QUARTETS - 1]) \
+    REALS(FLAT_FIRST_SHAPE + KIND_OVALS, Oval, Oval, inverses[2])                \
+    REALS(FLAT_FIRST_SHAPE + KIND_OVALS, Oval, Oval, sizes)                      \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, b)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
@@ -143,6 +145,7 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "  - cone: {from: [0, 0, 0], to: [0, 1, 0], radius: [1, 0]}\n"
                                  "  - paraboloid: {apex: [0, 0, 0], axis: [0, 1, 0], focal_length: 1}\n"
                                  "  - torus: {center: [0, 0, 0], axis: [0, 1, 0], major: 2, minor: 1}\n"
+                                 "  - sphere: {center: [0, 0, 0], radius: 1, transform: {scale: [1, 2, 1]}}\n"
                                  "  - triangle: {vertices: [[0, 0, 0], [1, 0, 0], [0, 1, 0]], normals: [[0, "
                                  "0, 1], [0, 0, 1], [0, 0, 1]]}\n"
                                  "  - mesh: {file: tests/textures/quad.obj, material: {image: "

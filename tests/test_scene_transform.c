@@ -27,6 +27,21 @@ static const Pair pairs[] = {
      "[{sphere: {center: [0, 2, 1], radius: 1}}]"},
     {"mirrored sphere", "[{sphere: {center: [1, 0, 0], radius: 1, transform: {scale: [-1, 1, 1]}}}]",
      "[{sphere: {center: [-1, 0, 0], radius: 1}}]"},
+    {"sphere that is stretched and compressed",
+     "[{group: {transform: {scale: [1, 0.5, 1]}, objects: [{sphere: {center: [0, 1, 0], radius: 1, "
+     "transform: "
+     "{scale: [1, 2, 1]}}}]}}]",
+     "[{sphere: {center: [0, 1, 0], radius: 1}}]"},
+    {"stretched instance", "[{instance: {of: row, transform: {scale: [1, 2, 1]}}}]",
+     "[{sphere: {center: [-1, 0, 0], radius: 0.5, transform: {scale: [1, 2, 1]}}}, {sphere: {center: [0, 0, "
+     "0], "
+     "radius: 1, transform: [{translate: [2, 0, 0]}, {scale: [1, 2, 1]}]}}]"},
+    {"cylinder that is sheared and back",
+     "[{group: {transform: {matrix: [[1, 0, -0.5, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}, objects: [{cylinder: "
+     "{from: "
+     "[0, 0, -1], to: [0, 0, 1], radius: 1, transform: {matrix: [[1, 0, 0.5, 0], [0, 1, 0, 0], [0, 0, 1, "
+     "0]]}}}]}}]",
+     "[{cylinder: {from: [0, 0, -1], to: [0, 0, 1], radius: 1}}]"},
     {"plane",
      "[{plane: {point: [0, -1, 0], normal: [0, 1, 0], transform: {rotate: {axis: [2, 0, 0], angle: 90}}}}]",
      "[{plane: {point: [0, 0, -1], normal: [0, 0, 1]}}]"},

@@ -46,7 +46,7 @@ static SceneFacts facts_of(const Scene *scene)
     SceneFacts facts = {0};
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        facts.shapes[object->kind]++;
+        facts.shapes[object_shape(object)]++;
         if (object->kind == SHAPE_MESH) facts.mesh_triangle_count += object_primitive_count(scene, object);
     }
     facts.bounds = scene_bounds(scene, &facts.unbounded_count);
@@ -132,7 +132,7 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         json_int64(json, "objects", (int64_t)scene->objects.count);
         json_begin_object(json, "shapes");
         for (size_t kind = 0; kind < SHAPE_COUNT; kind++)
-            json_int64(json, shape_names[kind], (int64_t)facts.shapes[kind]);
+            if (kind != SHAPE_OVAL) json_int64(json, shape_names[kind], (int64_t)facts.shapes[kind]);
         json_end(json);
         json_int64(json, "mesh_triangles", (int64_t)facts.mesh_triangle_count);
         json_int64(json, "unbounded", (int64_t)facts.unbounded_count);

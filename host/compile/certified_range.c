@@ -32,12 +32,23 @@ static double primitive_reach(size_t kind, const void *primitive)
     return shape_ops[kind]->largest_coordinate(primitive);
 }
 
+// In the unit shape's space, where distances are up to twice the inverse's norm times as large, and not
+// smaller.
+static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, double reach)
+{
+    const double unit = oval->sizes.x;
+    if (!(2 * oval->inverses[0].w * reach <= range->reach_max)) return false;
+    return oval->id.z != KIND_TORI ||
+           (unit <= range->torus_max && (unit >= range->torus_min || unit <= range->roundoff * reach));
+}
+
 static bool is_in_range(const CertifiedRange *range, size_t kind, const void *primitive)
 {
     const double reach = primitive_reach(kind, primitive);
     // no square is taken of a plane's distance
     if (kind == KIND_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
+    if (kind == KIND_OVALS) return oval_is_in_range(range, primitive, reach);
     if (kind != KIND_TORI) return true;
     const Torus *torus = primitive;
     const double size = torus->center_major.w + torus->axis_minor.w;

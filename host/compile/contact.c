@@ -9,7 +9,7 @@
 // about 2^-14.7 with the u of float: the kernels look for an opaque surface behind a transparent one up to 5
 // error bounds away (surface_find_opaque), each of at most 16 u per number of a shape, 7 of a cylinder, and 4
 // u per coordinate of the point. For double it is larger than needed. Five error bounds of an instance are
-// 140 u and 180 u times its condition at most.
+// 140 u and 180 u times its condition at most, those of an oval 420 u and 120 u times its condition.
 #define NEARNESS 0x1p-14
 
 // More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives
@@ -178,12 +178,21 @@ static Bounds lists_meet(ContactRegionList *transparent, ContactRegionList *opaq
     return all;
 }
 
+static double conditions_largest(const CompiledScene *compiled)
+{
+    double largest = compiled->instances ? compiled->instances->condition : 0;
+    const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + KIND_OVALS];
+    for (size_t i = 0; i < array->count; i++)
+        largest = fmax(largest, ((const Oval *)array->items)[i].extent.w);
+    return largest;
+}
+
 Bounds contact_find(const CompiledScene *compiled)
 {
     ContactRegionList transparent, opaque;
     double coordinate = regions_collect(&transparent, compiled, true);
     coordinate = fmax(coordinate, regions_collect(&opaque, compiled, false));
-    const double condition = compiled->instances ? compiled->instances->condition : 0;
+    const double condition = conditions_largest(compiled);
     Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * (1 + condition / 5) * coordinate);
     free(transparent.items);
     free(opaque.items);

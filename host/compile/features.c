@@ -69,6 +69,7 @@ FeatureSet features_of(const Scene *scene)
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         set |= shape_features[shape_ops[object->kind]->kind];
+        if (object->kind == SHAPE_OVAL) set |= shape_features[object->as.oval.unit];
         if (object_is_smooth(scene, object)) set |= FEATURE_SMOOTH_NORMALS;
     }
     for (size_t i = 0; i < scene->lights.count; i++) {

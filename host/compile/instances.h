@@ -26,7 +26,7 @@ typedef struct InstancePlan {
     size_t hidden_counts[EXTENDED_COUNT]; // see shared_meshes_toggle
 } InstancePlan;
 
-// A map from a shared mesh's space to the scene's, without its translation, and its
+// A map from a shared mesh's or a unit shape's space to the scene's, without its translation, and its
 // inverse.
 typedef struct {
     double rows[3][3], inverses[3][3];

@@ -4,6 +4,7 @@
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 #include "host/compile/stages.h"
+#include "host/scene/oval.h"
 #include <float.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -52,7 +53,7 @@ static double box_width(const Bounds *bounds)
 static char *extreme_describe(const Scene *scene, const Extreme *extreme)
 {
     const Object *object = extreme->object;
-    const char *name = shape_names[object->kind];
+    const char *name = shape_names[object_shape(object)];
     if (object->line == 0) return memory_copy_text(name);
     if (object->file == 0) return text_format("%s on line %u", name, object->line);
     return text_format("%s on line %u of %s", name, object->line,
@@ -126,10 +127,24 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
     return true;
 }
 
+// Returns by how much the mapped rays of an oval differ in length, at most (shapes/oval.h).
+static double stretch_largest(const Scene *scene)
+{
+    double largest = 1;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const Object *object = &scene->objects.items[i];
+        double least, most;
+        if (object->kind != SHAPE_OVAL) continue;
+        oval_stretches(object, &least, &most);
+        largest = fmax(largest, most / least);
+    }
+    return largest;
+}
+
 bool lights_fit(const CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages)
 {
-    const double farthest = 1e18;
+    const double farthest = 1e18 * fmin(1, 4 / stretch_largest(scene));
     Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
     if (settings->precision == PRECISION_DOUBLE) return true;
     for (size_t i = 0; i < scene->lights.count; i++) {

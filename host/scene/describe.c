@@ -39,7 +39,7 @@ void object_describe(Text *text, const Scene *scene, const char *path, size_t id
     }
     const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
     if (mesh) text_appendf(text, "triangle %zu of ", primitive);
-    text_appendf(text, "%s %zu", shape_names[object->kind], id - primitive);
+    text_appendf(text, "%s %zu", shape_names[object_shape(object)], id - primitive);
     if (mesh && mesh->path) text_appendf(text, ", %s", file_name(mesh->path));
     if (object->file > 0) path = scene->included.items[object->file - 1].path;
     if (object->line > 0) text_appendf(text, ", %s:%u", file_name(path), object->line);

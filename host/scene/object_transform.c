@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
+#include "host/scene/oval.h"
 #include <string.h>
 
 static const double NUMBER_LARGEST = 1e30; // of scene files
@@ -79,8 +80,8 @@ static void box_make_mesh(Scene *scene, Object *object)
     array_push(scene->meshes, mesh);
 }
 
-// The functions below transform a shape. They return false if it would no longer be one of its kind, and
-// leave numbers that object_transform checks.
+// The functions below transform a shape. They return false, and change nothing, if it would no longer be one
+// of its kind, and leave numbers that object_transform checks.
 
 static bool sphere_transform(Object *object, const Affine *affine)
 {
@@ -164,41 +165,36 @@ static bool paraboloid_transform(Object *object, const Affine *affine)
     return true;
 }
 
-#define NEEDS_STRAIGHT "needs the same scale in all directions across its axis, and no shear"
-
-// Indexed by ShapeKind. `need` is what a transform must fulfill, where it can fail to. Each list of offsets
-// is ended by 0: vectors and lengths must stay within the range, the axis different from 0, and `positive`
-// lengths above 0.
+// Indexed by ShapeKind. Each list of offsets is ended by 0: vectors and lengths must stay within the range,
+// the axis different from 0, and `positive` lengths above 0.
 static const struct {
     bool (*transform)(Object *object, const Affine *affine);
-    const char *need;
-    size_t vectors[4], axis, positive[3], lengths[4];
+    size_t vectors[5], axis, positive[3], lengths[4];
 } shapes[SHAPE_MESH] = {
-    {sphere_transform, "needs the same scale in all directions",
-     .vectors = {offsetof(Object, as.sphere.center)}, .positive = {offsetof(Object, as.sphere.radius)}},
+    {sphere_transform, .vectors = {offsetof(Object, as.sphere.center)},
+     .positive = {offsetof(Object, as.sphere.radius)}},
     {plane_transform, .vectors = {offsetof(Object, as.plane.point)}},
-    {disc_transform, "needs the same scale in all directions of its plane",
-     .vectors = {offsetof(Object, as.disc.center)}, .positive = {offsetof(Object, as.disc.radius)}},
+    {disc_transform, .vectors = {offsetof(Object, as.disc.center)},
+     .positive = {offsetof(Object, as.disc.radius)}},
     {box_transform, .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)}},
-    {cylinder_transform, NEEDS_STRAIGHT,
-     .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
+    {cylinder_transform, .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
      .axis = offsetof(Object, as.cylinder.axis), .positive = {offsetof(Object, as.cylinder.radius)}},
-    {cone_transform, NEEDS_STRAIGHT,
-     .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
+    {cone_transform, .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
      .axis = offsetof(Object, as.cone.axis),
      .lengths = {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1]),
                  offsetof(Object, as.cone.slope)}},
     {triangle_transform,
      .vectors = {offsetof(Object, as.triangle.vertices[0]), offsetof(Object, as.triangle.vertices[1]),
                  offsetof(Object, as.triangle.vertices[2])}},
-    {torus_transform, "needs the same scale in all directions",
-     .vectors = {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
+    {torus_transform, .vectors = {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
      .axis = offsetof(Object, as.torus.axis),
      .positive = {offsetof(Object, as.torus.major), offsetof(Object, as.torus.minor)}},
-    {paraboloid_transform, NEEDS_STRAIGHT,
+    {paraboloid_transform,
      .vectors = {offsetof(Object, as.paraboloid.apex), offsetof(Object, as.paraboloid.axis)},
      .axis = offsetof(Object, as.paraboloid.axis), .positive = {offsetof(Object, as.paraboloid.focal_length)},
      .lengths = {offsetof(Object, as.paraboloid.height)}},
+    {oval_transform, .vectors = {offsetof(Object, as.oval.center), offsetof(Object, as.oval.axes[0]),
+                                 offsetof(Object, as.oval.axes[1]), offsetof(Object, as.oval.axes[2])}},
 };
 
 // Return the member of an object at an offset.
@@ -238,6 +234,14 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
                                                       : mesh_transform(mesh, affine);
         return fits ? NULL : out_of_range;
     }
-    if (!shapes[object->kind].transform(object, affine)) return shapes[object->kind].need;
-    return numbers_fit(object) ? NULL : out_of_range;
+    if (!shapes[object->kind].transform(object, affine)) {
+        if (material_any_texture(&scene->materials.items[object->material]) > 0)
+            return "with an image would change its shape, on which images do not lie";
+        oval_make(object);
+        oval_transform(object, affine);
+    }
+    if (!numbers_fit(object)) return out_of_range;
+    return object->kind != SHAPE_OVAL || oval_is_moderate(object)
+               ? NULL
+               : "gets thinner than a millionth of its length, or leans by more than 89.9 degrees";
 }

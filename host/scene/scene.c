@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 
 #define SHAPE_NAME(NAME, name) name,
-const char *const shape_names[SHAPE_COUNT] = {SCENE_SHAPE_LIST(SHAPE_NAME)};
+const char *const shape_names[SHAPE_COUNT] = {SCENE_SHAPE_LIST(SHAPE_NAME) "oval", "mesh"};
 #undef SHAPE_NAME
 
 Material material_default(void)
@@ -171,6 +171,11 @@ size_t scene_primitive_count(const Scene *scene)
     for (size_t i = 0; i < scene->objects.count; i++)
         count += object_primitive_count(scene, &scene->objects.items[i]);
     return count;
+}
+
+ShapeKind object_shape(const Object *object)
+{
+    return object->kind == SHAPE_OVAL ? object->as.oval.unit : object->kind;
 }
 
 bool object_is_smooth(const Scene *scene, const Object *object)

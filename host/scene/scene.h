@@ -136,8 +136,8 @@ typedef struct {
     Image image; // decoded, or made without a file; its colors are finite
 } SceneTexture;
 
-// Every shape by its name in scene files: those of the kernels' SHAPE_LIST in its order (kernels/types.h),
-// then the mesh.
+// Every shape of scene files by its name there, in the order of the kernels' SHAPE_LIST (kernels/types.h).
+// After them come the oval, which transforms make of shapes, and the mesh.
 #define SCENE_SHAPE_LIST(SHAPE)                                                                              \
     SHAPE(SPHERE, "sphere")                                                                                  \
     SHAPE(PLANE, "plane")                                                                                    \
@@ -147,11 +147,10 @@ typedef struct {
     SHAPE(CONE, "cone")                                                                                      \
     SHAPE(TRIANGLE, "triangle")                                                                              \
     SHAPE(TORUS, "torus")                                                                                    \
-    SHAPE(PARABOLOID, "paraboloid")                                                                          \
-    SHAPE(MESH, "mesh")
+    SHAPE(PARABOLOID, "paraboloid")
 
 #define SHAPE_ENUMERATOR(NAME, name) SHAPE_##NAME,
-typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_COUNT } ShapeKind;
+typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_OVAL, SHAPE_MESH, SHAPE_COUNT } ShapeKind;
 #undef SHAPE_ENUMERATOR
 
 extern const char *const shape_names[SHAPE_COUNT];
@@ -209,6 +208,16 @@ typedef struct {
             double focal_length, height;
             bool finite, caps;
         } paraboloid;
+        // a round shape that an affine map has left of another kind (host/scene/oval.h): the points center +
+        // x axes[0] + y axes[1] + z axes[2] for those of a unit shape. half_height: where finite. radii: of a
+        // finite cone at its ends, the larger 1, or of a torus, whose sum is 1. rise: the slope of an
+        // infinite cone, or r^2 / z of an infinite paraboloid.
+        struct {
+            Vector3 center, axes[3];
+            double half_height, radii[2], rise;
+            ShapeKind unit;
+            bool finite, caps;
+        } oval;
         struct {
             uint32_t index;        // into the scene's meshes
             bool is_instance;      // which `transform` places, of a mesh that other objects may have
@@ -354,5 +363,7 @@ void scene_choose_image_size(const Scene *scene, uint32_t *width, uint32_t *heig
 // Returns how many ids an object takes: one for each triangle of a mesh, otherwise one.
 size_t object_primitive_count(const Scene *scene, const Object *object);
 size_t scene_primitive_count(const Scene *scene);
+// Returns the shape that the file named: of an oval, that of which a transform made it.
+ShapeKind object_shape(const Object *object);
 // Returns whether an object consists of triangles with the normals of vertices.
 bool object_is_smooth(const Scene *scene, const Object *object);

@@ -3,6 +3,7 @@
 #define PRIMITIVES_H
 
 #include "shapes/disc.h"
+#include "shapes/oval.h"
 #include "shapes/paraboloid.h"
 #include "shapes/plane.h"
 #include "shapes/revolution.h"

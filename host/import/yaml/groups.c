@@ -42,7 +42,7 @@ void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affi
     Scene *scene = reader->scene;
     for (size_t i = first; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
-        const ShapeKind kind = object->kind;
+        const ShapeKind kind = object_shape(object);
         if (!reader->warned_of_pattern && pattern_ignores_transform(scene, object, affine)) {
             report_warning(&reader->report, transform->offset,
                            "checkers and images other than those of meshes do not move with their objects");

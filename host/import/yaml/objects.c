@@ -190,7 +190,7 @@ typedef struct {
 #define FIELDS(fields) fields, COUNT_OF(fields)
 
 // Indexed by ShapeKind; a mesh has its own reader.
-static const Shape shapes[SHAPE_MESH] = {
+static const Shape shapes[SHAPE_OVAL] = {
     {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL, true},
     {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL, true},
     {{.kind = SHAPE_DISC}, FIELDS(disc_fields), NULL, true},
@@ -211,10 +211,10 @@ bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode
     if (object->kind == SHAPE_MESH)
         return reader->scene->meshes.items[object->as.mesh.index].uvs ||
                report_error(&reader->report, node->offset, "the mesh has no uv for the material's images");
-    return shapes[object->kind].takes_texture ||
+    return (object->kind != SHAPE_OVAL && shapes[object->kind].takes_texture) ||
            report_error(&reader->report, node->offset,
-                        "images and normal maps lie on a sphere, plane, disc or mesh, not on a %s",
-                        shape_names[object->kind]);
+                        "images and normal maps lie on a sphere, plane, disc or mesh, not on a %s%s",
+                        object->kind == SHAPE_OVAL ? "stretched " : "", shape_names[object_shape(object)]);
 }
 
 static void shape_read(YamlReader *reader, ShapeKind kind, const YamlNode *mapping)
@@ -239,7 +239,7 @@ static void shape_read(YamlReader *reader, ShapeKind kind, const YamlNode *mappi
 
 static void object_read(YamlReader *reader, const YamlNode *item)
 {
-    static const char *const names[] = {SCENE_SHAPE_LIST(SHAPE_WORD) "group", "instance"};
+    static const char *const names[] = {SCENE_SHAPE_LIST(SHAPE_WORD) "mesh", "group", "instance"};
     static void (*const compound_readers[])(YamlReader *, const YamlNode *) = {
         yaml_read_mesh, yaml_read_group, yaml_read_instance};
     const YamlNode *key, *mapping;
@@ -249,10 +249,10 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         kind++;
     if (kind == COUNT_OF(names))
         unknown_report(reader, key, "shape", names, COUNT_OF(names));
-    else if (kind < SHAPE_MESH)
+    else if (kind < SHAPE_OVAL)
         shape_read(reader, (ShapeKind)kind, mapping);
     else
-        compound_readers[kind - SHAPE_MESH](reader, mapping);
+        compound_readers[kind - SHAPE_OVAL](reader, mapping);
 }
 
 void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_progress)

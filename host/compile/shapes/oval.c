@@ -1,0 +1,104 @@
+#include "host/scene/oval.h"
+#include "host/compile/instances.h"
+#include "host/compile/shapes.h"
+
+// Returns half the size of the box around the oval: a ball in its space, a disc across z and a line along it,
+// added, contain the unit shape.
+static Vector3 oval_half_extents(const Object *object)
+{
+    const double *radii = object->as.oval.radii;
+    const Affine map = oval_map(object);
+    double ball = 0, disc = 1, line = 0, half[3];
+    if (object->as.oval.unit == SHAPE_SPHERE) ball = 1, disc = 0;
+    if (object->as.oval.unit == SHAPE_TORUS) ball = radii[1], disc = radii[0];
+    if (object->as.oval.finite) line = object->as.oval.half_height;
+    for (int i = 0; i < 3; i++) {
+        const double *row = map.rows[i];
+        half[i] = ball * vector_length((Vector3){row[0], row[1], row[2]}) +
+                  disc * hypotenuse(row[0], row[1]) + line * fabs(row[2]);
+    }
+    return (Vector3){half[0], half[1], half[2]};
+}
+
+static bool oval_bounds(const Scene *scene, const Object *object, Bounds *bounds)
+{
+    (void)scene;
+    if (!oval_is_bounded(object)) return false;
+    *bounds = bounds_around(object->as.oval.center, oval_half_extents(object));
+    return true;
+}
+
+static void oval_flatten(Flattening *flattening, const Object *object)
+{
+    const Rounding *rounding = &flattening->rounding;
+    const Affine transform = oval_map(object);
+    const Vector3 place = point_from_eye(rounding, object->as.oval.center);
+    const double *radii = object->as.oval.radii, half_height = object->as.oval.half_height,
+                 places[3] = {place.x, place.y, place.z};
+    const bool is_bounded = oval_is_bounded(object);
+    double least, most;
+    int exponent;
+    oval_stretches(object, &least, &most);
+    frexp(most, &exponent);
+    const double unit = ldexp(1, exponent);
+    const InstanceMap map = instance_map(&transform, unit, true);
+    const double condition = map_condition(&map);
+    Vector3 half = is_bounded ? oval_half_extents(object) : (Vector3){0, 0, 0};
+    const double reach = is_bounded ? vector_length(half) : unit;
+    // the hits of mapped rays lie in the box (docs/numerics.md)
+    if (is_bounded)
+        half = vector_add(half, vector_all(8 * (8 + 3 * condition) * roundoff_of(rounding) * reach));
+    Oval oval = {
+        .extent = scalar4_of(half, condition),
+        .sizes = {unit, 0, 0, half_height * unit},
+        .id.y = (object->as.oval.finite ? REVOLUTION_FINITE : 0u) |
+                (object->as.oval.caps ? REVOLUTION_CAPPED : 0u),
+        .id.z = object->as.oval.unit,
+    };
+    for (int i = 0; i < 3; i++) {
+        const double *row = map.rows[i], *inverse = map.inverses[i];
+        oval.rows[i] = (scalar4){rounded(rounding, row[0]), rounded(rounding, row[1]),
+                                 rounded(rounding, row[2]), places[i]};
+        oval.inverses[i] = (scalar4){rounded(rounding, inverse[0]), rounded(rounding, inverse[1]),
+                                     rounded(rounding, inverse[2]), 0};
+    }
+    oval.inverses[0].w = unit / least * (1 + 1e-6); // more than the roundings
+    oval.inverses[1].w = reach;
+    if (object->as.oval.unit == SHAPE_TORUS) {
+        oval.sizes.y = radii[0] * unit;
+        oval.sizes.z = radii[1] * unit;
+    } else if (object->as.oval.unit == SHAPE_CONE) {
+        oval.sizes.y = radii[0] * unit;
+        oval.sizes.z =
+            object->as.oval.finite ? (radii[1] - radii[0]) / (2 * half_height) : object->as.oval.rise;
+    } else if (object->as.oval.unit == SHAPE_PARABOLOID) {
+        oval.sizes.y = unit * (object->as.oval.finite ? 0.5 / half_height : object->as.oval.rise);
+    }
+    primitive_add(flattening, KIND_OVALS, &oval, object->material);
+}
+
+static bool oval_primitive_bounds(const void *primitive, Bounds *bounds)
+{
+    const Oval *oval = primitive;
+    const Vector3 half = vector3_of(&oval->extent);
+    if (vector_is_zero(half)) return false;
+    *bounds = bounds_around((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}, half);
+    return true;
+}
+
+static double oval_largest_coordinate(const void *primitive)
+{
+    const Oval *oval = primitive;
+    return vector_largest((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}) + oval->sizes.x;
+}
+
+// Not among the random shapes: tests/test_ovals.c transforms those.
+const ShapeOps oval_ops = {
+    .kind = KIND_OVALS,
+    .vectors = {offsetof(Object, as.oval.center), offsetof(Object, as.oval.axes[0]),
+                offsetof(Object, as.oval.axes[1]), offsetof(Object, as.oval.axes[2])},
+    .bounds = oval_bounds,
+    .flatten = oval_flatten,
+    .primitive_bounds = oval_primitive_bounds,
+    .largest_coordinate = oval_largest_coordinate,
+};

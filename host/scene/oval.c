@@ -1,0 +1,219 @@
+#include "host/scene/oval.h"
+
+#include <math.h>
+
+// Sets axes of the given lengths, the last along `along`.
+static void axes_set(Object *oval, Vector3 along, double across, double length)
+{
+    const Vector3 w = vector_normalize(along);
+    const Vector3 u = vector_normalize(vector_cross(w, vector_least_aligned_axis(w)));
+    oval->as.oval.axes[0] = vector_scale(u, across);
+    oval->as.oval.axes[1] = vector_scale(vector_cross(w, u), across);
+    oval->as.oval.axes[2] = vector_scale(w, length);
+}
+
+// Sets the map of a solid with ends, whose middle is the unit shape's.
+static void ends_set(Object *oval, Vector3 from, Vector3 axis, double widest)
+{
+    const Vector3 half = vector_scale(axis, 0.5);
+    oval->as.oval.center = vector_add(from, half);
+    oval->as.oval.finite = true;
+    oval->as.oval.half_height = 1;
+    axes_set(oval, axis, widest, vector_length(half));
+}
+
+void oval_make(Object *object)
+{
+    const Object from = *object;
+    object->kind = SHAPE_OVAL;
+    object->as.oval.unit = from.kind;
+    object->as.oval.finite = object->as.oval.caps = false;
+    object->as.oval.half_height = object->as.oval.rise = 0;
+    object->as.oval.radii[0] = object->as.oval.radii[1] = 0;
+    switch (from.kind) {
+    case SHAPE_SPHERE:
+        object->as.oval.center = from.as.sphere.center;
+        for (int i = 0; i < 3; i++)
+            object->as.oval.axes[i] = vector_scale((Vector3){i == 0, i == 1, i == 2}, from.as.sphere.radius);
+        return;
+    case SHAPE_DISC:
+        object->as.oval.center = from.as.disc.center;
+        axes_set(object, from.as.disc.normal, from.as.disc.radius, from.as.disc.radius);
+        return;
+    case SHAPE_CYLINDER:
+        object->as.oval.caps = from.as.cylinder.caps;
+        object->as.oval.center = from.as.cylinder.from;
+        axes_set(object, from.as.cylinder.axis, from.as.cylinder.radius, from.as.cylinder.radius);
+        if (from.as.cylinder.finite)
+            ends_set(object, from.as.cylinder.from, from.as.cylinder.axis, from.as.cylinder.radius);
+        return;
+    case SHAPE_CONE: {
+        const double *radii = from.as.cone.radius, widest = fmax(radii[0], radii[1]);
+        object->as.oval.caps = from.as.cone.caps;
+        object->as.oval.center = from.as.cone.from;
+        object->as.oval.rise = from.as.cone.slope;
+        axes_set(object, from.as.cone.axis, 1, 1);
+        if (!from.as.cone.finite) return;
+        ends_set(object, from.as.cone.from, from.as.cone.axis, widest);
+        object->as.oval.radii[0] = radii[0] / widest;
+        object->as.oval.radii[1] = radii[1] / widest;
+        return;
+    }
+    case SHAPE_TORUS: {
+        const double size = from.as.torus.major + from.as.torus.minor;
+        object->as.oval.center = from.as.torus.center;
+        axes_set(object, from.as.torus.axis, size, size);
+        object->as.oval.radii[0] = from.as.torus.major / size;
+        object->as.oval.radii[1] = from.as.torus.minor / size;
+        return;
+    }
+    default: { // a paraboloid
+        const double focal_length = from.as.paraboloid.focal_length, height = from.as.paraboloid.height;
+        const Vector3 axis = vector_normalize(from.as.paraboloid.axis);
+        object->as.oval.caps = from.as.paraboloid.caps;
+        object->as.oval.center = from.as.paraboloid.apex;
+        object->as.oval.rise = 1;
+        axes_set(object, axis, 4 * focal_length, 4 * focal_length);
+        if (from.as.paraboloid.finite)
+            ends_set(object, from.as.paraboloid.apex, vector_scale(axis, height),
+                     2 * sqrt(focal_length * height));
+        return;
+    }
+    }
+}
+
+// Turns two axes in the space of the unit shape so that they become perpendicular (Hestenes, Inversion of
+// matrices by biorthogonalization and related results, J. SIAM 6(1), 1958). Returns whether they changed.
+static bool axes_turn(Vector3 *a, Vector3 *b)
+{
+    const double aa = vector_dot(*a, *a), bb = vector_dot(*b, *b), ab = vector_dot(*a, *b);
+    if (fabs(ab) <= 0x1p-52 * sqrt(aa) * sqrt(bb)) return false;
+    const double half = (bb - aa) / (2 * ab);
+    const double tangent = copysign(1 / (fabs(half) + sqrt(1 + half * half)), half);
+    const double cosine = 1 / sqrt(1 + tangent * tangent), sine = cosine * tangent;
+    const Vector3 turned = vector_subtract(vector_scale(*a, cosine), vector_scale(*b, sine));
+    *b = vector_add(vector_scale(*a, sine), vector_scale(*b, cosine));
+    *a = turned;
+    return true;
+}
+
+enum { TURNS_MAX = 32 }; // of all axes; a few suffice
+
+// Makes all axes perpendicular.
+static void axes_turn_all(Vector3 axes[3])
+{
+    bool changes = true;
+    for (int i = 0; i < TURNS_MAX && changes; i++) {
+        changes = axes_turn(&axes[0], &axes[1]);
+        changes |= axes_turn(&axes[1], &axes[2]);
+        changes |= axes_turn(&axes[2], &axes[0]);
+    }
+}
+
+// Gives the last axis the mean length of the others, and the unit shape the height that it loses.
+static void axis_rescale(Object *object)
+{
+    Vector3 *axes = object->as.oval.axes;
+    const double length = sqrt(vector_length(axes[0])) * sqrt(vector_length(axes[1])),
+                 factor = length / vector_length(axes[2]);
+    axes[2] = vector_scale(axes[2], factor);
+    object->as.oval.half_height /= factor;
+    object->as.oval.rise *= factor;
+}
+
+bool oval_transform(Object *object, const Affine *affine)
+{
+    Vector3 *axes = object->as.oval.axes;
+    object->as.oval.center = affine_point(affine, object->as.oval.center);
+    for (int i = 0; i < 3; i++)
+        axes[i] = affine_direction(affine, axes[i]);
+    if (object->as.oval.unit == SHAPE_SPHERE) {
+        axes_turn_all(axes);
+        return true;
+    }
+    axes_turn(&axes[0], &axes[1]);
+    if (object->as.oval.unit == SHAPE_DISC) axes[2] = vector_cross(vector_normalize(axes[0]), axes[1]);
+    if (object->as.oval.unit != SHAPE_TORUS) axis_rescale(object);
+    return true;
+}
+
+void oval_stretches(const Object *oval, double *least, double *most)
+{
+    Vector3 axes[3] = {oval->as.oval.axes[0], oval->as.oval.axes[1], oval->as.oval.axes[2]};
+    axes_turn_all(axes);
+    *least = INFINITY, *most = 0;
+    for (int i = 0; i < 3; i++) {
+        *least = fmin(*least, vector_length(axes[i]));
+        *most = fmax(*most, vector_length(axes[i]));
+    }
+}
+
+bool oval_is_moderate(const Object *object)
+{
+    const Vector3 *axes = object->as.oval.axes;
+    double least, most;
+    oval_stretches(object, &least, &most);
+    const Vector3 across = vector_cross(vector_normalize(axes[0]), vector_normalize(axes[1]));
+    return least >= 1e-6 * most &&
+           fabs(vector_dot(across, vector_normalize(axes[2]))) >= 0.00175; // the sine of 0.1 degrees
+}
+
+Object oval_unit(const Object *oval)
+{
+    const bool finite = oval->as.oval.finite, caps = oval->as.oval.caps;
+    const double half = oval->as.oval.half_height, *radii = oval->as.oval.radii, rise = oval->as.oval.rise;
+    const Vector3 low = {0, 0, finite ? -half : 0}, z = {0, 0, 1}, up = {0, 0, finite ? 2 * half : 1};
+    Object unit = {.kind = oval->as.oval.unit, .material = oval->material};
+    switch (unit.kind) {
+    case SHAPE_SPHERE:
+        unit.as.sphere.radius = 1;
+        break;
+    case SHAPE_DISC:
+        unit.as.disc.normal = z;
+        unit.as.disc.radius = 1;
+        break;
+    case SHAPE_CYLINDER:
+        unit.as.cylinder.from = low;
+        unit.as.cylinder.axis = up;
+        unit.as.cylinder.radius = 1;
+        unit.as.cylinder.finite = finite;
+        unit.as.cylinder.caps = caps;
+        break;
+    case SHAPE_CONE:
+        unit.as.cone.from = low;
+        unit.as.cone.axis = up;
+        unit.as.cone.radius[0] = radii[0];
+        unit.as.cone.radius[1] = radii[1];
+        unit.as.cone.slope = rise;
+        unit.as.cone.finite = finite;
+        unit.as.cone.caps = caps;
+        break;
+    case SHAPE_TORUS:
+        unit.as.torus.axis = z;
+        unit.as.torus.major = radii[0];
+        unit.as.torus.minor = radii[1];
+        break;
+    default: // a paraboloid
+        unit.as.paraboloid.apex = low;
+        unit.as.paraboloid.axis = z;
+        unit.as.paraboloid.focal_length = finite ? 0.125 / half : 0.25 * rise;
+        unit.as.paraboloid.height = finite ? 2 * half : 0;
+        unit.as.paraboloid.finite = finite;
+        unit.as.paraboloid.caps = caps;
+    }
+    return unit;
+}
+
+Affine oval_map(const Object *oval)
+{
+    const Vector3 *axes = oval->as.oval.axes, center = oval->as.oval.center;
+    return (Affine){{{axes[0].x, axes[1].x, axes[2].x, center.x},
+                     {axes[0].y, axes[1].y, axes[2].y, center.y},
+                     {axes[0].z, axes[1].z, axes[2].z, center.z}}};
+}
+
+bool oval_is_bounded(const Object *oval)
+{
+    const ShapeKind unit = oval->as.oval.unit;
+    return oval->as.oval.finite || unit == SHAPE_SPHERE || unit == SHAPE_DISC || unit == SHAPE_TORUS;
+}

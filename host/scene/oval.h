@@ -1,0 +1,27 @@
+// Ovals: round shapes under affine maps, such as ellipsoids.
+#pragma once
+
+#include "host/scene/affine.h"
+#include "host/scene/scene.h"
+
+// Makes a sphere, disc, cylinder, cone, torus or paraboloid an oval that has the same points.
+void oval_make(Object *object);
+
+// Transforms an oval. Among the maps that give the same points it chooses one that stretches little. Returns
+// true.
+bool oval_transform(Object *object, const Affine *affine);
+
+// Returns whether the axes' lengths and directions leave enough bits of a mapped ray.
+bool oval_is_moderate(const Object *object);
+
+// Returns the unit shape around 0 and z, which has the radius 1 where it is widest, and its middle or apex at
+// 0.
+Object oval_unit(const Object *oval);
+
+// Returns the map from the unit shape to the oval.
+Affine oval_map(const Object *oval);
+
+// Returns the least and the greatest length of the oval's image of a unit vector.
+void oval_stretches(const Object *oval, double *least, double *most);
+
+bool oval_is_bounded(const Object *oval);

@@ -1,0 +1,189 @@
+// An oval: a unit shape (types.h) under an affine map, as an ellipsoid is a sphere. A ray is mapped to the
+// unit shape's space, where it has the same t, and intersected there. docs/numerics.md has the bounds.
+#ifndef OVAL_H
+#define OVAL_H
+
+#include "shapes/affine.h"
+#include "shapes/disc.h"
+#include "shapes/paraboloid.h"
+#include "shapes/revolution.h"
+#include "shapes/sphere.h"
+#include "shapes/torus.h"
+
+// The unit shapes: feature, struct, name.
+#define OVAL_LIST(SHAPE)                                                                                     \
+    SHAPE(SPHERES, Sphere, sphere)                                                                           \
+    SHAPE(DISCS, Disc, disc)                                                                                 \
+    SHAPE(CYLINDERS, Cylinder, cylinder)                                                                     \
+    SHAPE(CONES, Cone, cone)                                                                                 \
+    SHAPE(TORI, Torus, torus)                                                                                \
+    SHAPE(PARABOLOIDS, Paraboloid, paraboloid)
+
+static inline uint4 oval_unit_id(const Oval *oval)
+{
+    return (uint4)(oval->id.x, oval->id.y, 0, 0);
+}
+
+static inline Sphere oval_sphere(const Oval *oval)
+{
+    return (Sphere){(scalar4)(0, 0, 0, oval->sizes.x), oval_unit_id(oval)};
+}
+
+static inline Disc oval_disc(const Oval *oval)
+{
+    const scalar4 none = (scalar4)(0);
+    return (Disc){
+        (scalar4)(0, 0, 0, oval->sizes.x), (scalar4)(0, 0, 1, 1), none, none, none, oval_unit_id(oval)};
+}
+
+static inline Revolution oval_revolution(const Oval *oval, scalar radius, scalar slope)
+{
+    const scalar height = oval->sizes.w;
+    return (Revolution){(scalar4)(0, 0, -height, radius), (scalar4)(0, 0, 1, slope),
+                        (scalar4)(2 * height, 1, 1, 0), oval_unit_id(oval)};
+}
+
+static inline Cylinder oval_cylinder(const Oval *oval)
+{
+    return oval_revolution(oval, oval->sizes.x, 0);
+}
+
+static inline Cone oval_cone(const Oval *oval)
+{
+    return oval_revolution(oval, oval->sizes.y, oval->sizes.z);
+}
+
+static inline Torus oval_torus(const Oval *oval)
+{
+    const scalar4 none = (scalar4)(0);
+    return (Torus){(scalar4)(0, 0, 0, oval->sizes.y), (scalar4)(0, 0, 1, oval->sizes.z), none, none,
+                   oval_unit_id(oval)};
+}
+
+static inline Paraboloid oval_paraboloid(const Oval *oval)
+{
+    const scalar height = oval->sizes.w;
+    return (Paraboloid){(scalar4)(0, 0, -height, oval->sizes.y), (scalar4)(0, 0, 1, 2 * height), (scalar4)(0),
+                        oval_unit_id(oval)};
+}
+
+// The ray in the unit shape's space. Its t is the given ray's, less `shift`.
+typedef struct {
+    Ray ray;
+    real shift;
+} OvalRay;
+
+// Bounds the mapped ray's distance from the mapped exact ray. Rounding the place of 0 and the map,
+// differences and products leave 6 u of what is mapped.
+static inline void oval_ray_set_errors(Ray *own, const Oval *oval, const Ray *ray, Vector from)
+{
+    const real norm = (real)(oval->inverses[0].w), few = (real)(8 * UNIT_ROUNDOFF);
+    own->origin_error = norm * real_fma((real)(2 * UNIT_ROUNDOFF), vector_norm1(affine_place(oval->rows)),
+                                        ray->origin_error) +
+                        few * vector_norm1(affine_reach(oval->inverses, from));
+    own->direction_error = (norm * (ray->length * ray->direction_error) +
+                            few * vector_norm1(affine_reach(oval->inverses, ray->direction))) *
+                           ray_inverse_length(own) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    own->left = ray->left;
+    own->leaves_outward = ray->leaves_outward;
+}
+
+// Maps a ray. If it starts far away, its closest point to the center is mapped instead of its start, so that
+// roundings of the map are those of the shape's size and not of the distance.
+static inline OvalRay oval_ray(const Oval *oval, const Ray *ray)
+{
+    const Vector center = affine_place(oval->rows);
+    Vector from = vector_subtract(ray->origin, center);
+    OvalRay mapped;
+    mapped.shift = (real)(0);
+    if (!IS_CERTIFIED) {
+        const real reach = (real)(oval->inverses[1].w);
+        const mask is_far = vector_dot(from, from) > (real)(4) * reach * reach;
+        mapped.shift =
+            lanes_select(is_far, -vector_dot(from, ray->direction) * ray->inverse_squared, (real)(0));
+        from = ray_point_from(ray, center, mapped.shift);
+    }
+    mapped.ray = ray_make(affine_vector(oval->inverses, from), affine_vector(oval->inverses, ray->direction),
+                          ray->tmin - mapped.shift, ray->tmax - mapped.shift, ray->active);
+    if (IS_CERTIFIED) oval_ray_set_errors(&mapped.ray, oval, ray, from);
+    return mapped;
+}
+
+static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
+{
+    const OvalRay own = oval_ray(oval, ray);
+    mask hit = mask_none();
+    real unit_t = own.ray.tmax;
+#define OVAL_HIT(feature, Type, name)                                                                        \
+    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+        const Type shape = oval_##name(oval);                                                                \
+        hit = name##_hit(&shape, &own.ray, &unit_t);                                                         \
+    }
+    OVAL_LIST(OVAL_HIT)
+    *t = unit_t + own.shift;
+    return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
+}
+
+static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, real t)
+{
+    const OvalRay own = oval_ray(oval, ray);
+    SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
+#define OVAL_SURFACE_POINT(feature, Type, name)                                                              \
+    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+        const Type shape = oval_##name(oval);                                                                \
+        unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
+    }
+    OVAL_LIST(OVAL_SURFACE_POINT)
+    const Vector mapped = affine_normal(oval->inverses, unit.normal),
+                 reach = affine_reach(oval->rows, unit.position);
+    const real norm = vector_norm(mapped);
+    const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
+    const real rounding_scale =
+        real_fma((real)(0.25f), vector_norm1(unit.position), unit.rounding_scale) * inverse;
+    const real largest = real_max(real_max(reach.x, reach.y), reach.z);
+    return surface_point_make(affine_point(oval->rows, unit.position), vector_scale(mapped, inverse),
+                              real_fma(MAPPED_POINT_ERROR * (real)(oval->extent.w), largest, rounding_scale));
+}
+
+static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
+{
+    const OvalRay own = oval_ray(oval, ray);
+#define OVAL_CERTAIN_HIT(feature, Type, name)                                                                \
+    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+        const Type shape = oval_##name(oval);                                                                \
+        return name##_certain_hit(&shape, &own.ray);                                                         \
+    }
+    OVAL_LIST(OVAL_CERTAIN_HIT)
+    return certain_miss();
+}
+
+// A normal that is off by e is, once it is mapped to the length l and normalized, off by up to x (1 + x) for
+// x = |V| e / l. The factors cover the second order (docs/numerics.md).
+static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, real place_error,
+                                   SurfacePoint *point)
+{
+    const OvalRay own = oval_ray(oval, ray);
+    const real norm = (real)(oval->inverses[0].w),
+               moved = ray_place_error(&own.ray, own.ray.length * fabs(t)); // the mapped ray itself
+    SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
+    mask at_edge = mask_none();
+#define OVAL_SET_ERRORS(feature, Type, name)                                                                 \
+    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+        const Type shape = oval_##name(oval);                                                                \
+        unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
+        at_edge =                                                                                            \
+            name##_set_errors(&shape, &own.ray, t - own.shift, real_fma(norm, place_error, moved), &unit);   \
+    }
+    OVAL_LIST(OVAL_SET_ERRORS)
+    real growth = divide_or(norm, vector_norm(affine_normal(oval->inverses, unit.normal)), NEVER);
+    const real along = growth * norm * unit.curvature; // to first order
+    growth = growth * lanes_select(along * place_error < (real)(0.0625f), (real)(1.1f), (real)(1.5f));
+    const real turned = unit.curvature * moved; // with all orders of both turns
+    point->curvature = growth * norm * unit.curvature;
+    point->normal_error =
+        growth * (real_fma(turned, real_fma((real)(8), turned, (real)(2)), unit.normal_error) +
+                  (real)(32 * UNIT_ROUNDOFF));
+    return at_edge;
+}
+
+#endif

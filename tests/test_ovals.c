@@ -1,0 +1,271 @@
+// Tests that what rays hit of shapes that transforms make other shapes agrees with quadruple precision, at
+// every precision, and of ellipsoids with the textbook's quadric.
+//
+// run_tests: sanitize-long-only
+#include "host/compile/compile.h"
+#include "host/scene/object_transform.h"
+#include "host/scene/oval.h"
+#include "host/verify/reference.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include "tests/random_ray.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+enum { RAYS = 2000 };
+
+static ShapeForm forms[SHAPE_FORMS_MAX];
+
+static bool has_ovals(ShapeKind kind)
+{
+    return kind == SHAPE_SPHERE || kind == SHAPE_DISC || kind == SHAPE_CYLINDER || kind == SHAPE_CONE ||
+           kind == SHAPE_TORUS || kind == SHAPE_PARABOLOID;
+}
+
+static Affine random_turn(Random *random)
+{
+    return affine_about(random_unit_vector(random), random_between(random, 0, 360));
+}
+
+// Returns a turn, a scale, one in four mirrors and one in four is extreme, another turn and a translation.
+static Affine random_affine(Random *random)
+{
+    const double largest = random_bits(random) % 4 ? 0.4 : 1; // powers of ten
+    Affine scale = affine_identity;
+    for (int i = 0; i < 3; i++)
+        scale.rows[i][i] = random_power(random, -largest, largest);
+    if (random_bits(random) % 4 == 0) scale.rows[0][0] *= -1;
+    const Affine first = random_turn(random), turned = affine_multiply(&scale, &first),
+                 last = random_turn(random);
+    Affine affine = affine_multiply(&last, &turned);
+    const Vector3 place = random_cube_point(random, 8);
+    affine.rows[0][3] = place.x, affine.rows[1][3] = place.y, affine.rows[2][3] = place.z;
+    return affine;
+}
+
+// Transforms a shape, which becomes an oval.
+static Object oval_of(const Object *shape, const Affine *affine)
+{
+    Object object = *shape;
+    Material material;
+    Scene scene = scene_of_shapes(&object, 1, &material);
+    const char *why = object_transform(&scene, &object, affine);
+    if (why) fail_msg("%s", why);
+    assert_int_equal(object.kind, SHAPE_OVAL);
+    assert_int_equal(object_shape(&object), shape->kind);
+    return object;
+}
+
+static Vector3 vector_from(const double parts[3])
+{
+    return (Vector3){parts[0], parts[1], parts[2]};
+}
+
+// Prepares rays that are special to a shape, mapped as it is.
+static void rays_prepare(const RandomShape *shape, const Affine *affine, TraceRay *rays, Random *random)
+{
+    for (size_t i = 0; i < RAYS; i++) {
+        const RandomRay given = random_ray(shape, random);
+        const Vector3 from = affine_point(affine, given.origin),
+                      way = affine_direction(affine, given.direction);
+        rays[i] = (TraceRay){{from.x, from.y, from.z}, {way.x, way.y, way.z}, 0, 1e30};
+    }
+}
+
+static ReferenceHit exact_hit(const Object *object, const TraceRay *ray, bool is_double)
+{
+    const Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
+    const ReferenceRay exact =
+        is_double ? reference_ray(origin, direction) : reference_ray_rounded(origin, direction);
+    return reference_hit_object(object, &exact);
+}
+
+typedef struct {
+    size_t compared, hits;
+    double t, normal; // the largest errors, as parts of their bounds
+} Tally;
+
+// The bounds are those of other shapes (docs/numerics.md), with a size that the map's stretch multiplies.
+static void hit_compare(const Object *object, const TraceRay *ray, const TraceHit *hit, Precision precision,
+                        const char *what, Tally *tally)
+{
+    const bool is_double = precision == PRECISION_DOUBLE;
+    const double u = is_double ? 0x1p-53 : 0x1p-24;
+    const ReferenceHit exact = exact_hit(object, ray, is_double);
+    const ReferenceSurface surface = reference_surface(object, quad3(object->as.oval.center));
+    double least, most;
+    oval_stretches(object, &least, &most);
+    const double length = vector_length(vector_from(ray->direction)), stretch = most / least,
+                 distance = vector_length(vector_subtract(vector_from(ray->origin), surface.center));
+    double size = surface.bounding_radius;
+    if (!oval_is_bounded(object)) size = fmax(size, distance);
+    if (exact.found && !oval_is_bounded(object)) size = fmax(size, (double)exact.t * length);
+    // rounding turns a ray along the axis to either side
+    const Vector3 way = vector_normalize(vector_from(ray->direction)),
+                  axis = vector_normalize(object->as.oval.axes[2]);
+    if (!oval_is_bounded(object) && vector_length(vector_cross(way, axis)) < 1e-3) return;
+    // rays far away are moved before they are mapped, at compensated forms without loss
+    const double moved = u * ((precision == PRECISION_SINGLE ? 2 * distance : 0) + 4 * stretch * size);
+    if ((double)exact.margin <= fmax(2 * moved, 4 * u * distance)) return;
+    tally->compared++;
+    if (hit->object != exact.object)
+        fail_msg("%s, %s: object %u, exact %u, margin %g of %g", what, precision_names[precision],
+                 hit->object, exact.object, (double)exact.margin, moved);
+    if (!exact.found) return;
+    tally->hits++;
+    const double t_bound = 8 * u * (double)exact.t + moved / ((double)exact.cosine * length);
+    tally->t = fmax(tally->t, fabs((double)(hit->t - exact.t)) / t_bound);
+    const double normal_bound =
+        16 * u * stretch +
+        4 * u * (distance + stretch * size) / ((double)exact.cosine * (double)exact.curvature_radius);
+    tally->normal =
+        fmax(tally->normal, reference_distance(vector_from(hit->normal), exact.normal) / normal_bound);
+}
+
+static void hits_ovals(void **state)
+{
+    const ShapeForm *form = *state;
+    static TraceRay rays[RAYS];
+    static TraceHit hits[RAYS];
+    Random random = {(uint64_t)(form - forms) + 1};
+    for (int round = 0; round < (tests_are_long() ? 12 : 3); round++) {
+        const RandomShape shape = random_shape(form, &random);
+        const Affine affine = random_affine(&random);
+        const Object exact = oval_of(&shape.object, &affine);
+        rays_prepare(&shape, &affine, rays, &random);
+        for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
+            if (!probe_has(precision)) continue;
+            Object object = precision == PRECISION_DOUBLE ? exact : reference_round_object(&exact);
+            Material material;
+            const Scene scene = scene_of_shapes(&object, 1, &material);
+            assert_true(probe_trace(&scene, precision, 0, rays, RAYS, hits));
+            Tally tally = {0};
+            for (size_t i = 0; i < RAYS; i++)
+                hit_compare(&object, &rays[i], &hits[i], precision, form->name, &tally);
+            const bool is_right =
+                tally.t <= 1 && tally.normal <= 1 && tally.compared > RAYS / 2 && tally.hits > RAYS / 20;
+            if (!is_right || tests_are_long())
+                print_message(
+                    "%s, %s: %zu compared, %zu hits; as parts of their bounds t %.2f, normal %.2f\n",
+                    form->name, precision_names[precision], tally.compared, tally.hits, tally.t,
+                    tally.normal);
+            assert_true(is_right);
+        }
+    }
+}
+
+// What is certain at `certified` is right, also at outlines and rims.
+static void certain_hits_of_ovals_are_right(void **state)
+{
+    (void)state;
+    if (!probe_compute.device->fp64) skip();
+    static TraceRay rays[RAYS];
+    static TraceHit hits[RAYS];
+    const size_t form_count = shape_forms(forms);
+    size_t certain = 0, found = 0;
+    for (size_t f = 0; f < form_count; f++) {
+        if (!has_ovals(forms[f].kind)) continue;
+        Random random = {f + 100};
+        for (int round = 0; round < (tests_are_long() ? 20 : 2); round++) {
+            const RandomShape shape = random_shape(&forms[f], &random);
+            const Affine affine = random_affine(&random);
+            Object object = oval_of(&shape.object, &affine);
+            Material material;
+            const Scene scene = scene_of_shapes(&object, 1, &material);
+            rays_prepare(&shape, &affine, rays, &random);
+            assert_true(probe_trace(&scene, PRECISION_CERTIFIED, 0, rays, RAYS, hits));
+            for (size_t i = 0; i < RAYS; i++) {
+                if (hits[i].certainty == TRACE_UNCERTAIN) continue;
+                const ReferenceHit exact = exact_hit(&object, &rays[i], true);
+                certain++;
+                found += exact.found;
+                if (hits[i].object != exact.object ||
+                    (exact.found && !((Quad)hits[i].low <= exact.t && exact.t <= (Quad)hits[i].high)))
+                    fail_msg("%s, ray %zu: object %u, t %a in %a .. %a, exact %u at %a", forms[f].name, i,
+                             hits[i].object, hits[i].t, hits[i].low, hits[i].high, exact.object,
+                             (double)exact.t);
+            }
+        }
+    }
+    print_message("%zu certain, of which %zu hit\n", certain, found);
+    assert_true(found > certain / 4);
+}
+
+// An ellipsoid with the semi-axes s along the columns of a rotation R is |S^-1 R^T (p - c)| = 1, with the
+// gradient R S^-2 R^T (p - c) (Glassner, An Introduction to Ray Tracing, 1989, chapter 2).
+static void ellipsoids_follow_the_textbook(void **state)
+{
+    (void)state;
+    if (!probe_has(PRECISION_DOUBLE)) skip();
+    static TraceRay rays[RAYS];
+    static TraceHit hits[RAYS];
+    Random random = {7};
+    for (int round = 0; round < 4; round++) {
+        const Vector3 semi_axes = {random_between(&random, 0.3, 3), random_between(&random, 0.3, 3),
+                                   random_between(&random, 0.3, 3)};
+        const Vector3 center = random_cube_point(&random, 2);
+        const Affine turn = random_turn(&random);
+        Affine affine = turn;
+        for (int i = 0; i < 3; i++) {
+            affine.rows[i][0] *= semi_axes.x, affine.rows[i][1] *= semi_axes.y,
+                affine.rows[i][2] *= semi_axes.z;
+        }
+        affine.rows[0][3] = center.x, affine.rows[1][3] = center.y, affine.rows[2][3] = center.z;
+        const Object unit = {.kind = SHAPE_SPHERE, .as.sphere.radius = 1};
+        Object object = oval_of(&unit, &affine);
+        Material material;
+        const Scene scene = scene_of_shapes(&object, 1, &material);
+        for (size_t i = 0; i < RAYS; i++) {
+            const Vector3 from = vector_scale(random_unit_vector(&random), 9),
+                          to = vector_add(center, random_cube_point(&random, 2)),
+                          way = vector_normalize(vector_subtract(to, from));
+            rays[i] = (TraceRay){{from.x, from.y, from.z}, {way.x, way.y, way.z}, 0, 1e30};
+        }
+        assert_true(probe_trace(&scene, PRECISION_DOUBLE, 1, rays, RAYS, hits));
+        size_t found = 0;
+        for (size_t i = 0; i < RAYS; i++) {
+            const Vector3 f = vector_subtract(vector_from(rays[i].origin), center),
+                          d = vector_from(rays[i].direction);
+            const double semi[3] = {semi_axes.x, semi_axes.y, semi_axes.z};
+            double a = 0, b = 0, c = -1;
+            for (int k = 0; k < 3; k++) {
+                const Vector3 axis = {turn.rows[0][k], turn.rows[1][k], turn.rows[2][k]};
+                const double fk = vector_dot(f, axis) / semi[k], dk = vector_dot(d, axis) / semi[k];
+                a += dk * dk, b += fk * dk, c += fk * fk;
+            }
+            const double discriminant = b * b - a * c;
+            if (fabs(discriminant) < 1e-9 * a) continue;
+            assert_int_equal(hits[i].object, discriminant > 0 ? 0 : UINT32_MAX);
+            if (discriminant < 0) continue;
+            found++;
+            const double t = (-b - sqrt(discriminant)) / a;
+            assert_true(fabs(hits[i].t - t) < 1e-9);
+            const Vector3 p = vector_add(f, vector_scale(d, t));
+            Vector3 gradient = {0, 0, 0};
+            for (int k = 0; k < 3; k++) {
+                const Vector3 axis = {turn.rows[0][k], turn.rows[1][k], turn.rows[2][k]};
+                gradient =
+                    vector_add(gradient, vector_scale(axis, vector_dot(p, axis) / (semi[k] * semi[k])));
+            }
+            const Vector3 error = vector_subtract(vector_normalize(gradient), vector_from(hits[i].normal));
+            assert_true(vector_length(error) < 1e-7);
+        }
+        assert_true(found > RAYS / 10);
+    }
+}
+
+int main(void)
+{
+    struct CMUnitTest tests[SHAPE_FORMS_MAX + 2] = {0};
+    const size_t form_count = shape_forms(forms);
+    size_t count = 0;
+    for (size_t i = 0; i < form_count; i++)
+        if (has_ovals(forms[i].kind))
+            tests[count++] = (struct CMUnitTest){forms[i].name, hits_ovals, NULL, NULL, &forms[i]};
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(certain_hits_of_ovals_are_right);
+    tests[count++] = (struct CMUnitTest)cmocka_unit_test(ellipsoids_follow_the_textbook);
+    return cmocka_run_group_tests(tests, probe_open, probe_close);
+}
