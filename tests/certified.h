@@ -1,0 +1,116 @@
+// Renders at `certified` and compares with the exact reference, for the tests of one program.
+#pragma once
+
+#include "host/base/array.h"
+#include "host/compile/random_shape.h"
+#include "host/verify/certify.h"
+#include "tests/film.h"
+#include "tests/probe.h"
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+static Random random_state;
+
+enum { AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT };
+
+typedef struct {
+    size_t wrong, wrong_decided; // pixels; the latter are not listed as undecided
+    uint64_t repeated, undecided;
+} Answer;
+
+// Renderers at each precision. Their kernels serve scene after scene.
+static Renderer *painters[PRECISION_COUNT];
+
+static inline Film image_render(const Scene *scene, const RenderSettings *settings)
+{
+    Renderer **painter = &painters[settings->precision];
+    Compute *compute = &probe_compute;
+    MessageList messages = {0};
+    renderers_open(painter, &compute, 1, scene, settings, NULL, &messages, &messages);
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    assert_non_null(*painter);
+    Film film;
+    assert_true(renderer_render_film(*painter, AOVS, &film));
+    return film;
+}
+
+static inline int painters_close(void **state)
+{
+    for (size_t i = 0; i < PRECISION_COUNT; i++)
+        renderer_close(painters[i]);
+    return probe_close(state);
+}
+
+static inline Answer answer(const Scene *scene, const CertifySample *reference,
+                            const RenderSettings *settings)
+{
+    Film film = image_render(scene, settings);
+    const CertifyErrors errors = certify_compare(reference, &film);
+    const Answer counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
+                            film.repeats.repeated, film.repeats.undecided};
+    film_free(&film);
+    return counted;
+}
+
+enum { SMALL_SIDE = 15 }; // odd: the image has a pixel in its center
+
+// Returns settings of a small image at certified, with the same features for all, so that one program serves
+// them.
+static inline RenderSettings small_settings(uint32_t bounce_count)
+{
+    RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_CERTIFIED);
+    settings.bounce_count = bounce_count;
+    if (tests_are_long()) settings.extra_features = FEATURE_ALL;
+    return settings;
+}
+
+// Renders a small image. Its decided pixels must have the reference's decisions and colors. Returns the
+// number of undecided samples and frees the scene.
+static inline size_t check_image(Scene *scene, const RenderSettings *settings, const char *what,
+                                 double number)
+{
+    CertifySample reference;
+    assert_true(certify_sample_open(&reference, scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
+                                    (ReferencePath){.bounce_count = settings->bounce_count}, NULL));
+    Film film = image_render(scene, settings);
+    const CertifyErrors errors = certify_compare(&reference, &film);
+    if (errors.wrong_decided > 0)
+        fail_msg("%s, %g: of the pixels not undecided %zu are wrong, at most %zu of them in color", what,
+                 number, errors.wrong_decided, errors.color);
+    const size_t undecided = (size_t)film.repeats.undecided;
+    film_free(&film);
+    certify_sample_close(&reference);
+    scene_free(scene);
+    return undecided;
+}
+
+static inline size_t check_small(Scene *scene, uint32_t bounce_count, const char *what, double number)
+{
+    const RenderSettings settings = small_settings(bounce_count);
+    return check_image(scene, &settings, what, number);
+}
+
+// A scene seen along -z from a point, `half_tangent` up and down.
+static inline Scene scene_seen_from(Vector3 from, double tangent)
+{
+    Scene scene = {.camera = {.position = from,
+                              .look_at = {from.x, from.y, from.z - fmax(1, fabs(from.z))},
+                              .up = {0, 1, 0},
+                              .field_axis = FIELD_HORIZONTAL,
+                              .half_tangent = tangent},
+                   .background = {0.25, 0.25, 0.25},
+                   .ambient = {0.1, 0.1, 0.1}};
+    array_push(scene.materials, material_default());
+    return scene;
+}
+
+static inline void point_light_add(Scene *scene, Vector3 position, double intensity)
+{
+    const Color color = {intensity, intensity, intensity};
+    array_push(scene->lights, ((Light){.kind = LIGHT_POINT, .color = color, .position = position}));
+}
