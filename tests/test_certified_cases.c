@@ -1,7 +1,9 @@
 // Renders at `certified` small scenes with lights on surfaces, checkers far out, paths of little weight, thin
-// walls, needles, and sizes from 1e-29 to 1e29 in one scene. Each object, shadow and path must
-// equal the reference's, and each color must be within the certified bound. The program takes a pattern of
-// its tests' names. run_tests: sanitize-long-only
+// walls, needles, and sizes from 1e-29 to 1e29 in one scene. Each object, shadow and path must equal the
+// reference's, and each color must be within the certified bound. The program takes a pattern of its tests'
+// names.
+//
+// run_tests: sanitize-long-only
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "tests/certified.h"
