@@ -112,7 +112,6 @@ int main(void)
         {"test_rt_examples", check_examples, NULL, NULL, &(Examples){"rt", 1}},
         {"test_cfg_examples", check_examples, NULL, NULL, &(Examples){"cfg", 1}},
         {"test_nff_examples", check_examples, NULL, NULL, &(Examples){"nff", 1}},
-        {"test_dat_examples", check_examples, NULL, NULL, &(Examples){"dat", 1}},
         cmocka_unit_test(test_every_shape_is_named),
         cmocka_unit_test(test_names_of_colors),
     };

@@ -62,7 +62,7 @@ static char *extreme_describe(const Scene *scene, const Extreme *extreme)
 
 void sizes_check(const Scene *scene, const CompileSettings *settings, MessageList *messages)
 {
-    const double detail = 1e-12; // docs/scene-format.md
+    const double detail = 1e-12;
     if (settings->precision == PRECISION_DOUBLE || settings->certifies) return;
     const Vector3 eye = settings->shift_to_eye ? scene->camera.position : (Vector3){0};
     Extreme farthest = {NULL, 0}, smallest = {NULL, INFINITY};
