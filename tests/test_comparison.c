@@ -251,6 +251,27 @@ static void test_rows_of_one_process(void **state)
 }
 
 // Worked out by hand: the ends are the order statistics that the binomial distribution gives.
+static void test_rows(void **state)
+{
+    (void)state;
+    static const struct {
+        Verdict frame, processor, row;
+    } rows[] = {
+        {VERDICT_SLOWER, VERDICT_SAME, VERDICT_SLOWER},
+        {VERDICT_SLOWER, VERDICT_FASTER, VERDICT_SLOWER},
+        {VERDICT_SAME, VERDICT_SLOWER, VERDICT_SLOWER},
+        {VERDICT_FASTER, VERDICT_FASTER, VERDICT_FASTER},
+        {VERDICT_SAME, VERDICT_FASTER, VERDICT_FASTER},
+        {VERDICT_FASTER, VERDICT_SAME, VERDICT_UNDECIDED},
+        {VERDICT_FASTER, VERDICT_SLOWER, VERDICT_SLOWER},
+        {VERDICT_SAME, VERDICT_SAME, VERDICT_SAME},
+        {VERDICT_FASTER, VERDICT_UNDECIDED, VERDICT_UNDECIDED},
+        {VERDICT_SAME, VERDICT_UNDECIDED, VERDICT_SAME},
+    };
+    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+        assert_int_equal(verdict_of_row(rows[i].frame, rows[i].processor), rows[i].row);
+}
+
 static void test_intervals(void **state)
 {
     (void)state;
@@ -289,6 +310,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(test_intervals),
+        cmocka_unit_test(test_rows),
         cmocka_unit_test(test_same_build_against_itself),
         cmocka_unit_test(test_slower_build_is_found),
         cmocka_unit_test(test_rows_of_one_process),

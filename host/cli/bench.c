@@ -240,8 +240,9 @@ static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
         comparison->has_processor = bench->open.compute.device->type & CL_DEVICE_TYPE_CPU;
         const size_t count = set->count * (comparison->has_processor ? 2 : 1);
         comparison->frame = comparison_of_reports(wall, old_wall, count, tolerance);
-        if (comparison->has_processor)
-            comparison->processor = comparison_of_reports(processor, old_processor, count, tolerance);
+        comparison->verdict = comparison->frame.verdict;
+        if (!comparison->has_processor) continue;
+        comparison->processor = comparison_of_reports(processor, old_processor, count, tolerance);
         comparison->verdict = verdict_of_row(comparison->frame.verdict, comparison->processor.verdict);
     }
     return comparisons;

@@ -155,5 +155,5 @@ Verdict verdict_of_row(Verdict frame, Verdict processor)
 {
     if (frame == VERDICT_SLOWER || processor == VERDICT_SLOWER) return VERDICT_SLOWER;
     if (processor == VERDICT_FASTER) return VERDICT_FASTER;
-    return frame;
+    return frame == VERDICT_FASTER ? VERDICT_UNDECIDED : frame;
 }
