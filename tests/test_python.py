@@ -207,6 +207,21 @@ class AllHits(unittest.TestCase):
         firsts = np.unique(found.ray, return_index=True)[1]
         np.testing.assert_array_equal(found.t[firsts], nearest.t[nearest.hit])
 
+    def test_far_transformed_shapes(self):
+        """Each ray through the middle has an entry and an exit, however far away it starts."""
+        stretched = {"transform": {"scale": [1, 2, 1.5]}}
+        for shape, hits in (({"sphere": {"center": [0, 0, 0], "radius": 1, **stretched}}, 2),
+                            ({"cylinder": {"from": [0, -1, 0], "to": [0, 1, 0], "radius": 1, **stretched}}, 2),
+                            ({"torus": {"center": [0, 0, 0], "axis": [0, 1, 0], "major": 1, "minor": 0.25, **stretched}}, 4)):
+            scene = glint.Scene({**SPHERE, "objects": [shape]})
+            for distance in 10, 1e3, 1e4:
+                angle, slope = np.random.default_rng(4).uniform(-np.pi, np.pi, (2, 1000))
+                away = np.stack([np.cos(angle), 0.05 * slope, np.sin(angle)], 1)
+                origins = distance * away
+                for precision in "single", "strict", "double":
+                    found = scene.trace_all(origins, -away, precision)
+                    self.assertTrue(np.all(np.bincount(found.ray, minlength=1000) == hits), (shape, distance, precision))
+
     def test_limits(self):
         origins, directions = np.array([[0, 0, -8], [9, 0, 0]], np.float32), np.array([[0, 0, 1], [0, 0, 1]], np.float32)
         for precision in "single", "strict", "double":

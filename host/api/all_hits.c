@@ -2,8 +2,12 @@
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
+
+// The size of the struct in the first version that has it.
+enum { ALL_HITS_SIZE_MIN = offsetof(GlintAllHits, position) + sizeof(double *) };
 
 // A hit of a batch's ray.
 typedef struct {
@@ -118,15 +122,27 @@ static bool rays_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hi
     return is_sound;
 }
 
+// Sets the members that the caller's version of the struct has.
+static void all_hits_set(GlintAllHits *hits, const GlintAllHits *found)
+{
+    const size_t size = hits->size, own = sizeof *found;
+    memset(hits, 0, size);
+    memcpy(hits, found, size < own ? size : own);
+    hits->size = size;
+}
+
 GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,
                             char **messages)
 {
     MessageList list = {0};
     GlintRays given;
-    GlintAllHits found = {.size = hits->size};
+    GlintAllHits found = {0};
+    if (hits->size < ALL_HITS_SIZE_MIN) {
+        message_error(&list, "the size of a GlintAllHits is not set");
+        return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
+    }
+    all_hits_set(hits, &found);
     bool is_sound = rays_read(&given, rays, &list);
-    if (is_sound && hits->size < sizeof found)
-        is_sound = message_error(&list, "the size of a GlintAllHits is not set");
     if (is_sound && tracer->precision == GLINT_CERTIFIED)
         is_sound = message_error(&list, "all hits have no bounds: trace them at another precision");
     if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
@@ -135,13 +151,16 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
     const GlintStatus status =
         call_end(&list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     pthread_mutex_unlock(&tracer->device->mutex);
-    if (status != GLINT_DONE) glint_all_hits_free(&found);
-    memcpy(hits, &found, sizeof found);
+    if (status == GLINT_DONE)
+        all_hits_set(hits, &found);
+    else
+        glint_all_hits_free(&found);
     return status;
 }
 
 void glint_all_hits_free(GlintAllHits *hits)
 {
+    if (!hits) return;
     free(hits->ray);
     free(hits->object);
     free(hits->t);

@@ -167,8 +167,8 @@ typedef struct {
     uint32_t lanes; // as in GlintRenderSettings
 } GlintTraceSettings;
 
-// Prepares a scene for many calls of glint_trace. The scene may be freed afterwards, but the device must
-// outlive the tracer. Sets *tracer to NULL on failure.
+// Prepares a scene for many calls of glint_trace and glint_trace_all. The scene may be freed afterwards, but
+// the device must outlive the tracer. Sets *tracer to NULL on failure.
 GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
                               const GlintTraceSettings *settings, GlintTracer **tracer, char **messages);
 void glint_tracer_close(GlintTracer *tracer); // accepts NULL
@@ -215,19 +215,19 @@ typedef struct {
     size_t size;
     size_t count;     // of all hits
     size_t *ray;      // the index of each hit's ray
-    uint32_t *object; // these as in GlintHits
+    uint32_t *object; // this and the following members are as in GlintHits
     double *t;
     double *normal;
     double *position;
 } GlintAllHits;
 
-// Finds the hits of each ray, at most the nearest hits_max of it, each strictly behind the last one: of hits
-// at the same t only one. Sets the members of *hits, whose size the caller has set; free them by
-// glint_all_hits_free. A failure leaves count 0. Not at GLINT_CERTIFIED, whose bounds are those of a ray from
-// its origin.
+// Finds up to hits_max hits of each ray, nearest first. Of several hits at the same t it finds one. The
+// caller sets hits->size; the other members are overwritten and must not hold arrays of an earlier call.
+// glint_all_hits_free frees the arrays. After a failure there are none, and count is 0. GLINT_CERTIFIED is
+// refused, because its bounds are those of rays from their origins.
 GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,
                             char **messages);
-void glint_all_hits_free(GlintAllHits *hits);
+void glint_all_hits_free(GlintAllHits *hits); // accepts NULL
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

@@ -119,13 +119,15 @@ static bool variant_has(const KernelVariant *variant, const Text *prelude)
     return strcmp(text_c(prelude), text_c(&variant->prelude)) == 0;
 }
 
-// Returns whether functions stay out of line at once. With every feature inlined, a kernel for NVIDIA has 4
-// MB of PTX, and its compiler takes ten times as long as with them out of line (clang 15 and ptxas 12.9: 53 s
-// and 6 s).
+enum { FEATURES_MANY = 8 };
+
+// Returns whether kernels are built with large functions out of line from the start. With every feature
+// inlined, a kernel for NVIDIA has 4 MB of PTX, and its compiler takes ten times as long as with them out of
+// line (clang 15 and ptxas 12.9: 53 s and 6 s).
 static bool starts_out_of_line(const Renderer *renderer)
 {
-    return renderer->settings.extra_features && renderer->report.lanes == 1 &&
-           (renderer->compute->device->type & CL_DEVICE_TYPE_GPU);
+    return __builtin_popcountll(renderer->settings.extra_features) >= FEATURES_MANY &&
+           renderer->report.lanes == 1 && (renderer->compute->device->type & CL_DEVICE_TYPE_GPU);
 }
 
 void renderer_kernels_choose(Renderer *renderer)

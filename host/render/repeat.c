@@ -147,12 +147,12 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
             !(layer == LAYER_COLOR && repeated.band_film) && film_layer_size(&band->film, layer) > 0)
             layer_merge(renderer, layer, &repeated, band->buffers, list, &band->film);
-    if (undecided && whole)
-        renderer_read(repeat, repeated.doubts, list->count * sizeof *list->items,
-                      list->count * sizeof *undecided, undecided);
+    const bool is_read =
+        whole && (!undecided || renderer_read(repeat, repeated.doubts, list->count * sizeof *list->items,
+                                              list->count * sizeof *undecided, undecided));
     repeat_launches_take(&renderer->report, &repeat->report);
     band_buffers_close(&repeated, repeat);
-    return compute_check_reference(renderer->compute) && whole;
+    return compute_check_reference(renderer->compute) && is_read;
 }
 
 // Keeps the pixels of the list that are uncertified. Returns the number of their uncertified samples.

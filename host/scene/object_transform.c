@@ -236,7 +236,7 @@ const char *object_transform(Scene *scene, Object *object, const Affine *affine)
     }
     if (!shapes[object->kind].transform(object, affine)) {
         if (material_any_texture(&scene->materials.items[object->material]) > 0)
-            return "with an image would change its shape, on which images do not lie";
+            return "with an image would change its shape, and then cannot have one";
         oval_make(object);
         oval_transform(object, affine);
     }

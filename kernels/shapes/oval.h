@@ -111,16 +111,22 @@ static inline OvalRay oval_ray(const Oval *oval, const Ray *ray)
 
 static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
 {
-    const OvalRay own = oval_ray(oval, ray);
+    OvalRay own = oval_ray(oval, ray);
     mask hit = mask_none();
-    real unit_t = own.ray.tmax;
 #define OVAL_HIT(feature, Type, name)                                                                        \
     if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
         const Type shape = oval_##name(oval);                                                                \
         hit = name##_hit(&shape, &own.ray, &unit_t);                                                         \
     }
-    OVAL_LIST(OVAL_HIT)
-    *t = unit_t + own.shift;
+    for (;;) {
+        real unit_t = own.ray.tmax;
+        OVAL_LIST(OVAL_HIT)
+        *t = unit_t + own.shift;
+        // of a ray that goes on behind a hit, whose t was rounded: the hit itself
+        mask passed = hit & !(*t > ray->tmin) & (unit_t > own.ray.tmin);
+        if (!lanes_any(passed)) break;
+        own.ray.tmin = lanes_select(passed, unit_t, own.ray.tmin);
+    }
     return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
@@ -158,7 +164,7 @@ static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
 }
 
 // A normal that is off by e is, once it is mapped to the length l and normalized, off by up to x (1 + x) for
-// x = |V| e / l. The factors cover the second order (docs/numerics.md).
+// x = |V| e / l. The factors cover the second order, and all normals from a 16th on (docs/numerics.md).
 static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, real place_error,
                                    SurfacePoint *point)
 {
@@ -176,8 +182,9 @@ static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, rea
     }
     OVAL_LIST(OVAL_SET_ERRORS)
     real growth = divide_or(norm, vector_norm(affine_normal(oval->inverses, unit.normal)), NEVER);
-    const real along = growth * norm * unit.curvature; // to first order
-    growth = growth * lanes_select(along * place_error < (real)(0.0625f), (real)(1.1f), (real)(1.5f));
+    const real first_order = growth * unit.curvature * real_fma(norm, place_error, moved);
+    const real factor = lanes_select(first_order < (real)(0x1p-6f), (real)(1.1f), (real)(1.5f));
+    growth = growth * lanes_select(first_order < (real)(0x1p-4f), factor, (real)(32));
     const real turned = unit.curvature * moved; // with all orders of both turns
     point->curvature = growth * norm * unit.curvature;
     point->normal_error =

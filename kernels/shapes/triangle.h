@@ -461,7 +461,7 @@ static inline void triangle_set_lift_error(Corners corners, TriangleHeights heig
     real rounded = real_fma((real)(16 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(edges)),
                             (real)(4 * UNIT_ROUNDOFF) * size);
     real weight_error = real_fma((real)(36 * UNIT_ROUNDOFF), size, place_error) * slimness;
-    real height_error = real_fma(weight_error, heights.steepest, rounded);
+    real height_error = real_fma(weight_error, heights.steepest + rounded, rounded);
     real heights_sum = heights.a + heights.b + heights.c;
     real error = real_fma(weight_error, heights_sum + (real)(3) * height_error, height_error);
     point->lift_error = lanes_select(side == (real)(0), (real)(0), error);
