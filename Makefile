@@ -135,13 +135,15 @@ $(BUILD)/%.o: %.c Makefile $(BUILD)/flags
 	@mkdir -p $(@D)
 	$(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) -MMD -MP -c $< -o $@
 
-# Each test links only the objects that it uses, which takes half the time.
+# Each test links only the objects that it uses, by gold where it is installed; each of the two halves the time.
+test_linker := $(if $(shell $(CC) -fuse-ld=gold -Wl,--version 2>/dev/null),-fuse-ld=gold)
+
 $(BUILD)/tests.a: $(library)
 	rm -f $@
 	$(AR) rcsT $@ $^
 
 $(BUILD)/tests/%: $(BUILD)/tests/%.o $(test_objects) $(BUILD)/tests.a
-	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $(filter %.o,$^) $(BUILD)/tests.a -lcmocka $(LIBS) -o $@
+	$(CC) $(OURS) $(CFLAGS) $(test_linker) $(LDFLAGS) $(filter %.o,$^) $(BUILD)/tests.a -lcmocka $(LIBS) -o $@
 
 # Tests in which calls fail: those of OpenCL, and of the system's two, go through tests/failing.
 opencl_calls    := $(sort $(shell grep -ohw 'cl[A-Z]\w*' $(sources)))
