@@ -3,8 +3,6 @@
 that glint render writes with the camera that is printed.
 
 Nothing here depends on time: a test waits until glint has printed or shown what it must.
-
-run_tests: sanitized
 """
 import os
 import queue
