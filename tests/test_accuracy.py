@@ -265,7 +265,7 @@ class Accuracy(TestCase):
                 for other in pick["others"]:
                     self.assertEqual(other["ties"], other["low"] <= 1)
                     self.assertLessEqual(other["low"], other["ratio"])
-        scene = self.json(f"accuracy {self.spheres} --size 1920x1200 --bounces 16 --seconds 0.01 --precision single,double --json")
+        scene = self.json(f"accuracy {self.spheres} --size 480x300 --bounces 16 --seconds 0.0001 --precision single,double --json")
         (_, pick, _), (single, double) = scene["scenes"][0]["picks"], scene["scenes"][0]["variants"]
         self.assertLess(single["frame_ms"]["runs"], 8)
         self.assertEqual([(other["ties"], other["high"]) for other in pick["others"]], [(True, None)])
