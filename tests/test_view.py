@@ -381,6 +381,17 @@ class View(TestCase):
         window.shows_at_last(png_rows("before.png"))
         window.close()
 
+    def test_reload_of_what_cannot_be_rendered(self):
+        """The last scene stays, which can be saved and moved."""
+        window = Window(self)
+        window.check()
+        write("scene.yaml", SCENE.replace("[3, 4, -5]", "[1e25, 4, -5]"))
+        window.line("a light lies 1e.25 from the eye")
+        window.check()
+        window.key("Left")
+        window.check()
+        window.close()
+
     def test_reload_of_an_included_file(self):
         """The included camera cannot be written into the scene's file."""
         camera, background, *others = SCENE.splitlines(keepends=True)

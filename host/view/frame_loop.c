@@ -28,8 +28,8 @@ static void *loop_run(void *context)
     FrameLoop *loop = context;
     bool is_complete = false;
     char *save_path = NULL;
-    for (Work work;
-         (work = work_wait(loop, is_complete && loop->current.view == VIEW_COLOR, &save_path)) != WORK_END;) {
+    for (Work work; (work = work_wait(loop, is_complete && loop->renderer && loop->current.view == VIEW_COLOR,
+                                      &save_path)) != WORK_END;) {
         if (work == WORK_SAVE) image_save(loop, save_path);
         if (work == WORK_PROBE) probe_answer(loop);
         if (work == WORK_PROBE && !compute_ok(&loop->compute)) failure_publish(loop);

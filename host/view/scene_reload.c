@@ -15,7 +15,8 @@ static void file_watch(void *context, const char *path)
     watch_add(loop->watch, path);
 }
 
-// Replaces the renderer by one of the scene. False: the scene cannot be rendered, and the last one stays.
+// Replaces the renderer by one of the scene, which keeps the kernels that suit. False: the scene cannot be
+// rendered, and the last one stays.
 static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *messages)
 {
     if (loop->current_number == 0) return true; // no image was asked for
@@ -25,12 +26,20 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
         return true; // the last one cannot be rendered either
     Scene seen = *scene;
     seen.camera = loop->current.camera;
-    Renderer *renderer = renderer_open(&loop->compute, &seen, &loop->settings, messages);
-    if (!renderer && compute_ok(&loop->compute)) return false;
-    renderers_close(loop);
-    loop->renderer = renderer;
-    if (renderer) loop->expected_move = move_guess(renderer);
-    if (!renderer) compute_close(&loop->compute); // the image, which is due, opens it again or says why not
+    renderer_close(loop->reference);
+    loop->reference = NULL;
+    renderers_open(&loop->renderer, &(Compute *){&loop->compute}, 1, &seen, &loop->settings, NULL, messages,
+                   messages);
+    if (loop->renderer) {
+        loop->expected_move = move_guess(loop->renderer);
+    } else if (compute_ok(&loop->compute)) {
+        MessageList known = {0};
+        loop->renderer = renderer_open(&loop->compute, &loop->scene, &loop->settings, &known);
+        message_list_free(&known);
+        return false;
+    } else {
+        compute_close(&loop->compute); // the image, which is due, opens it again or says why not
+    }
     return true;
 }
 
