@@ -26,6 +26,9 @@ lights: [{point: {position: [3, 4, -5]}}]
 objects:
   - mesh: {file: mesh.obj, material: {color: [0.9, 0.8, 0.7]}}
 """
+FRAMES = 8
+ANIMATION = f"frames: {FRAMES}\n" + SCENE.replace("[0.5, 1, -4]", "{keys: {0: [0.5, 1, -4], 7: [2, 1, -3]}}").replace(
+    "[0.9, 0.8, 0.7]", "{keys: {0: [0.9, 0.8, 0.7], 7: [0.1, 0.5, 0.9]}}")
 MESH = """\
 v 0 -1 -1
 v 1 1 0
@@ -236,6 +239,10 @@ class Window:
     def most_colors_of_a_column(columns, rows):
         stride, pixels = screen()
         return max(len({pixels[y * stride + 4 * x : y * stride + 4 * x + 3] for y in rows}) for x in columns)
+
+    def frame(self):
+        """The frame of the animation, in the title."""
+        return int(re.search(", frame (.*?) of ", xdotool("getwindowname", self.id))[1])
 
     def title_at_last(self, text):
         wait_until(lambda: text in xdotool("getwindowname", self.id), f"the title has no '{text}'")
@@ -559,6 +566,65 @@ class View(TestCase):
         window.key("shift+v")
         window.title_at_last(", error against double, ")
         wait_until(lambda: window.most_colors_of_a_column(range(160, 320), range(180, 360)) >= 64, "there is no legend")
+        window.close()
+
+    def shows_frame(self, window, text, frame):
+        """The display, but for the time line's mark, and the saved image are what glint render makes of the frame."""
+        window.title_at_last(f", frame {frame} of {FRAMES}, {SAMPLES} samples")
+        rows = self.image_of(text, f"--frames {frame}")
+        window.shows_at_last(rows[: HEIGHT * 2 // 3])
+        mark = int((frame + 0.5) / FRAMES * WIDTH), HEIGHT - 1
+        wait_until(lambda: window.pixel(*mark) == (96, 160, 255), "the time line does not show the frame")
+        self.assertEqual(png_rows(window.saved()), rows)
+        window.key("x")  # hides the message
+
+    def test_frames(self):
+        """Keys and the mouse choose a frame; a camera that was moved stays."""
+        write("scene.yaml", ANIMATION)
+        window = Window(self)
+        self.shows_frame(window, ANIMATION, 0)
+        window.key("period")
+        self.shows_frame(window, ANIMATION, 1)
+        window.key("comma", "comma")
+        self.shows_frame(window, ANIMATION, 7)
+        low = HEIGHT - 5
+        window.mouse(WIDTH * 11 // 16, low, "click", 1)
+        self.shows_frame(window, ANIMATION, 5)
+        window.drag(1, (WIDTH * 11 // 16, low), (WIDTH * 3 // 16, low), (WIDTH * 5 // 16, 0))
+        self.shows_frame(window, ANIMATION, 2)
+        window.key("Left")
+        moved = re.sub("(?m)^camera: .*", window.camera(), ANIMATION)
+        window.key("x", "period")
+        self.shows_frame(window, moved, 3)
+        window.key("r")
+        self.shows_frame(window, ANIMATION, 3)
+        brighter = ANIMATION.replace("[0.1, 0.5, 0.9]", "[1, 1, 1]")
+        write("scene.yaml", brighter)  # read at this frame
+        self.shows_frame(window, brighter, 3)
+        write("scene.yaml", SCENE)  # the time line is gone
+        window.key("x")
+        window.shows_at_last(self.image_of(SCENE))
+        self.assertNotIn("frame", xdotool("getwindowname", window.id))
+        window.key("space", "period")
+        window.check()
+        window.close()
+
+    def test_play(self):
+        """It passes the last frame; paused it stays."""
+        write("scene.yaml", ANIMATION)
+        window = Window(self)
+        window.key("comma", "space")
+        seen = set()
+        wait_until(lambda: seen.add(window.frame()) or len(seen) == 4, "it does not play")
+        window.key("space")
+        window.title_at_last(f", {SAMPLES} samples")
+        self.shows_frame(window, ANIMATION, frame := window.frame())
+        window.key("space")
+        wait_until(lambda: window.frame() != frame, "it does not play")
+        write("scene.yaml", ANIMATION.replace("material", "metarial"))  # what cannot be read stops it
+        window.line("^scene.yaml:6:.*metarial")
+        window.key("x")
+        window.title_at_last(f", {SAMPLES} samples")
         window.close()
 
     def test_help(self):

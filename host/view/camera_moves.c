@@ -5,6 +5,16 @@
 
 static const double POLE_ANGLE = M_PI / 180; // between the view and `up`, at least
 
+bool cameras_equal(const Camera *a, const Camera *b)
+{
+    return vectors_equal(a->position, b->position) && vectors_equal(a->look_at, b->look_at) &&
+           vectors_equal(a->up, b->up) && a->field_axis == b->field_axis &&
+           a->half_tangent == b->half_tangent && a->shift[0] == b->shift[0] && a->shift[1] == b->shift[1] &&
+           a->orthographic == b->orthographic && a->equirectangular == b->equirectangular &&
+           a->lens_radius == b->lens_radius && a->focal_distance == b->focal_distance &&
+           a->has_focus == b->has_focus && vectors_equal(a->focus, b->focus);
+}
+
 static void camera_move(Camera *camera, Vector3 by)
 {
     camera->position = vector_add(camera->position, by);

@@ -12,6 +12,8 @@ typedef struct {
     Vector3 origin, direction; // unit
 } CameraRay;
 
+bool cameras_equal(const Camera *a, const Camera *b);
+
 // Returns the ray through a pixel's center, from the lens' center.
 CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y);
 

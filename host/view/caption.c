@@ -12,7 +12,8 @@ struct Caption {
     SDL_Renderer *target;
     TTF_Font *font;
     float scale;
-    int size; // of the font, in pixels
+    int size;     // of the font, in pixels
+    int reserved; // rows at the bottom
 };
 
 // The file of the font that the user has chosen for fixed-width text. Caller frees; NULL: none.
@@ -49,7 +50,7 @@ Caption *caption_open(SDL_Renderer *target, float scale)
     free(path);
     if (!font) return NULL;
     Caption *caption = memory_allocate_zeroed(1, sizeof *caption);
-    *caption = (Caption){target, font, scale, size};
+    *caption = (Caption){target, font, scale, size, 0};
     return caption;
 }
 
@@ -59,6 +60,19 @@ void caption_close(Caption *caption)
     TTF_CloseFont(caption->font);
     TTF_Quit();
     free(caption);
+}
+
+void caption_reserve(Caption *caption, int height)
+{
+    if (caption) caption->reserved = height;
+}
+
+SDL_Point caption_room(const Caption *caption)
+{
+    SDL_Point room = {0, 0};
+    SDL_GetRendererOutputSize(caption->target, &room.x, &room.y);
+    room.y -= caption->reserved;
+    return room;
 }
 
 // Characters of the longest line, and number of lines.
@@ -125,8 +139,7 @@ static const SDL_Color white = {255, 255, 255, 255};
 void caption_draw(Caption *caption, CaptionPlace place, const char *text)
 {
     if (!caption || text[0] == '\0') return;
-    SDL_Point room = {0, 0};
-    SDL_GetRendererOutputSize(caption->target, &room.x, &room.y);
+    SDL_Point room = caption_room(caption);
     room = (SDL_Point){room.x - 2 * PADDING, room.y - 2 * PADDING};
     if (room.x <= 0) return;
     const int width = size_fit(caption, extent_of(text), room);

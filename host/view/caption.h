@@ -12,6 +12,10 @@ typedef enum { CAPTION_TOP, CAPTION_BOTTOM } CaptionPlace;
 // is drawn.
 Caption *caption_open(SDL_Renderer *target, float scale);
 void caption_close(Caption *caption);
+// Leaves rows of pixels free at the bottom of the image. Accepts NULL.
+void caption_reserve(Caption *caption, int height);
+// Returns the width and height of the rest of the image.
+SDL_Point caption_room(const Caption *caption);
 // Draws lines of text on a dark ground at the left of the image, in a smaller font where they do not fit and
 // wrapped where they do not fit in that.
 void caption_draw(Caption *caption, CaptionPlace place, const char *text);

@@ -1,6 +1,7 @@
 // What the thread of the window and that of the loop pass to each other, all of it under the mutex.
 #include "host/view/frame_loop_state.h"
 
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include <stdlib.h>
 #include <string.h>
@@ -46,24 +47,20 @@ void frame_publish(FrameLoop *loop, uint32_t samples)
     loop->options.notify(loop->options.notify_context);
 }
 
-static bool cameras_equal(const Camera *a, const Camera *b)
-{
-    return vectors_equal(a->position, b->position) && vectors_equal(a->look_at, b->look_at) &&
-           vectors_equal(a->up, b->up) && a->field_axis == b->field_axis &&
-           a->half_tangent == b->half_tangent && a->shift[0] == b->shift[0] && a->shift[1] == b->shift[1] &&
-           a->orthographic == b->orthographic && a->equirectangular == b->equirectangular &&
-           a->lens_radius == b->lens_radius && a->focal_distance == b->focal_distance &&
-           a->has_focus == b->has_focus && vectors_equal(a->focus, b->focus);
-}
-
 void scene_publish(FrameLoop *loop)
 {
     const Camera *camera = &loop->scene.camera;
     ImageSize size = {0};
     scene_choose_image_size(&loop->scene, &size.width, &size.height);
     pthread_mutex_lock(&loop->mutex);
-    loop->has_camera |= loop->scene_state == SCENE_LOADING || !cameras_equal(&loop->file_camera, camera);
-    loop->file_camera = *camera;
+    SceneUpdate *update = &loop->update;
+    update->has_new_camera |= loop->scene_state == SCENE_LOADING ||
+                              (update->frame == loop->scene_frame && !cameras_equal(&update->camera, camera));
+    update->camera = *camera;
+    update->frame = loop->scene_frame;
+    update->frame_count = file_obstacle(loop->options.scene_path) ? 0 : loop->scene.frame_count;
+    loop->has_update = true;
+    if (loop->current.follows_scene) loop->current.camera = *camera;
     loop->scene_state = SCENE_LOADED;
     loop->scene_size = size;
     pthread_mutex_unlock(&loop->mutex);
@@ -122,6 +119,7 @@ Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
     } else if (loop->request_number != loop->current_number) {
         work = WORK_RENDER;
         loop->current = loop->request;
+        if (loop->current.follows_scene) loop->current.camera = loop->update.camera;
         loop->current_number = loop->request_number;
     } else if (loop->renderer && loop->has_probe) {
         work = WORK_PROBE;
@@ -202,12 +200,13 @@ bool frame_loop_take(FrameLoop *loop, Frame *frame)
     return is_new;
 }
 
-bool frame_loop_take_camera(FrameLoop *loop, Camera *camera)
+bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update)
 {
     pthread_mutex_lock(&loop->mutex);
-    bool is_new = loop->has_camera;
-    loop->has_camera = false;
-    if (is_new) *camera = loop->file_camera;
+    bool is_new = loop->has_update;
+    loop->has_update = false;
+    if (is_new) *update = loop->update;
+    loop->update.has_new_camera = false;
     pthread_mutex_unlock(&loop->mutex);
     return is_new;
 }

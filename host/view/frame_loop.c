@@ -34,6 +34,7 @@ static void *loop_run(void *context)
         if (work == WORK_PROBE) probe_answer(loop);
         if (work == WORK_PROBE && !compute_ok(&loop->compute)) failure_publish(loop);
         if (work == WORK_RELOAD && !is_own_write(loop)) is_complete = !scene_reload(loop) && is_complete;
+        if (work == WORK_RENDER && loop->current.scene_frame != loop->scene_frame) scene_reload(loop);
         if (work == WORK_RENDER || (work == WORK_RELOAD && !is_complete && loop->current_number > 0))
             is_complete = request_render(loop);
         stage_end(loop->stage);

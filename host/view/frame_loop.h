@@ -1,6 +1,6 @@
 // Renders what the window shows on a separate thread: coarse frames while the camera moves, and at rest the
 // image in passes, until it has all samples. A new request ends the work on the last one. When the scene's
-// files change they are read again.
+// files change they are read again, and so they are for another frame of an animation.
 #pragma once
 
 #include "host/image/image.h"
@@ -61,6 +61,8 @@ SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size);
 
 typedef struct {
     Camera camera;
+    bool follows_scene;   // replaces the camera by the scene's own at that frame
+    uint32_t scene_frame; // of the animation
     ImageSize size;
     View view;
     Precision precision;
@@ -83,8 +85,15 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList 
 
 // Exchanges `frame` for the newest one. False: there is none that was not taken before.
 bool frame_loop_take(FrameLoop *loop, Frame *frame);
-// Whether the scene's file has another camera than at the last call, or was read for the first time.
-bool frame_loop_take_camera(FrameLoop *loop, Camera *camera);
+// The scene that was read last.
+typedef struct {
+    Camera camera;        // its own
+    bool has_new_camera;  // other than before at the same frame, or the first
+    uint32_t frame;       // of the animation
+    uint32_t frame_count; // 0: not given, or the file cannot be read again, as standard input
+} SceneUpdate;
+// Returns false if none was read since the last call.
+bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update);
 // What went wrong, or was saved, since the last call; empty: what was wrong is fixed. Caller frees; NULL:
 // nothing.
 char *frame_loop_take_message(FrameLoop *loop);

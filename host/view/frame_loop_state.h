@@ -24,18 +24,19 @@ struct FrameLoop {
     ImageSize scene_size;
     char *save_path, *message;
     Frame ready;
-    Camera file_camera;
+    SceneUpdate update;
     uint32_t probe[2]; // the pixel of the last question
     char *facts;       // the answer
     Text written;      // into the scene's file; the watch has not reported it yet
-    bool has_ready, has_camera, has_probe, quits;
+    bool has_ready, has_update, has_probe, quits;
     bool reloads; // the scene's files have changed, or have not been read
 
     // the thread's own
-    bool is_mistaken; // whether the scene's file, as it is now, has a mistake
-    bool has_preview; // the request's first frame is coarse, or of arrays that another eye saw
-    uint32_t divisor; // the coarse frame's
-    Scene scene;      // with the request's camera
+    bool is_mistaken;     // whether the scene's file, as it is now, has a mistake
+    bool has_preview;     // the request's first frame is coarse, or of arrays that another eye saw
+    uint32_t divisor;     // the coarse frame's
+    uint32_t scene_frame; // of the animation, at which the scene was read last
+    Scene scene;          // with the request's camera
     Watch *watch;
     RenderSettings settings;
     Compute compute;
@@ -71,7 +72,8 @@ void message_publish(FrameLoop *loop, char *message);
 // Takes ownership of the messages.
 void messages_publish(FrameLoop *loop, MessageList *messages);
 void frame_publish(FrameLoop *loop, uint32_t samples);
-// A camera that was changed in the file becomes the view's: the window asks for its image.
+// The view gets the scene's camera if it follows that. A camera that was changed in the file becomes the
+// view's: the window asks for its image.
 void scene_publish(FrameLoop *loop);
 // The scene cannot be read or rendered.
 void refusal_publish(FrameLoop *loop);
@@ -99,6 +101,6 @@ double move_guess(const Renderer *renderer);
 
 // Whether the scene's file is what was written into it here.
 bool is_own_write(FrameLoop *loop);
-// Reads the scene, for the first time or again. False, with a message published, where it has a mistake: the
-// last one stays.
+// Reads the scene at the current request's frame, for the first time or again. False, with a message
+// published, where it has a mistake: the last one stays.
 bool scene_reload(FrameLoop *loop);

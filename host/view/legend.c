@@ -27,11 +27,11 @@ void legend_draw(Caption *caption, SDL_Renderer *target, double largest_error)
     const SDL_Point character = caption_character(caption);
     const int line = character.y, decade = 3 * line / 2, height = HEATMAP_DECADES * decade;
     SDL_Rect ground = {0, 0, LEGEND_WIDTH * character.x, height + 3 * line};
-    int width, window_height;
-    SDL_GetRendererOutputSize(target, &width, &window_height);
-    if (character.x == 0 || ground.w > width / 2 || ground.h > window_height / 2) return;
-    ground.x = width - ground.w;
-    ground.y = window_height - ground.h;
+    if (character.x == 0) return;
+    const SDL_Point room = caption_room(caption);
+    if (ground.w > room.x / 2 || ground.h > room.y / 2) return;
+    ground.x = room.x - ground.w;
+    ground.y = room.y - ground.h;
     caption_draw_ground(caption, ground);
     const int left = ground.x + character.x, top = ground.y + line;
     char text[32];

@@ -25,7 +25,7 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     else if (!loop->renderer)
         return true; // the last one cannot be rendered either
     Scene seen = *scene;
-    seen.camera = loop->current.camera;
+    if (!loop->current.follows_scene) seen.camera = loop->current.camera;
     renderer_close(loop->reference);
     loop->reference = NULL;
     renderers_open(&loop->renderer, &(Compute *){&loop->compute}, 1, &seen, &loop->settings, NULL, messages,
@@ -62,11 +62,13 @@ bool is_own_write(FrameLoop *loop)
 bool scene_reload(FrameLoop *loop)
 {
     const bool was_mistaken = loop->is_mistaken;
+    const bool is_other_frame = loop->current.scene_frame != loop->scene_frame;
     MessageList messages = {0};
     SceneOptions options = loop->options.scene_options;
     options.file_named = file_watch;
     options.context = loop;
     options.stage = loop->stage;
+    options.frame = loop->scene_frame = loop->current.scene_frame;
     Scene scene;
     watch_only(loop->watch, loop->options.scene_path);
     bool loaded = scene_load(&scene, loop->options.scene_path, &options, &messages);
@@ -75,6 +77,7 @@ bool scene_reload(FrameLoop *loop)
         loaded = false;
     }
     loop->is_mistaken = !loaded;
+    if (loaded && is_other_frame) message_list_free(&messages); // warnings, which the first frame had
     if (was_mistaken && messages.count == 0) message_publish(loop, memory_copy_text(""));
     messages_publish(loop, &messages);
     if (!loaded) {
@@ -110,13 +113,13 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList 
     pthread_mutex_lock(&loop->mutex);
     text_free(&loop->written);
     loop->written = text;
-    const Camera file_camera = loop->file_camera;
-    loop->file_camera = *camera;
+    const Camera file_camera = loop->update.camera;
+    loop->update.camera = *camera;
     pthread_mutex_unlock(&loop->mutex);
     if (output_commit(&output, messages)) return true;
     pthread_mutex_lock(&loop->mutex);
     text_free(&loop->written);
-    loop->file_camera = file_camera;
+    loop->update.camera = file_camera;
     pthread_mutex_unlock(&loop->mutex);
     return false;
 }

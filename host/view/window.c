@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// In milliseconds: how often interrupts are noticed, and the camera flies.
+// In milliseconds: how often interrupts are noticed, and the camera flies or frames play.
 enum { WAIT_AT_REST = 100, WAIT_IN_FLIGHT = 4 };
 
 static void frame_notify(void *context)
@@ -27,12 +27,19 @@ void message_show(Window *window, char *message)
 
 void request_send(Window *window)
 {
-    if (!window->is_loaded || (!window->camera_changed && !window->image_changed)) return;
-    bool is_moving = window->request > 0;
-    const FrameRequest request = {window->camera, window->size, window->view, window->precision, is_moving};
+    if (!window->is_loaded ||
+        (!window->camera_changed && !window->scene_frame_changed && !window->image_changed))
+        return;
+    const FrameRequest request = {.camera = window->camera,
+                                  .follows_scene = cameras_equal(&window->camera, &window->scene.camera),
+                                  .scene_frame = window->scene_frame,
+                                  .size = window->size,
+                                  .view = window->view,
+                                  .precision = window->precision,
+                                  .is_moving = window->request > 0};
     window->request = frame_loop_request(window->frames, &request);
     if (window->image_changed) window->image_request = window->request;
-    window->camera_changed = window->image_changed = false;
+    window->camera_changed = window->scene_frame_changed = window->image_changed = false;
 }
 
 // Asks for the facts of the pixel under the cursor, if they are shown, and takes them.
@@ -121,6 +128,7 @@ static void message_take(Window *window)
     if (!message) return;
     size_t length = strlen(message);
     if (length > 0) fprintf(stderr, "%s%s", message, message[length - 1] == '\n' ? "" : "\n");
+    window->plays &= length == 0; // or each frame might bring another
     message_show(window, message);
 }
 
@@ -150,13 +158,21 @@ static bool is_refused(const Window *window)
     return frame_loop_scene(window->frames, &size) == SCENE_REFUSED;
 }
 
+static void scene_take(Window *window)
+{
+    const bool follows = cameras_equal(&window->camera, &window->scene.camera);
+    if (!frame_loop_take_scene(window->frames, &window->scene)) return;
+    if (follows || window->scene.has_new_camera) window->camera = window->scene.camera;
+    window->camera_changed |= window->scene.has_new_camera;
+    window->plays &= has_time_line(window);
+    if (window->scene_frame > 0 && window->scene_frame >= window->scene.frame_count)
+        scene_frame_show(window, (int64_t)window->scene.frame_count - 1);
+}
+
 static void work_exchange(Window *window)
 {
     if (!window->is_loaded) scene_receive(window);
-    if (frame_loop_take_camera(window->frames, &window->file_camera)) {
-        window->camera = window->file_camera;
-        window->camera_changed = true;
-    }
+    scene_take(window);
     request_send(window);
     if (frame_loop_take(window->frames, &window->frame)) {
         window->facts_are_due |= window->frame.number != window->facts_request;
@@ -172,12 +188,13 @@ static WindowEnd events_run(Window *window)
 {
     while (!window->closes) {
         SDL_Event event;
-        int wait = window->drag == DRAG_LOOK ? WAIT_IN_FLIGHT : WAIT_AT_REST;
+        int wait = window->drag == DRAG_LOOK || window->plays ? WAIT_IN_FLIGHT : WAIT_AT_REST;
         for (int had = SDL_WaitEventTimeout(&event, wait); had; had = SDL_PollEvent(&event))
             event_handle(window, &event);
         if (window->options->stop()) return WINDOW_STOPPED;
         size_read(window);
         if (window->drag == DRAG_LOOK) fly(window);
+        if (window->plays) play(window);
         work_exchange(window);
         if (!window->is_loaded && is_refused(window)) {
             message_take(window); // it may have come since the last look, together with the refusal

@@ -18,6 +18,8 @@ static void title_set(const Window *window)
     // ASCII: in the C locale SDL sets no other title
     text_appendf(&title, "%s, %s, %s, %ux%u", scene_name(window), view_names[window->view],
                  precision_names[window->precision], window->size.width, window->size.height);
+    if (has_time_line(window))
+        text_appendf(&title, ", frame %u of %u", window->scene_frame, window->scene.frame_count);
     if (!window->frame.pixels || window->frame.number < window->image_request)
         text_appendf(&title, ", preparing");
     else if (window->frame.samples < count)
@@ -96,6 +98,7 @@ void window_draw(Window *window)
     SDL_SetRenderDrawColor(window->target, 0, 0, 0, 255);
     SDL_RenderClear(window->target);
     if (window->texture) SDL_RenderCopy(window->target, window->texture, NULL, NULL);
+    caption_reserve(window->caption, time_line_height(window));
     if (window->frame.pixels && window->frame.largest_error >= 0)
         legend_draw(window->caption, window->target, window->frame.largest_error);
     if (window->shows_help)
@@ -103,6 +106,7 @@ void window_draw(Window *window)
     else
         facts_draw(window);
     message_draw(window);
+    time_line_draw(window);
     SDL_RenderPresent(window->target);
     title_set(window);
     window->redraws = false;

@@ -25,7 +25,7 @@ static void camera_write(Window *window)
     FILE *stream = open_memstream(&text, &size);
     if (!stream) return;
     if (frame_loop_write_camera(window->frames, &window->camera, &messages)) {
-        window->file_camera = window->camera;
+        window->scene.camera = window->camera;
         fprintf(stream, "camera written to %s\n", camera_path(&window->options->frames));
     }
     message_list_print(&messages, stream);
@@ -94,8 +94,16 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
     case SDLK_DOWN:
         arrow_turn(window, 0, 1);
         break;
+    case SDLK_SPACE:
+        if (event->repeat == 0) play_toggle(window);
+        break;
+    case SDLK_COMMA:
+    case SDLK_PERIOD:
+        window->plays = false;
+        scene_frame_show(window, window->scene_frame + (event->keysym.sym == SDLK_PERIOD ? INT64_C(1) : -1));
+        break;
     case SDLK_r:
-        window->camera = window->file_camera;
+        window->camera = window->scene.camera;
         window->camera_changed = true;
         break;
     case SDLK_c:

@@ -25,7 +25,8 @@ static double distance_known(const Window *window, const double at[2])
 {
     const Frame *frame = &window->frame;
     bool is_inside = at[0] >= 0 && at[0] < frame->width && at[1] >= 0 && at[1] < frame->height;
-    bool is_current = frame->number == window->request && !window->camera_changed && !window->image_changed;
+    bool is_current = frame->number == window->request && !window->camera_changed &&
+                      !window->scene_frame_changed && !window->image_changed;
     if (!frame->distances || !is_inside || !is_current) return 0;
     float distance = frame->distances[(size_t)at[1] * frame->width + (size_t)at[0]];
     return distance < INFINITY ? (double)distance : 0;
@@ -46,6 +47,11 @@ static void pivot_pick(Window *window, const double at[2])
 void drag_begin(Window *window, const SDL_MouseButtonEvent *event)
 {
     position_set(window, window->mouse, event->x, event->y);
+    if (event->button == SDL_BUTTON_LEFT && is_in_time_line(window, window->mouse)) {
+        window->drag = DRAG_TIME;
+        time_line_follow(window, window->mouse);
+        return;
+    }
     pivot_pick(window, window->mouse);
     if (event->button == SDL_BUTTON_LEFT && event->clicks == 2) {
         camera_look_at(&window->camera, window->pivot);
@@ -63,6 +69,10 @@ void drag_move(Window *window, const SDL_MouseMotionEvent *event)
     if (window->drag == DRAG_NONE) return;
     double to[2];
     position_set(window, to, event->x, event->y);
+    if (window->drag == DRAG_TIME) {
+        time_line_follow(window, to);
+        return;
+    }
     double right = to[0] - window->mouse[0], down = to[1] - window->mouse[1];
     Camera *camera = &window->camera;
     if (window->drag == DRAG_ORBIT) {

@@ -5,7 +5,7 @@
 #include "host/view/window.h"
 #include <SDL.h>
 
-typedef enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN, DRAG_LOOK } Drag;
+typedef enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN, DRAG_LOOK, DRAG_TIME } Drag;
 
 typedef struct {
     const WindowOptions *options;
@@ -17,11 +17,13 @@ typedef struct {
     FrameLoop *frames;
     Uint32 frame_event;
 
-    ImageSize size;             // in pixels, which a point of the window may have several of
-    Camera camera, file_camera; // the view's, and the scene's own
+    ImageSize size; // in pixels, which a point of the window may have several of
+    Camera camera;  // follows the scene's own unless it was moved
+    SceneUpdate scene;
+    uint32_t scene_frame; // of the animation, which the last request was for or the next will be
     View view;
     Precision precision;
-    bool camera_changed, image_changed;
+    bool camera_changed, scene_frame_changed, image_changed;
     bool is_loaded;         // the scene
     unsigned request;       // the last one
     unsigned image_request; // the last one for another view, precision or size
@@ -32,6 +34,10 @@ typedef struct {
     Vector3 pivot;                 // the point that was last picked, and where
     double pivot_at[2];
     double flown_seconds; // the moment up to which the camera has flown
+
+    bool plays;
+    double play_seconds; // the moment, and the frame of the animation then, from which it plays
+    uint32_t play_frame;
 
     char *message;   // at the bottom, until the next key
     Text stage;      // what keeps the next frame waiting; empty: not shown
@@ -57,6 +63,21 @@ void drag_move(Window *window, const SDL_MouseMotionEvent *event);
 void wheel_turn(Window *window, const SDL_MouseWheelEvent *event);
 // Moves the camera as the keys have been held since the last call.
 void fly(Window *window);
+
+// window_time.c
+bool has_time_line(const Window *window);
+// Shows a frame of the animation. Frames before the first are the last ones, and those behind the last the
+// first.
+void scene_frame_show(Window *window, int64_t frame);
+void play_toggle(Window *window);
+// Shows the frame that is due, once the last one is shown.
+void play(Window *window);
+int time_line_height(const Window *window); // in pixels; 0: there is none
+// Returns whether a position in pixels is in the time line.
+bool is_in_time_line(const Window *window, const double at[2]);
+// Shows the frame at a position.
+void time_line_follow(Window *window, const double at[2]);
+void time_line_draw(const Window *window);
 
 // window_keys.c
 void key_press(Window *window, const SDL_KeyboardEvent *event);

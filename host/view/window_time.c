@@ -1,0 +1,83 @@
+// The time line of an animation along the lower edge of the window, and how its frames play.
+#include "host/view/window_state.h"
+
+#include "host/base/clock.h"
+#include "host/base/text.h"
+
+static const double FRAMES_PER_SECOND = 24;
+enum { MARGIN = 2, INDENT = 8, MARK_WIDTH = 3 };
+
+bool has_time_line(const Window *window)
+{
+    return window->scene.frame_count > 1;
+}
+
+static void play_start(Window *window)
+{
+    window->play_seconds = clock_seconds();
+    window->play_frame = window->scene_frame;
+}
+
+void scene_frame_show(Window *window, int64_t frame)
+{
+    const int64_t count = has_time_line(window) ? window->scene.frame_count : 1;
+    const uint32_t shown = (uint32_t)((frame % count + count) % count);
+    window->scene_frame_changed |= shown != window->scene_frame;
+    window->redraws = true;
+    window->scene_frame = shown;
+    play_start(window);
+}
+
+void play_toggle(Window *window)
+{
+    window->plays = !window->plays && has_time_line(window);
+    play_start(window);
+}
+
+void play(Window *window)
+{
+    if (window->drag == DRAG_TIME) play_start(window);
+    if (window->frame.number != window->request || window->scene_frame_changed) return;
+    const double frames = FRAMES_PER_SECOND * (clock_seconds() - window->play_seconds);
+    const uint32_t due = (uint32_t)((window->play_frame + (uint64_t)frames) % window->scene.frame_count);
+    window->scene_frame_changed = due != window->scene_frame;
+    window->scene_frame = due;
+}
+
+int time_line_height(const Window *window)
+{
+    return has_time_line(window) ? caption_character(window->caption).y + 2 * MARGIN : 0;
+}
+
+bool is_in_time_line(const Window *window, const double at[2])
+{
+    return at[1] >= (double)window->size.height - time_line_height(window);
+}
+
+void time_line_follow(Window *window, const double at[2])
+{
+    const double frame = floor(at[0] / window->size.width * window->scene.frame_count);
+    scene_frame_show(window, (int64_t)fmax(0, fmin(frame, window->scene.frame_count - 1.0)));
+}
+
+static void area_fill(const Window *window, SDL_Rect area, SDL_Color color)
+{
+    SDL_SetRenderDrawBlendMode(window->target, SDL_BLENDMODE_BLEND);
+    SDL_SetRenderDrawColor(window->target, color.r, color.g, color.b, color.a);
+    SDL_RenderFillRect(window->target, &area);
+}
+
+void time_line_draw(const Window *window)
+{
+    if (!has_time_line(window)) return;
+    const int width = (int)window->size.width, height = time_line_height(window);
+    const int top = (int)window->size.height - height;
+    const int at = (int)((window->scene_frame + 0.5) / window->scene.frame_count * width);
+    area_fill(window, (SDL_Rect){0, top, width, height}, (SDL_Color){0, 0, 0, 176});
+    area_fill(window, (SDL_Rect){0, top, at, height}, (SDL_Color){255, 255, 255, 48});
+    area_fill(window, (SDL_Rect){at - MARK_WIDTH / 2, top, MARK_WIDTH, height},
+              (SDL_Color){96, 160, 255, 255});
+    char text[64];
+    snprintf(text, sizeof text, "frame %u of %u", window->scene_frame, window->scene.frame_count);
+    caption_draw_line(window->caption, INDENT, top + MARGIN, text);
+}
