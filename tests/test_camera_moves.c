@@ -1,4 +1,5 @@
 // The camera's movements, its YAML, and the pace of coarse frames: without a window or a device.
+#include "host/import/load.h"
 #include "host/scene/portable.h"
 #include "host/view/camera_file.h"
 #include "host/view/camera_moves.h"
@@ -183,20 +184,39 @@ static void yaml_gives_the_same_camera(void **state)
 
 #define REST "objects: [] # none\n"
 
-// Checks the text that replaces the camera. An `expected` of NULL means a refusal with one message.
-static void check_replaced(const char *text, const char *expected)
+// Checks the text that replaces the camera, or records it at a frame. An `expected` of NULL means a refusal
+// with one message.
+static void check_written(const char *text, const uint32_t *frame, const char *expected)
 {
     const Camera camera = {
         .position = {1, 2.5, 3}, .look_at = {0, 0, 1e-3}, .up = {0, 0, 1}, .half_tangent = 0.5};
     const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};
     Text replaced;
     MessageList messages = {0};
-    assert_int_equal(camera_replace(&replaced, &source, &camera, &messages), expected != NULL);
+    assert_int_equal(camera_replace(&replaced, &source, &camera, frame, &messages), expected != NULL);
     assert_int_equal(messages.count, expected == NULL);
     message_list_free(&messages);
     if (!expected) return;
     assert_string_equal(text_c(&replaced), expected);
+    Scene scene;
+    const Source written = {.file = "scene.yaml", .bytes = expected, .length = strlen(expected)};
+    assert_true(scene_read_yaml(&scene, &written, &(SceneOptions){.frame = frame ? *frame : 0}, &messages));
+    assert_true(vectors_equal(scene.camera.position, camera.position));
+    assert_true(vectors_equal(scene.camera.look_at, camera.look_at));
+    assert_true(vectors_equal(scene.camera.up, camera.up));
+    message_list_free(&messages);
+    scene_free(&scene);
     text_free(&replaced);
+}
+
+static void check_replaced(const char *text, const char *expected)
+{
+    check_written(text, NULL, expected);
+}
+
+static void check_recorded(const char *text, const char *expected)
+{
+    check_written(text, &(uint32_t){12}, expected);
 }
 
 static void camera_is_written_into_the_file(void **state)
@@ -211,6 +231,8 @@ static void camera_is_written_into_the_file(void **state)
         " # there\n" REST,
         "camera:\n  up: [0, 0, 1]\n  position: # the eye\n    [1, 2.5, 3]\n\n  # below\n  look_at: "
         "[0, 0, 0.001] # there\n" REST);
+    check_replaced("camera:\n  position:\n  - 1\n  - 9\n  - 3\n  look_at: [0, 0, 0.001]\n" REST,
+                   "camera:\n  up: [0, 0, 1]\n  position:\n   [1, 2.5, 3]\n  look_at: [0, 0, 0.001]\n" REST);
     check_replaced("camera: {look_at: [0, 0, 0.001], position: [1, 2.50, 3.0]}\n" REST,
                    "camera: {up: [0, 0, 1], look_at: [0, 0, 0.001], position: [1, 2.50, 3.0]}\n" REST);
     check_replaced("{\"camera\": {\"look_at\": [0, 0, 0], \"position\": [1, 2.5, 3]}, \"objects\": []}\n",
@@ -227,6 +249,39 @@ static void camera_is_written_into_the_file(void **state)
     check_replaced("{a: [1], objects: []}\n", NULL);
     check_replaced("camera: {position: [1, 2, 3]}\n", NULL);
     check_replaced("camera: {position: [1, 2, 3]\n", NULL);
+}
+
+static void camera_is_recorded_in_the_file(void **state)
+{
+    (void)state;
+    check_recorded( // its first keys; what stays constant stays
+        "camera: {position: [9, 9, 9], fov: 30, look_at: [0, 0, 0], up: [0, 0, 1], turn: 0} # eye\n" REST,
+        "camera: {position: {keys: {12: [1, 2.5, 3]}}, fov: 30, look_at: {keys: {12: [0, 0, 0.001]}}, "
+        "up: [0, 0, 1], turn: 0} # eye\n" REST);
+    check_recorded( // in front, in the place of another, and behind
+        "camera:\n  up: {keys: {12.5: [0, 1, 0] }, ease: step}\n"
+        "  position: {ease: smooth, keys: {0: [0, 0, 0], 12.0: [9, 9, 9], 24: [1, 1, 1]}}\n"
+        "  look_at: {keys: {-1: [0, 0, 1], 3: [0, 0, 2]}}\n  fov: {keys: {0: 30, 24: 40}}\n" REST,
+        "camera:\n  up: {keys: {12: [0, 0, 1], 12.5: [0, 1, 0] }, ease: step}\n"
+        "  position: {ease: smooth, keys: {0: [0, 0, 0], 12.0: [1, 2.5, 3], 24: [1, 1, 1]}}\n"
+        "  look_at: {keys: {-1: [0, 0, 1], 3: [0, 0, 2], 12: [0, 0, 0.001]}}\n"
+        "  fov: {keys: {0: 30, 24: 40}}\n" REST);
+    check_recorded( // in blocks
+        "camera:\n  up: [0, 0, 1]\n  position:\n    keys: # of the eye\n      24: [9, 9, 9] # last\n"
+        "  look_at:\n    keys:\n      0: [0, 0, 0] # first\n      # none\n    ease: smooth\n"
+        "  height:\n    keys:\n      12:\n        2\n" REST,
+        "camera:\n  up: [0, 0, 1]\n  position:\n    keys: # of the eye\n      12: [1, 2.5, 3]\n"
+        "      24: [9, 9, 9] # last\n  look_at:\n    keys:\n      0: [0, 0, 0] # first\n"
+        "      12: [0, 0, 0.001]\n      # none\n    ease: smooth\n"
+        "  height:\n    keys:\n      12:\n        1\n" REST);
+    check_recorded("{\"camera\": {\"position\": {\"keys\": {\"0\": [1, 1, 1]}}, \"look_at\": [0, 0, 0]}}",
+                   "{\"camera\": {\"up\": [0, 0, 1], \"position\": {\"keys\": {\"0\": [1, 1, 1], "
+                   "\"12\": [1, 2.5, 3]}}, \"look_at\": {\"keys\": {\"12\": [0, 0, 0.001]}}}}");
+    check_recorded("camera: {position: [9, 9, 9], look_at: [0, 0, 0], turn: {keys: {0: 0}}}\n" REST, NULL);
+    check_recorded("camera: {position: [9, 9, 9], look_at: [0, 0, 0], turn: 90}\n" REST, NULL);
+    check_recorded("{a: &a {0: [9, 9, 9]}, camera: {position: {keys: *a}, look_at: [0, 0, 0]}}\n", NULL);
+    check_recorded("{a: &a [9, 9, 9], camera: {position: {keys: {0: *a}}, look_at: [0, 0, 0]}}\n", NULL);
+    check_recorded("camera: {position: {keys: {0: [1, 2]}}, look_at: [0, 0, 0]}\n" REST, NULL);
 }
 
 // Checks a scene that takes this long to move and per pixel: every frame after the first few is in time, and
@@ -283,6 +338,7 @@ int main(void)
         cmocka_unit_test(camera_turns_and_flies),
         cmocka_unit_test(yaml_gives_the_same_camera),
         cmocka_unit_test(camera_is_written_into_the_file),
+        cmocka_unit_test(camera_is_recorded_in_the_file),
         cmocka_unit_test(coarse_frames_are_in_time),
         cmocka_unit_test(one_slow_frame_changes_nothing),
     };

@@ -609,6 +609,15 @@ class View(TestCase):
         window.check()
         window.close()
 
+    def stays(self, window):
+        """The frame of an animation that has paused."""
+        window.camera()  # once it has seen all that came before
+        window.key("x")
+        frame = window.frame()
+        self.image_of(ANIMATION)  # meanwhile it would play
+        self.assertEqual(window.frame(), frame)
+        return frame
+
     def test_play(self):
         """It passes the last frame; paused it stays."""
         write("scene.yaml", ANIMATION)
@@ -617,14 +626,41 @@ class View(TestCase):
         seen = set()
         wait_until(lambda: seen.add(window.frame()) or len(seen) == 4, "it does not play")
         window.key("space")
-        window.title_at_last(f", {SAMPLES} samples")
-        self.shows_frame(window, ANIMATION, frame := window.frame())
+        self.shows_frame(window, ANIMATION, frame := self.stays(window))
         window.key("space")
         wait_until(lambda: window.frame() != frame, "it does not play")
         write("scene.yaml", ANIMATION.replace("material", "metarial"))  # what cannot be read stops it
         window.line("^scene.yaml:6:.*metarial")
-        window.key("x")
-        window.title_at_last(f", {SAMPLES} samples")
+        self.stays(window)
+        window.close()
+
+    def test_recorded_keys(self):
+        """K adds a key to the file, whose other keys and text stay; the view follows them."""
+        write("scene.yaml", ANIMATION + "# kept\n")
+        window = Window(self)
+        window.key("k")  # needs --write-camera
+        window.says_at_last()
+        window.close()
+        window = Window(self, options="--write-camera")
+        window.key("period", "period")
+        window.title_at_last(f", frame 2 of {FRAMES}, {SAMPLES} samples")
+        window.key("Left")
+        camera = window.camera()
+        window.line("^scene.yaml:2:20: error: the camera cannot be written: it is animated; K records a key")
+        window.key("k")
+        window.line("^camera written to scene.yaml at frame 2")
+        text = Path("scene.yaml").read_text()
+        position = re.search(r"position: (\[.*?\])", camera)[1]
+        self.assertEqual(
+            text, ANIMATION.replace("-4], 7", f"-4], 2: {position}, 7").replace(": [0, 0, 0], fov", ": {keys: {2: [0, 0, 0]}}, fov")
+            + "# kept\n")
+        window.key("x", "period", "period")
+        self.shows_frame(window, text, 4)
+        window.key("--delay", 0, "period", "k")  # what the view will have at that frame
+        window.line("^camera written to scene.yaml at frame 5")
+        keyed = Path("scene.yaml").read_text()
+        self.assertEqual(self.image_of(keyed, "--frames 5"), self.image_of(text, "--frames 5"))
+        self.assertEqual(keyed.count("5: ["), 2)
         window.close()
 
     def test_help(self):
@@ -683,9 +719,10 @@ class View(TestCase):
     def test_random_events(self):
         """Nothing that a user does ends the program, and afterwards the image is right."""
         draw = random.Random(19)
-        keys = ["r", "c", "h", "w", "a", "d", "e", "Left", "Up", "shift"]
+        keys = ["r", "c", "h", "w", "a", "d", "e", "Left", "Up", "shift", "space", "comma", "period", "k"]
         keys += ["v", "1", "2", "t", "i", "f"] if IS_LONG else []  # many kernels
-        window = Window(self)
+        write("scene.yaml", ANIMATION)
+        window = Window(self, options="--write-camera")
         for _ in range(10000 // 50 if IS_LONG else 6):
             words = []
             for _ in range(50):
@@ -705,9 +742,11 @@ class View(TestCase):
             window.key("v")
         xdotool("windowsize", window.id, WIDTH, HEIGHT)
         window.title_at_last(f"{WIDTH}x{HEIGHT}")
+        window.key("comma")  # pauses
         path = window.saved()
         self.assertEqual(png_read(path)[0][:2], (WIDTH, HEIGHT))
         window.close()
+        self.glint("check scene.yaml")  # whose camera has many keys
 
 
 def window_camera_in_flight(window):

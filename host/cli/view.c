@@ -37,7 +37,7 @@ static const char help_text[] =
     "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel, once the camera rests (default: 16)\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION
-    "      --write-camera    C writes the camera into its file, which is YAML\n" //
+    "      --write-camera    C and K write the camera into its file, which is YAML\n" //
     HELP_SET HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
 
 typedef struct {

@@ -1,8 +1,10 @@
 #include "host/view/camera_file.h"
 
+#include "host/base/memory.h"
 #include "host/import/yaml/animation.h"
 #include "host/import/yaml/yaml.h"
 #include "host/view/camera_yaml.h"
+#include <stdlib.h>
 #include <string.h>
 
 typedef struct {
@@ -17,6 +19,37 @@ static void camera_file_free(CameraFile *file)
     scene_free(&file->scene);
 }
 
+static bool is_zero(const YamlReader *reader, const YamlNode *node)
+{
+    double number = 1;
+    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    return number_read(text, strlen(text), &number) == NUMBER_READ && number == 0;
+}
+
+// Reads the camera at a frame of the animation, and leaves the tree as it is in the file.
+static void animated_camera_read(CameraFile *file, uint32_t frame)
+{
+    YamlReader *reader = &file->reader;
+    YamlTree *tree = &reader->tree;
+    const size_t count = tree->nodes.count;
+    YamlNode *nodes = memory_allocate(count, sizeof *nodes);
+    memcpy(nodes, tree->nodes.items, count * sizeof *nodes);
+    const YamlNode *turn = field_node(reader, file->camera, "turn");
+    const bool can_turn = turn != file->camera && !is_zero(reader, turn);
+    const SceneOptions options = {.frame = frame};
+    reader->options = &options;
+    if (can_turn)
+        report_error(&reader->report, turn->offset,
+                     "no key can be recorded: the camera's positions would be turned; remove 'turn'");
+    else if (yaml_animate(reader))
+        yaml_read_camera(reader, field_node(reader, tree->nodes.items, "camera"));
+    reader->options = NULL;
+    memcpy(tree->nodes.items, nodes, count * sizeof *nodes);
+    tree->nodes.count = count;
+    free(nodes);
+    file->camera = field_node(reader, tree->nodes.items, "camera");
+}
+
 // Reports an error and returns false if a value of the camera has keys.
 static bool camera_is_constant(CameraFile *file)
 {
@@ -26,12 +59,13 @@ static bool camera_is_constant(CameraFile *file)
         value = yaml_next(&reader->tree, key);
         if (yaml_has_keys(reader, value))
             return report_error(&reader->report, value->offset,
-                                "the camera cannot be written: it is animated");
+                                "the camera cannot be written: it is animated; K records a key");
     }
     return true;
 }
 
-static bool camera_file_read(CameraFile *file, const Source *source, MessageList *messages)
+static bool camera_file_read(CameraFile *file, const Source *source, const uint32_t *frame,
+                             MessageList *messages)
 {
     *file = (CameraFile){.reader.report = report_open(source, messages)};
     YamlReader *reader = &file->reader;
@@ -45,6 +79,8 @@ static bool camera_file_read(CameraFile *file, const Source *source, MessageList
                          "the camera cannot be written: it is in an included file");
         else if (file->camera == root)
             report_error(&reader->report, root->offset, "the scene has no camera");
+        else if (frame)
+            animated_camera_read(file, *frame);
         else if (camera_is_constant(file))
             yaml_read_camera(reader, file->camera);
     }
@@ -75,23 +111,90 @@ static size_t indentation(const Source *source, size_t offset)
     return offset - start;
 }
 
-static void up_insert(Copy *copy, const CameraFile *file, const YamlNode *key, Vector3 up)
+// A quoted key's offset is behind its quote.
+static bool is_quoted(const Source *source, const YamlNode *key)
 {
-    const char *before = copy->source->bytes + key->offset - 1; // a quoted key's offset is behind its quote
-    const bool is_quoted = *before == '"' || *before == '\'';
-    const size_t offset = key->offset - is_quoted;
+    const char before = source->bytes[key->offset - 1];
+    return before == '"' || before == '\'';
+}
+
+// Inserts a key in front of another of a mapping.
+static void pair_insert(Copy *copy, const YamlNode *mapping, const YamlNode *next, const char *key,
+                        const Text *value)
+{
+    const char *quote = is_quoted(copy->source, next) ? "\"" : "";
+    const size_t offset = next->offset - strlen(quote);
     copy_until(copy, offset);
-    text_appendf(copy->text, is_quoted ? "\"up\": " : "up: ");
-    vector_write_yaml(copy->text, up);
-    if (copy->source->bytes[file->camera->offset] == '{')
+    text_appendf(copy->text, "%s%s%s: %s", quote, key, quote, text_c(value));
+    if (copy->source->bytes[mapping->offset] == '{')
         text_appendf(copy->text, ", ");
     else
         text_appendf(copy->text, "\n%*s", (int)indentation(copy->source, offset), "");
 }
 
-// Writes the new value of a key. Returns false if it has not changed. Where the camera turned, the new
-// position has turned.
-static bool value_write(Text *text, const char *key, const Camera *old, const Camera *camera, bool has_turn)
+// Adds a key behind the last one of a mapping: in a block on a new line, behind a comment.
+static void pair_append(Copy *copy, const YamlNode *mapping, const YamlNode *last, size_t end,
+                        const char *key, const Text *value)
+{
+    const Source *source = copy->source;
+    const char *quote = is_quoted(source, last) ? "\"" : "";
+    const bool is_block = source->bytes[mapping->offset] != '{';
+    while (is_block && end < source->length && source->bytes[end] != '\n')
+        end++;
+    copy_until(copy, end);
+    if (is_block)
+        text_appendf(copy->text, "\n%*s", (int)indentation(source, last->offset - strlen(quote)), "");
+    else
+        text_appendf(copy->text, ", ");
+    text_appendf(copy->text, "%s%s%s: %s", quote, key, quote, text_c(value));
+}
+
+// Replaces the value of a key. A list in a block may begin in the column of its key; other values may not.
+static void value_replace(Copy *copy, const YamlNode *key, const YamlNode *value, const char *text)
+{
+    const Source *source = copy->source;
+    copy_until(copy, value->offset);
+    const bool is_flush = indentation(source, value->offset) <= indentation(source, key->offset);
+    text_appendf(copy->text, "%s%s", is_flush ? " " : "", text);
+    copy->next = value->end;
+}
+
+// Records the new value of an animated one, or of one that becomes animated.
+static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, const YamlNode *animated,
+                         uint32_t frame, const Text *value)
+{
+    YamlReader *reader = &file->reader;
+    char key[16];
+    snprintf(key, sizeof key, "%u", frame);
+    if (!yaml_has_keys(reader, animated)) {
+        const char *quote = is_quoted(copy->source, name) ? "\"" : "";
+        Text text = {0};
+        text_appendf(&text, "{%skeys%s: {%s%s%s: %s}}", quote, quote, quote, key, quote, text_c(value));
+        value_replace(copy, name, animated, text_c(&text));
+        text_free(&text);
+        return true;
+    }
+    const YamlNode *keys = field_node(reader, animated, "keys"), *old;
+    for (const YamlNode *next = yaml_first(&reader->tree, keys);; next = yaml_next(&reader->tree, old)) {
+        old = yaml_next(&reader->tree, next);
+        const char *text = yaml_text(&reader->tree, next);
+        double number;
+        if (next->offset < animated->offset || old->offset < next->offset)
+            return report_error(&reader->report, animated->offset,
+                                "no key can be recorded: the camera's keys have an alias");
+        number_read(text, strlen(text), &number);
+        if (number == frame) value_replace(copy, next, old, text_c(value));
+        if (number > frame) pair_insert(copy, keys, next, key, value);
+        const bool is_last = number < frame && !yaml_next(&reader->tree, old);
+        if (is_last) pair_append(copy, keys, next, old->end, key, value);
+        if (is_last || number >= frame) return true;
+    }
+}
+
+// Writes the new value of a key. Returns false if it has not changed and is not recorded. Where the camera
+// turned, the new position has turned.
+static bool value_write(Text *text, const char *key, const Camera *old, const Camera *camera, bool has_turn,
+                        bool is_recorded)
 {
     const bool is_moved = !vectors_equal(old->position, camera->position) ||
                           !vectors_equal(old->look_at, camera->look_at) ||
@@ -104,7 +207,8 @@ static bool value_write(Text *text, const char *key, const Camera *old, const Ca
                    {"up", old->up, camera->up}};
     for (size_t i = 0; i < sizeof members / sizeof *members; i++)
         if (strcmp(key, members[i].name) == 0) {
-            if (vectors_equal(members[i].old, members[i].new) && !(i == 0 && is_moved && has_turn))
+            if (!is_recorded && vectors_equal(members[i].old, members[i].new) &&
+                !(i == 0 && is_moved && has_turn))
                 return false;
             vector_write_yaml(text, members[i].new);
             return true;
@@ -113,12 +217,21 @@ static bool value_write(Text *text, const char *key, const Camera *old, const Ca
         number_write_yaml(text, 0);
         return true;
     }
-    if (strcmp(key, "height") != 0 || old->half_tangent == camera->half_tangent) return false;
+    if (strcmp(key, "height") != 0 || (!is_recorded && old->half_tangent == camera->half_tangent))
+        return false;
     number_write_yaml(text, 2 * camera->half_tangent);
     return true;
 }
 
-static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera)
+// Returns whether a value gets a key when one of the camera is recorded. Without keys `up` stays, which moves
+// only make upright.
+static bool gets_key(const YamlReader *reader, const char *key, const YamlNode *value)
+{
+    return strcmp(key, "position") == 0 || strcmp(key, "look_at") == 0 || strcmp(key, "height") == 0 ||
+           (strcmp(key, "up") == 0 && yaml_has_keys(reader, value));
+}
+
+static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera, const uint32_t *frame)
 {
     YamlReader *reader = &file->reader;
     if (camera->lens_radius > 0 && camera_focal_distance(camera) == 0)
@@ -134,26 +247,36 @@ static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera)
         if (key->offset < copy->next || value->offset < key->offset)
             return report_error(&reader->report, key->offset,
                                 "the camera cannot be written: it has an alias");
-        if (lacks_up) up_insert(copy, file, key, camera->up);
-        lacks_up = false;
         Text written = {0};
-        if (!value_write(&written, yaml_text(&reader->tree, key), old, camera, has_turn)) continue;
-        copy_until(copy, value->offset);
-        text_append(copy->text, written.items, written.count);
+        if (lacks_up) {
+            vector_write_yaml(&written, camera->up);
+            pair_insert(copy, file->camera, key, "up", &written);
+            text_free(&written);
+        }
+        lacks_up = false;
+        const char *name = yaml_text(&reader->tree, key);
+        const bool records = frame && gets_key(reader, name, value);
+        if (!value_write(&written, name, old, camera, has_turn, records)) continue;
+        bool is_replaced = true;
+        if (records)
+            is_replaced = value_record(copy, file, key, value, *frame, &written);
+        else
+            value_replace(copy, key, value, text_c(&written));
         text_free(&written);
-        copy->next = value->end;
+        if (!is_replaced) return false;
     }
     copy_until(copy, copy->source->length);
     return true;
 }
 
-bool camera_replace(Text *text, const Source *source, const Camera *camera, MessageList *messages)
+bool camera_replace(Text *text, const Source *source, const Camera *camera, const uint32_t *frame,
+                    MessageList *messages)
 {
     *text = (Text){0};
     CameraFile file;
-    if (!camera_file_read(&file, source, messages)) return false;
+    if (!camera_file_read(&file, source, frame, messages)) return false;
     Copy copy = {.source = source, .text = text};
-    bool replaced = values_replace(&copy, &file, camera);
+    bool replaced = values_replace(&copy, &file, camera, frame);
     report_close(&file.reader.report);
     camera_file_free(&file);
     if (!replaced) text_free(text);

@@ -5,7 +5,9 @@
 #include "host/import/report.h"
 #include "host/scene/scene.h"
 
-// Replaces position, look_at and up of the camera in the file's text; all other bytes stay, including
-// comments. Returns false with a message if the text is not a scene, or these have no separate place in it,
-// as in an alias.
-bool camera_replace(Text *text, const Source *source, const Camera *camera, MessageList *messages);
+// Replaces position, look_at, up and height of the camera in the file's text; all other bytes stay, including
+// comments. With a `frame`, position, look_at and height get a key there, and up gets one if it has keys.
+// Returns false with a message if the text is not a scene, if these have no separate place in it, as in an
+// alias, or if they have keys and `frame` is NULL.
+bool camera_replace(Text *text, const Source *source, const Camera *camera, const uint32_t *frame,
+                    MessageList *messages);

@@ -79,9 +79,10 @@ void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y);
 // The answer to the last question. Caller frees; NULL: none since the last call.
 char *frame_loop_take_facts(FrameLoop *loop);
 
-// Writes the camera into the scene's file, which then is not read again for that. False with messages if it
-// cannot.
-bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages);
+// Writes the camera into the scene's file, which then is not read again for that; with a `frame`, as keys
+// there. False with messages if it cannot.
+bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32_t *frame,
+                             MessageList *messages);
 
 // Exchanges `frame` for the newest one. False: there is none that was not taken before.
 bool frame_loop_take(FrameLoop *loop, Frame *frame);

@@ -17,6 +17,7 @@
     KEY("I", "show or hide what the pixel under the cursor sees; print it")                                  \
     KEY("R", "reset the camera")                                                                             \
     KEY("C", "print the camera as YAML; with --write-camera, write it into its file")                        \
+    KEY("K", "record the camera as a key at this frame; needs --write-camera")                               \
     KEY("S", "save the image, once complete, as PNG; Shift S: EXR")                                          \
     KEY("F", "full screen")                                                                                  \
     KEY("H", "show or hide this list")                                                                       \

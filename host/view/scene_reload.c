@@ -90,14 +90,15 @@ bool scene_reload(FrameLoop *loop)
     return true;
 }
 
-bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, MessageList *messages)
+bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32_t *frame,
+                             MessageList *messages)
 {
     const char *path = camera_path(&loop->options);
     Text old = {0}, text = {0};
     if (!text_read_file(&old, path, messages)) return false;
     const Source source = {.file = path, .bytes = text_c(&old), .length = old.count};
     OutputFile output;
-    bool done = camera_replace(&text, &source, camera, messages);
+    bool done = camera_replace(&text, &source, camera, frame, messages);
     text_free(&old);
     if (!done || !output_open(&output, path, messages)) {
         text_free(&text);

@@ -128,7 +128,7 @@ static void message_take(Window *window)
     if (!message) return;
     size_t length = strlen(message);
     if (length > 0) fprintf(stderr, "%s%s", message, message[length - 1] == '\n' ? "" : "\n");
-    window->plays &= length == 0; // or each frame might bring another
+    if (length > 0) window->plays = window->key_is_due = false; // each frame might bring another
     message_show(window, message);
 }
 
@@ -173,6 +173,7 @@ static void work_exchange(Window *window)
 {
     if (!window->is_loaded) scene_receive(window);
     scene_take(window);
+    key_record(window);
     request_send(window);
     if (frame_loop_take(window->frames, &window->frame)) {
         window->facts_are_due |= window->frame.number != window->facts_request;

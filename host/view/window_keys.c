@@ -17,16 +17,19 @@ static void arrow_turn(Window *window, double yaw, double pitch)
     window->camera_changed = true;
 }
 
-static void camera_write(Window *window)
+// With a `frame`, writes keys there.
+static void camera_write(Window *window, const uint32_t *frame)
 {
     MessageList messages = {0};
     char *text = NULL;
     size_t size;
     FILE *stream = open_memstream(&text, &size);
     if (!stream) return;
-    if (frame_loop_write_camera(window->frames, &window->camera, &messages)) {
+    if (frame_loop_write_camera(window->frames, &window->camera, frame, &messages)) {
         window->scene.camera = window->camera;
-        fprintf(stream, "camera written to %s\n", camera_path(&window->options->frames));
+        fprintf(stream, "camera written to %s", camera_path(&window->options->frames));
+        if (frame) fprintf(stream, " at frame %u", *frame);
+        fprintf(stream, "\n");
     }
     message_list_print(&messages, stream);
     message_list_free(&messages);
@@ -42,10 +45,29 @@ static void camera_print(Window *window)
     fputs(text_c(&yaml), stdout);
     fflush(stdout);
     message_show(window, yaml.items);
-    if (window->options->writes_camera) camera_write(window);
+    if (window->options->writes_camera) camera_write(window, NULL);
 }
 
-// Saves as SCENE-1.png, or with the first number that is free.
+static void key_ask(Window *window)
+{
+    if (!window->options->writes_camera)
+        message_show(window, memory_copy_text("K writes into the scene's file: start with --write-camera"));
+    else if (!has_time_line(window))
+        message_show(window, memory_copy_text("K needs an animation: a scene with 'frames' above 1"));
+    else
+        window->key_is_due = true;
+    window->plays = false;
+}
+
+void key_record(Window *window)
+{
+    if (!window->key_is_due || window->scene.frame != window->scene_frame) return;
+    window->key_is_due = false;
+    camera_write(window, &window->scene_frame);
+}
+
+// Saves as SCENE-1.png, or with the first number that is free. An animation pauses, since only a complete
+// image is saved.
 static void image_save(Window *window, const char *ending)
 {
     const char *name = scene_name(window), *dot = strrchr(name, '.');
@@ -55,6 +77,7 @@ static void image_save(Window *window, const char *ending)
         text_free(&path);
         text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
     } while (access(text_c(&path), F_OK) == 0);
+    window->plays = false;
     request_send(window); // what is saved is what was asked for before
     frame_loop_save(window->frames, text_c(&path));
     text_free(&path);
@@ -108,6 +131,9 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
         break;
     case SDLK_c:
         camera_print(window);
+        break;
+    case SDLK_k:
+        key_ask(window);
         break;
     case SDLK_s:
         if (window->view == VIEW_COLOR)

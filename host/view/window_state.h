@@ -35,8 +35,8 @@ typedef struct {
     double pivot_at[2];
     double flown_seconds; // the moment up to which the camera has flown
 
-    bool plays;
-    double play_seconds; // the moment, and the frame of the animation then, from which it plays
+    bool plays, key_is_due; // once the scene of its frame was read
+    double play_seconds;    // the moment, and the frame of the animation then, from which it plays
     uint32_t play_frame;
 
     char *message;   // at the bottom, until the next key
@@ -80,6 +80,8 @@ void time_line_follow(Window *window, const double at[2]);
 void time_line_draw(const Window *window);
 
 // window_keys.c
+// Records the camera at this frame of the animation, if it is asked for and the scene of the frame was read.
+void key_record(Window *window);
 void key_press(Window *window, const SDL_KeyboardEvent *event);
 
 // window_draw.c
