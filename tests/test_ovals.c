@@ -88,7 +88,7 @@ typedef struct {
     double t, normal, place; // the largest errors, as parts of their bounds
 } Tally;
 
-// Keeps the largest part of a bound, of which NaN is no part.
+// Keeps the largest part of a bound, which NaN would leave as it is.
 static void tally_add(double *largest, double part)
 {
     if (isnan(part)) fail_msg("NaN");

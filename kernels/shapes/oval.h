@@ -122,7 +122,7 @@ static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
         real unit_t = own.ray.tmax;
         OVAL_LIST(OVAL_HIT)
         *t = unit_t + own.shift;
-        // of a ray that goes on behind a hit, whose t was rounded: the hit itself
+        // a ray that starts at a hit, whose t was rounded, meets that hit once more
         mask passed = hit & !(*t > ray->tmin) & (unit_t > own.ray.tmin);
         if (!lanes_any(passed)) break;
         own.ray.tmin = lanes_select(passed, unit_t, own.ray.tmin);
