@@ -11,7 +11,8 @@
 
 typedef struct {
     const Scene *scene;
-    Mesh all; // triangles, with equal vertices joined
+    bool has_normals; // of vertices
+    Mesh all;         // triangles, with equal vertices joined
     uint32_t *ids;
     uint32_t *owners;    // of each triangle, the index of its object
     uint32_t *first_ids; // of each object
@@ -232,7 +233,7 @@ static void sides_find(void *context, size_t begin, size_t end)
             if (of_this == BEHIND) sides |= NEIGHBOR_HAS_THIS_BEHIND;
             if (of_neighbor == IN_FRONT) sides |= NEIGHBOR_IN_FRONT;
             if (of_neighbor == BEHIND) sides |= NEIGHBOR_BEHIND;
-            if ((of_neighbor == IN_FRONT || of_neighbor == BEHIND) &&
+            if (triangles->has_normals && (of_neighbor == IN_FRONT || of_neighbor == BEHIND) &&
                 lifts_away(triangles, i, across / 3, of_neighbor))
                 sides |= NEIGHBOR_LIFTS_AWAY;
             if (sides == 0) continue;
@@ -250,6 +251,7 @@ void neighbors_find(CompiledScene *compiled, const Scene *scene, const CompileSe
     flat_array_renew(compiled, FLAT_TRIANGLE_NEIGHBORS, is_wanted ? compiled->arrays[FLAT_OBJECTS].count : 0);
     if (!is_wanted) return;
     Triangles triangles = triangles_open(scene);
+    triangles.has_normals = compiled->arrays[FLAT_TRIANGLE_NORMALS].count > 0;
     edges_match(&triangles);
     triangles.neighbors = compiled->arrays[FLAT_TRIANGLE_NEIGHBORS].items;
     parallel_run(triangles.all.triangle_count, FLAT_RANGE_MIN, sides_find, &triangles);
