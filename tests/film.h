@@ -8,7 +8,7 @@
 bool tests_are_long(void);
 
 // Returns the lanes to compare, up to a 0: 1 and the device's default, which most other tests use, or 4 if
-// that is 1, except on a GPU, where nobody uses 4 and NVIDIA's compiler takes minutes for every feature; in
+// that is 1, except on a GPU, whose kernels are slower at 4 and take NVIDIA's compiler minutes; in
 // long tests those of 1, 4, 8 and 16 that the device runs.
 const uint32_t *tested_lanes(const Device *device);
 

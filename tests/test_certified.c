@@ -152,20 +152,27 @@ static Object round_in_view(size_t index)
     }
 }
 
-// A round shape under a map x + w (n . (x - p)), which keeps the line that it nearly touches at p.
+// The map x + w (n . (x - p)).
+static Affine affine_along(Vector3 w, Vector3 n, Vector3 p)
+{
+    const double along[3] = {n.x, n.y, n.z}, across[3] = {w.x, w.y, w.z};
+    Affine affine = affine_identity;
+    for (int i = 0; i < 3; i++) {
+        for (int k = 0; k < 3; k++)
+            affine.rows[i][k] += across[i] * along[k];
+        affine.rows[i][3] = -across[i] * vector_dot(n, p);
+    }
+    return affine;
+}
+
+// A round shape under a map that keeps the line that it nearly touches.
 static Object oval_in_view(const Scene *scene, size_t index)
 {
     Object object = index % 3 > 0 ? round_in_view(index) : flat_in_view(index % 2 > 0 ? 5 : 3);
     const Vector3 n = vector_normalize(vector_cross(view, random_unit_vector(&random_state))),
                   w = vector_scale(random_unit_vector(&random_state),
                                    random_between(&random_state, 0.2, 0.8));
-    const double along[3] = {n.x, n.y, n.z}, across[3] = {w.x, w.y, w.z};
-    Affine affine = affine_identity;
-    for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++)
-            affine.rows[i][k] += across[i] * along[k];
-        affine.rows[i][3] = -across[i] * vector_dot(n, viewed);
-    }
+    const Affine affine = affine_along(w, n, viewed);
     assert_null(object_transform((Scene *)scene, &object, &affine));
     return object;
 }
@@ -427,13 +434,7 @@ static Object oval_before_eye(Scene *scene, unsigned seed)
     const Vector3 n = random_unit_vector(&random_state),
                   w = vector_add(vector_scale(n, random_between(&random_state, -0.9, -0.5)),
                                  vector_scale(random_unit_vector(&random_state), 0.2));
-    const double along[3] = {n.x, n.y, n.z}, across[3] = {w.x, w.y, w.z};
-    Affine affine = affine_identity;
-    for (int i = 0; i < 3; i++) {
-        for (int k = 0; k < 3; k++)
-            affine.rows[i][k] += across[i] * along[k];
-        affine.rows[i][3] = -across[i] * vector_dot(n, center);
-    }
+    const Affine affine = affine_along(w, n, center);
     assert_null(object_transform(scene, &object, &affine));
     assert_int_equal(object.kind, SHAPE_OVAL);
     return object;

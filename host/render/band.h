@@ -10,8 +10,8 @@ typedef struct {
     size_t layer_begins[LAYER_COUNT]; // offsets in the film, in bytes
     size_t layer_sizes[LAYER_COUNT];  // in bytes, for all rows
     cl_mem ray_counts;
-    // At `certified`, a bit for each pixel, tile by tile, set where its color is uncertain. In a list, x, y
-    // and the index in the band of each pixel, and then of each the number of its uncertain samples.
+    // At `certified`, a bit for each pixel, tile by tile, set where its color is uncertain. In a list, first
+    // each pixel's x, y and index in the band, then each pixel's number of uncertain samples.
     cl_mem doubts;
     cl_mem center_doubts; // the same bits for the AOVs' rays
     cl_mem band_film;     // in a list, where its colors are to go, or NULL
