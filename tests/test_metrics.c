@@ -1,8 +1,8 @@
 // Tests image metrics. Expected values are computed by hand, or by the FLIP of its authors (flip-evaluator
 // 1.7 of PyPI). tests/test_diff_metrics.py checks more of them.
+#include "host/image/flip.h"
 #include "host/image/heatmap.h"
-#include "host/measure/flip.h"
-#include "host/measure/image_metrics.h"
+#include "host/image/image_metrics.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>

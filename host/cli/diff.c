@@ -6,9 +6,9 @@
 #include "host/cli/format.h"
 #include "host/cli/options.h"
 #include "host/cli/report_json.h"
+#include "host/image/flip.h"
 #include "host/image/heatmap.h"
-#include "host/measure/flip.h"
-#include "host/measure/image_metrics.h"
+#include "host/image/image_metrics.h"
 #include <getopt.h>
 #include <math.h>
 #include <stdio.h>

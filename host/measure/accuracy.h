@@ -3,9 +3,9 @@
 // figure.
 #pragma once
 
+#include "host/image/image_metrics.h"
 #include "host/measure/bench.h"
 #include "host/measure/comparison.h"
-#include "host/measure/image_metrics.h"
 #include "host/render/film.h"
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,9 +1,9 @@
 #include "host/measure/error_budget.h"
 
 #include "host/base/memory.h"
+#include "host/image/flip.h"
+#include "host/image/image_metrics.h"
 #include "host/image/srgb.h"
-#include "host/measure/flip.h"
-#include "host/measure/image_metrics.h"
 #include <math.h>
 #include <stdlib.h>
 
