@@ -59,8 +59,8 @@ int main(int argument_count, char **arguments)
     GlintTracer *tracer;
     const GlintTraceSettings precision = {.size = sizeof precision, .precision = GLINT_CERTIFIED};
     check(glint_tracer_open(device, scene, &precision, &tracer, &messages), &messages);
-    const double origin[3] = {0, 1, -6}, direction[3] = {0, 0, 1};
-    const GlintRays rays = {
+    const double origin[3] = {0, 1, -6}, direction[3] = {0, 0, 1}, tmax = 3.5;
+    GlintRays rays = {
         .size = sizeof rays, .count = 1, .real = GLINT_FLOAT64, .origins = origin, .directions = direction};
     uint32_t object;
     double low, high;
@@ -70,6 +70,11 @@ int main(int argument_count, char **arguments)
     check(glint_trace(tracer, &rays, &hits, &messages), &messages);
     printf("object %u, t from %.9g to %.9g, %s\n", object, low, high,
            certainty == GLINT_UNCERTAIN ? "uncertain" : "certain");
+    rays.tmax = &tmax;
+    uint8_t is_occluded;
+    GlintOcclusion occlusion = {.size = sizeof occlusion, .occluded = &is_occluded};
+    check(glint_trace_occlusion(tracer, &rays, &occlusion, &messages), &messages);
+    printf("%s before t = %g\n", is_occluded ? "something" : "nothing", tmax);
 
     glint_tracer_close(tracer);
     glint_scene_free(scene);

@@ -181,6 +181,42 @@ class Rays(unittest.TestCase):
         np.testing.assert_array_equal(found[0], found[2])
 
 
+class Occlusion(unittest.TestCase):
+    def test_shadows_of_a_sphere(self):
+        """A sphere hides some points of a plane from a light, with more rays than a batch has."""
+        scene = glint.Scene(SPHERE)
+        points = np.random.default_rng(6).uniform(-4, 4, (70000, 3))
+        points[:, 2] = 2
+        light = np.array([0, 0.5, -3])
+        offset = np.linalg.norm(np.cross(points - light, light) / np.linalg.norm(points - light, axis=1)[:, None], axis=1)
+        clear = np.abs(offset - 1) > 1e-4
+        for dtype in np.float32, np.float64:
+            for precision in glint.PRECISIONS:
+                rays = points.astype(dtype), (light - points).astype(dtype)
+                occluded, certain = scene.occluded(*rays, precision, tmax=dtype(1), return_certain=True)
+                self.assertEqual((occluded.dtype, certain.dtype), (bool, bool))
+                np.testing.assert_array_equal(occluded[clear], offset[clear] < 1)
+                hits = scene.trace(*rays, precision, tmax=dtype(1))
+                np.testing.assert_array_equal(occluded, hits.hit)
+                np.testing.assert_array_equal(certain, hits.certain)
+                self.assertTrue(certain.mean() > 0.99 if precision == "certified" else not certain.any())
+        self.assertTrue(0.05 < (offset < 1).mean() < 0.5)
+
+    def test_ends(self):
+        """Only what lies strictly between the ends occludes: a cube's faces at t 1 and 2."""
+        scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
+        below, above = np.nextafter((1, 2), 0), np.nextafter((1, 2), 3)
+        tmin, tmax = [0, 0, 0, 1, below[1], 2], [below[0], 1, above[0], 2, above[1], 3]
+        occluded = scene.occluded([[0.25, 0.5, -1]] * 6, [0, 0, 1], "double", tmin, tmax)
+        self.assertEqual(occluded.tolist(), [False, False, True, False, True, False])
+        # certified compares the bounds of t with the end
+        occluded, certain = scene.occluded([[0.25, 0.5, -1]] * 3, [0, 0, 1], "certified", tmax=[0.999, 1, 1.001], return_certain=True)
+        self.assertEqual((occluded.tolist(), certain.tolist()), ([False, False, True], [True, False, True]))
+        self.assertEqual(scene.occluded(np.zeros((0, 3)), np.zeros((0, 3))).shape, (0,))
+        with self.assertRaisesRegex(glint.SceneError, "ray 1: expected finite numbers"):
+            scene.occluded([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0, 0]])
+
+
 class AllHits(unittest.TestCase):
     def setUp(self):
         spheres = [{"sphere": {"center": [0, 0, 0], "radius": radius}} for radius in range(1, 6)]

@@ -167,8 +167,8 @@ typedef struct {
     uint32_t lanes; // as in GlintRenderSettings
 } GlintTraceSettings;
 
-// Prepares a scene for many calls of glint_trace and glint_trace_all. The scene may be freed afterwards, but
-// the device must outlive the tracer. Sets *tracer to NULL on failure.
+// Prepares a scene for many calls of the functions that trace. The scene may be freed afterwards, but the
+// device must outlive the tracer. Sets *tracer to NULL on failure.
 GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
                               const GlintTraceSettings *settings, GlintTracer **tracer, char **messages);
 void glint_tracer_close(GlintTracer *tracer); // accepts NULL
@@ -209,6 +209,18 @@ typedef struct {
 // Finds the nearest hit of each ray. A failure, such as a ray that is not as stated above, leaves the arrays
 // undefined.
 GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages);
+
+// Arrays of one value per ray, which the caller owns, or NULL where not wanted.
+typedef struct {
+    size_t size;
+    uint8_t *occluded;  // 1 where anything lies strictly between tmin and tmax, otherwise 0
+    uint8_t *certainty; // GlintCertainty, as in GlintHits
+} GlintOcclusion;
+
+// Finds whether each ray hits anything. It traces nearest hits, as glint_trace does and in the same time, and
+// is as certain as they are. A failure leaves the arrays undefined.
+GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, GlintOcclusion *occlusion,
+                                  char **messages);
 
 // Hits of many rays, sorted by ray and then by t. The library allocates the arrays.
 typedef struct {

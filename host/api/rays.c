@@ -79,8 +79,15 @@ static void vector_write(double *vectors, size_t index, const double vector[3], 
         vectors[3 * index + axis] = is_hit ? vector[axis] : 0;
 }
 
-static void hit_write(const GlintHits *hits, size_t index, TraceHit *hit, int exponent)
+// The caller's arrays, or NULL where not wanted.
+typedef struct {
+    GlintHits hits;
+    uint8_t *occluded;
+} TraceArrays;
+
+static void hit_write(const TraceArrays *arrays, size_t index, TraceHit *hit, int exponent)
 {
+    const GlintHits *hits = &arrays->hits;
     const bool is_hit = hit->object != UINT32_MAX, is_certain = hit->certainty != TRACE_UNCERTAIN;
     trace_hit_unscale(hit, exponent);
     if (hits->object) hits->object[index] = hit->object;
@@ -93,11 +100,12 @@ static void hit_write(const GlintHits *hits, size_t index, TraceHit *hit, int ex
                                           [TRACE_CERTAIN] = GLINT_CERTAIN,
                                           [TRACE_CERTAIN_IN_DOUBLE] = GLINT_CERTAIN_IN_DOUBLE};
     if (hits->certainty) hits->certainty[index] = certainties[hit->certainty];
+    if (arrays->occluded) arrays->occluded[index] = is_hit;
 }
 
 // Traces rays in batches, which bounds the memory that they take. False with a message, or if the device
 // failed.
-static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const GlintHits *hits,
+static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
                        MessageList *messages)
 {
     const size_t batch = rays->count < BATCH_RAYS ? rays->count : BATCH_RAYS;
@@ -111,7 +119,7 @@ static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const GlintHi
             is_sound = ray_read(&scaled[i], &exponents[i], rays, first + i, tracer->precision, messages);
         is_sound = is_sound && renderer_trace_closest(tracer->renderer, scaled, count, found);
         for (size_t i = 0; i < count && is_sound; i++)
-            hit_write(hits, first + i, &found[i], exponents[i]);
+            hit_write(arrays, first + i, &found[i], exponents[i]);
     }
     free(exponents);
     free(found);
@@ -129,17 +137,36 @@ bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages)
     return true;
 }
 
+// Traces rays and ends the call.
+static GlintStatus call_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
+                              MessageList *list, char **messages)
+{
+    pthread_mutex_lock(&tracer->device->mutex);
+    const bool is_sound = rays_trace(tracer, rays, arrays, list);
+    const GlintStatus status =
+        call_end(list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+    pthread_mutex_unlock(&tracer->device->mutex);
+    return status;
+}
+
 GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages)
 {
     MessageList list = {0};
     GlintRays given;
-    GlintHits arrays;
-    bool is_sound = rays_read(&given, rays, &list) && struct_read(&arrays, sizeof arrays, hits, &list);
-    if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
-    pthread_mutex_lock(&tracer->device->mutex);
-    is_sound = rays_trace(tracer, &given, &arrays, &list);
-    const GlintStatus status =
-        call_end(&list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
-    pthread_mutex_unlock(&tracer->device->mutex);
-    return status;
+    TraceArrays arrays = {0};
+    if (!rays_read(&given, rays, &list) || !struct_read(&arrays.hits, sizeof arrays.hits, hits, &list))
+        return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
+    return call_trace(tracer, &given, &arrays, &list, messages);
+}
+
+GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, GlintOcclusion *occlusion,
+                                  char **messages)
+{
+    MessageList list = {0};
+    GlintRays given;
+    GlintOcclusion own;
+    if (!rays_read(&given, rays, &list) || !struct_read(&own, sizeof own, occlusion, &list))
+        return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
+    const TraceArrays arrays = {.hits.certainty = own.certainty, .occluded = own.occluded};
+    return call_trace(tracer, &given, &arrays, &list, messages);
 }

@@ -28,6 +28,7 @@ Rays = structure("Rays", ("count", c_size_t), ("real", c_int), ("origins", c_voi
 AllHits = structure("AllHits", ("count", c_size_t), ("ray", POINTER(c_size_t)), ("object", POINTER(c_uint32)),
                     *((name, POINTER(c_double)) for name in ("t", "normal", "position")))
 Hits = structure("Hits", *((name, c_void_p) for name in ("object", "t", "low", "high", "normal", "position", "certainty")))
+Occlusion = structure("Occlusion", ("occluded", c_void_p), ("certainty", c_void_p))
 
 _MESSAGES = POINTER(c_void_p)
 _FUNCTIONS = {
@@ -48,6 +49,7 @@ _FUNCTIONS = {
     "glint_tracer_open": (c_int, c_void_p, c_void_p, POINTER(TraceSettings), POINTER(c_void_p), _MESSAGES),
     "glint_tracer_close": (None, c_void_p),
     "glint_trace": (c_int, c_void_p, POINTER(Rays), POINTER(Hits), _MESSAGES),
+    "glint_trace_occlusion": (c_int, c_void_p, POINTER(Rays), POINTER(Occlusion), _MESSAGES),
     "glint_trace_all": (c_int, c_void_p, POINTER(Rays), c_size_t, POINTER(AllHits), _MESSAGES),
     "glint_all_hits_free": (None, POINTER(AllHits)),
 }

@@ -32,7 +32,8 @@ class RayMeshIntersector:
 
     def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
         """Returns whether each ray hits anything."""
-        return self.hits(ray_origins, ray_directions).hit
+        return self._scene.occluded(np.asarray(ray_origins, np.float64), np.asarray(ray_directions, np.float64), self._precision,
+                                    device=self._device)
 
     def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True) \
             -> tuple[np.ndarray, np.ndarray, np.ndarray]:
