@@ -1,4 +1,4 @@
-// Renders a scene to a PPM file and traces one ray along z:
+// Renders a scene to a PPM file, prints the image's error and traces one ray along z:
 //     cc example.c $(pkg-config --cflags --libs glint) -o example
 //     ./example scene.yaml image.ppm
 #include <glint.h>
@@ -20,6 +20,45 @@ static int show_progress(void *context, double fraction_done)
     return 0;
 }
 
+enum { WIDTH = 320, HEIGHT = 180, VALUES = 3 * WIDTH * HEIGHT };
+
+static void render(GlintDevice *device, const GlintScene *scene, GlintPrecision precision, double *color)
+{
+    char *messages;
+    const GlintRenderSettings settings = {.size = sizeof settings,
+                                          .width = WIDTH,
+                                          .height = HEIGHT,
+                                          .samples = 4,
+                                          .bounces = 5,
+                                          .precision = precision,
+                                          .progress = show_progress,
+                                          .context = stderr};
+    GlintImage image = {.size = sizeof image, .color = color};
+    check(glint_render(device, scene, &settings, &image, &messages), &messages);
+}
+
+// Prints how far an image in float is from one in double.
+static void print_error(GlintDevice *device, const GlintScene *scene, const double *color)
+{
+    GlintDeviceInfo info = {.size = sizeof info};
+    glint_device_info(device, &info);
+    if (!info.has_double) return;
+    char *messages;
+    double *reference = calloc(VALUES, sizeof *reference);
+    render(device, scene, GLINT_DOUBLE, reference);
+    const GlintImagePair images = {.size = sizeof images,
+                                   .real = GLINT_FLOAT64,
+                                   .width = WIDTH,
+                                   .height = HEIGHT,
+                                   .channels = 3,
+                                   .reference = reference,
+                                   .image = color};
+    GlintImageMetrics metrics = {.size = sizeof metrics};
+    check(glint_images_compare(&images, &metrics, &messages), &messages);
+    printf("RMSE %.1e, mean FLIP %.1e\n", metrics.rmse, metrics.flip_mean);
+    free(reference);
+}
+
 // Returns the sRGB value of a linear one.
 static unsigned char encode(double light)
 {
@@ -37,21 +76,13 @@ int main(int argument_count, char **arguments)
     check(glint_device_open(NULL, &device, &messages), &messages);
     check(glint_scene_load(arguments[1], NULL, &scene, &messages), &messages);
 
-    const uint32_t width = 320, height = 180;
-    double *color = calloc(3 * (size_t)width * height, sizeof *color);
-    const GlintRenderSettings settings = {.size = sizeof settings,
-                                          .width = width,
-                                          .height = height,
-                                          .samples = 4,
-                                          .bounces = 5,
-                                          .progress = show_progress,
-                                          .context = stderr};
-    GlintImage image = {.size = sizeof image, .color = color};
-    check(glint_render(device, scene, &settings, &image, &messages), &messages);
+    double *color = calloc(VALUES, sizeof *color);
+    render(device, scene, GLINT_SINGLE, color);
+    print_error(device, scene, color);
     FILE *file = fopen(arguments[2], "wb");
     if (!file) return EXIT_FAILURE;
-    fprintf(file, "P6 %u %u 255\n", width, height);
-    for (size_t i = 0; i < 3 * (size_t)width * height; i++)
+    fprintf(file, "P6 %d %d 255\n", WIDTH, HEIGHT);
+    for (size_t i = 0; i < VALUES; i++)
         fputc(encode(color[i]), file);
     fclose(file);
     free(color);

@@ -1,9 +1,10 @@
 #!/usr/bin/env -S python3 -B
-"""The Python package over libglint: scenes, images, rays with bounds, the drop-in for trimesh, errors and threads.
+"""The Python package over libglint: scenes, images and their metrics, rays with bounds, the drop-in for trimesh, errors and threads.
 
 run_tests: sanitize-long-only"""
 import copy
 import ctypes
+import dataclasses
 import json
 import os
 import pickle
@@ -215,6 +216,72 @@ class Occlusion(unittest.TestCase):
         self.assertEqual(scene.occluded(np.zeros((0, 3)), np.zeros((0, 3))).shape, (0,))
         with self.assertRaisesRegex(glint.SceneError, "ray 1: expected finite numbers"):
             scene.occluded([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0, 0]])
+
+
+class Compare(unittest.TestCase):
+    def test_equals_the_program(self):
+        """The metrics are those that glint diff reports of NPY files with the arrays."""
+        random = np.random.default_rng(7)
+        color = random.uniform(-0.2, 1.3, (18, 32, 3))
+        other = color + random.normal(size=color.shape) * 10.0 ** random.uniform(-6, -2, color.shape)
+        t = np.where(color[:, :, 0] < 0, np.inf, 5 + color[:, :, 0])
+        broken = other.copy()
+        broken[3, 4, 1], broken[5, 6] = np.nan, np.inf
+        for reference, image in (color, other), (color, broken), (broken, broken), (t, t + 1e-9), (t, other[:, :, 0]), (color[:, :, :2], other[:, :, 1:]):
+            for dtype in np.float32, np.float64:
+                arrays = reference.astype(dtype), image.astype(dtype)
+                metrics = glint.compare(*arrays)
+                with tempfile.TemporaryDirectory() as folder:
+                    paths = [f"{folder}/{i}.npy" for i in range(2)]
+                    for path, array in zip(paths, arrays):
+                        np.save(path, array)
+                    report = json.loads(subprocess.run([BUILD / "glint", "diff", *paths, "--format", "json"], check=False, capture_output=True).stdout)
+                linear, pixels, worst = report["linear"], report["nonfinite_pixels"], report["worst"]
+                srgb8, flip = report.get("srgb8", {"off_by_1": 0, "off_by_2_or_more": 0, "psnr": None}), report.get("flip", {"mean": None, "max": None})
+                expected = [report["differing_values"], report["unmatched_values"], pixels["reference"], pixels["image"], linear["values"],
+                            linear["max_abs"], linear["rmse"], linear["bias"], linear["p99_9"], linear["psnr"], linear["rel_mse"], report["max_ulp"],
+                            worst["x"], worst["y"], srgb8["off_by_1"], srgb8["off_by_2_or_more"], srgb8["psnr"], flip["mean"], flip["max"]]
+                found = [value if np.isfinite(value) else None for value in dataclasses.astuple(metrics)]
+                self.assertEqual(found, expected)
+
+    def test_accuracy_of_a_precision(self):
+        """The error of a render in float is its difference from one in double. A distance in float is as many ulp off."""
+        scene = glint.Scene(SPHERE)
+        single, strict, double = (scene.render_layers(("color", "t"), 64, 48, precision=precision) for precision in ("single", "strict", "double"))
+        for image in single, strict:
+            error = glint.compare(double["color"], image["color"])
+            self.assertTrue(0 < error.rmse < 1e-5 and error.max_abs < 1e-4 and error.flip_mean < 1e-4 and error.psnr > 100, error)
+            ulp = glint.compare(double["t"].astype(np.float32), image["t"].astype(np.float32)).max_ulp
+            self.assertTrue(0 < ulp < 100, ulp)
+        equal = glint.compare(double["color"], double["color"].copy())
+        self.assertEqual((equal.differing_values, equal.rmse, equal.psnr, equal.flip_max), (0, 0, np.inf, 0))
+
+    def test_shapes(self):
+        metrics = glint.compare([1, 2, 3], np.array([1, 2.5, 3]))
+        self.assertEqual((metrics.compared_values, metrics.max_abs, metrics.worst_x, metrics.worst_y), (3, 0.5, 1, 0))
+        image = np.random.default_rng(8).random((9, 16, 3))
+        self.assertEqual(glint.compare(image[::-1, ::2], np.flipud(image)[:, ::2].copy()).differing_values, 0)
+        for wrong in (image, image[:8]), (image, image[:, :, 0]), (image[None], image[None]):
+            with self.assertRaisesRegex(ValueError, "of one shape"):
+                glint.compare(*wrong)
+        with self.assertRaisesRegex(glint.SceneError, "have pixels and channels, not 0 x 9 with 3"):
+            glint.compare(image[:, :0], image[:, :0])
+
+    def test_other_versions(self):
+        """A caller of an earlier version gets the metrics that it knows, and one of a later version 0 for those that this one lacks."""
+        reference, image = np.zeros((2, 2, 3)), np.ones((2, 2, 3))
+        pair = glint._c.ImagePair(ctypes.sizeof(glint._c.ImagePair), 1, 2, 2, 3, reference.ctypes.data, image.ctypes.data)
+
+        class Later(glint._c.ImageMetrics):
+            _fields_ = [("later", ctypes.c_uint64), ("beyond", ctypes.c_uint64)]
+        earlier, own, later = Later.unmatched_values.offset, ctypes.sizeof(glint._c.ImageMetrics), Later.beyond.offset
+        for size in 0, earlier, own, later:
+            metrics, messages = Later(size=size, differing_values=7, unmatched_values=7, later=7, beyond=7), ctypes.c_void_p()
+            status = glint._c.library.glint_images_compare(ctypes.byref(pair), ctypes.byref(metrics), ctypes.byref(messages))
+            self.assertEqual((status, bool(messages)), (0, False) if size else (1, True))
+            glint._c.library.glint_text_free(messages)
+            self.assertEqual((metrics.size, metrics.differing_values, metrics.unmatched_values, metrics.later, metrics.beyond),
+                             (size, 12 if size else 7, 0 if size >= own else 7, 0 if size == later else 7, 7))
 
 
 class AllHits(unittest.TestCase):

@@ -122,15 +122,6 @@ static bool rays_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hi
     return is_sound;
 }
 
-// Sets the members that the caller's version of the struct has.
-static void all_hits_set(GlintAllHits *hits, const GlintAllHits *found)
-{
-    const size_t size = hits->size, own = sizeof *found;
-    memset(hits, 0, size);
-    memcpy(hits, found, size < own ? size : own);
-    hits->size = size;
-}
-
 GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,
                             char **messages)
 {
@@ -141,7 +132,7 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
         message_error(&list, "the size of a GlintAllHits is not set");
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     }
-    all_hits_set(hits, &found);
+    struct_write(hits, &found, sizeof found);
     bool is_sound = rays_read(&given, rays, &list);
     if (is_sound && tracer->precision == GLINT_CERTIFIED)
         is_sound = message_error(&list, "all hits have no bounds: trace them at another precision");
@@ -152,7 +143,7 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
         call_end(&list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     pthread_mutex_unlock(&tracer->device->mutex);
     if (status == GLINT_DONE)
-        all_hits_set(hits, &found);
+        struct_write(hits, &found, sizeof found);
     else
         glint_all_hits_free(&found);
     return status;

@@ -18,6 +18,15 @@ bool struct_read(void *own, size_t own_size, const void *given, MessageList *mes
     return true;
 }
 
+void struct_write(void *given, const void *own, size_t own_size)
+{
+    size_t size;
+    memcpy(&size, given, sizeof size);
+    memset(given, 0, size);
+    memcpy(given, own, size < own_size ? size : own_size);
+    memcpy(given, &size, sizeof size);
+}
+
 GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages)
 {
     if (compute && !compute_ok(compute)) {

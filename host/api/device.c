@@ -2,12 +2,10 @@
 
 #include "host/base/memory.h"
 #include <stdlib.h>
-#include <string.h>
 
 static void info_set(GlintDeviceInfo *info, const Device *device)
 {
-    GlintDeviceInfo own = {.size = info->size,
-                           .index = device->index,
+    GlintDeviceInfo own = {.index = device->index,
                            .compute_units = device->compute_units,
                            .memory_bytes = device->memory_bytes,
                            .is_gpu = (device->type & CL_DEVICE_TYPE_GPU) != 0,
@@ -17,9 +15,7 @@ static void info_set(GlintDeviceInfo *info, const Device *device)
     snprintf(own.name, sizeof own.name, "%s", device->name);
     snprintf(own.platform, sizeof own.platform, "%s", device->platform_name);
     snprintf(own.driver, sizeof own.driver, "%s", device->driver);
-    const size_t size = info->size;
-    memset(info, 0, size);
-    memcpy(info, &own, size < sizeof own ? size : sizeof own);
+    struct_write(info, &own, sizeof own);
 }
 
 GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *count, char **messages)

@@ -1,4 +1,4 @@
-// libglint: renders scenes and traces rays on OpenCL devices.
+// libglint: renders scenes and traces rays on OpenCL devices, and measures the errors of images.
 //
 // Functions that can fail return a GlintStatus. Functions with a `messages` parameter, which may be NULL, set
 // *messages to their warnings and errors, one or more lines each, or to NULL if there are none. The caller
@@ -240,6 +240,38 @@ typedef struct {
 GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *hits,
                             char **messages);
 void glint_all_hits_free(GlintAllHits *hits); // accepts NULL
+
+// Errors of images
+
+// An image and its reference: arrays of height x width x channels values from the top left, which the caller
+// owns. 3 channels are colors in linear light. Any other number of channels is data, such as t.
+typedef struct {
+    size_t size;
+    GlintReal real; // of both arrays
+    uint32_t width, height, channels;
+    const void *reference;
+    const void *image;
+} GlintImagePair;
+
+// The figures of glint diff, with the names of its JSON report.
+typedef struct {
+    size_t size;
+    uint64_t differing_values; // in any bit
+    uint64_t unmatched_values; // pairs of which one is infinite or NaN and the other is not the same
+    uint64_t nonfinite_reference, nonfinite_image; // pixels
+    // The pairs of finite values, and their errors.
+    uint64_t compared_values;
+    double max_abs, rmse, bias, p99_9, psnr, rel_mse;
+    double max_ulp; // in units in the last place of the arrays' type; infinite if a value is unmatched
+    uint32_t worst_x, worst_y; // the pixel with the largest error
+    // Colors as a screen shows them. For data the counts are 0 and the doubles NaN.
+    uint64_t srgb8_off_by_1, srgb8_off_by_2_or_more; // 8-bit values
+    double srgb8_psnr, flip_mean, flip_max;
+} GlintImageMetrics;
+
+// Compares an image with its reference and fills *metrics, whose size the caller has set. The error that a
+// precision makes shows in a render at it, compared with one at a higher precision.
+GlintStatus glint_images_compare(const GlintImagePair *images, GlintImageMetrics *metrics, char **messages);
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

@@ -26,6 +26,10 @@ struct GlintTracer {
 // its size is invalid or if a member that this version does not know is not 0.
 bool struct_read(void *own, size_t own_size, const void *given, MessageList *messages);
 
+// Copies a struct over the caller's, which may be of another version of the interface and keeps its size.
+// Members that this version does not know become 0.
+void struct_write(void *given, const void *own, size_t own_size);
+
 // Ends a call: passes its messages to the caller, with the failure of the Compute if it has one; the Compute
 // may be NULL. Returns `status`, or the status of the failure.
 GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages);

@@ -17,14 +17,15 @@ import os
 import threading
 import warnings
 import weakref
+from dataclasses import dataclass, fields
 from typing import Any, Callable, Literal, Mapping, NamedTuple, Optional, Sequence, Union, overload
 
 import numpy as np
 
 from . import _library as _c
 
-__all__ = ["AllHits", "Device", "DeviceError", "GlintWarning", "Hits", "LAYERS", "MISS", "PRECISIONS", "Scene", "SceneError", "Stopped", "devices",
-           "load", "load_mesh", "version"]
+__all__ = ["AllHits", "Device", "DeviceError", "GlintWarning", "Hits", "ImageMetrics", "LAYERS", "MISS", "PRECISIONS", "Scene", "SceneError",
+           "Stopped", "compare", "devices", "load", "load_mesh", "version"]
 
 MISS = 0xFFFFFFFF  #: the object of a miss
 PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
@@ -400,6 +401,50 @@ def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) ->
     for tracer in tracers.values():
         _c.library.glint_tracer_close(tracer)
     _c.library.glint_scene_free(handle)
+
+
+@dataclass(frozen=True)
+class ImageMetrics:
+    """How far an image is from its reference: the figures of `glint diff`, with the names of its JSON report.
+
+    max_abs to rel_mse compare the values that are finite in both. max_ulp is in units in the last place of the arrays' type.
+    srgb8_off_by_1 to flip_max compare colors as a screen shows them, and are 0 or NaN for data.
+    """
+    differing_values: int  #: in any bit
+    unmatched_values: int  #: infinite or NaN in one, and not the same in the other
+    nonfinite_reference: int  #: pixels
+    nonfinite_image: int
+    compared_values: int
+    max_abs: float
+    rmse: float
+    bias: float
+    p99_9: float
+    psnr: float
+    rel_mse: float
+    max_ulp: float
+    worst_x: int
+    worst_y: int
+    srgb8_off_by_1: int
+    srgb8_off_by_2_or_more: int
+    srgb8_psnr: float
+    flip_mean: float
+    flip_max: float
+
+
+def compare(reference: Any, image: Any) -> ImageMetrics:
+    """Compares an image with its reference: (height, width, 3) are colors in linear light, other shapes up to three dimensions
+    data, such as t. Arrays are compared as float32 if both are, else as float64."""
+    given = np.asarray(reference), np.asarray(image)
+    shape = given[0].shape
+    if shape != given[1].shape or not 1 <= len(shape) <= 3:
+        raise ValueError(f"compare: expected two arrays of one shape with 1 to 3 dimensions, not {shape} and {given[1].shape}")
+    dtype = np.float32 if all(array.dtype == np.float32 for array in given) else np.float64
+    arrays = [np.ascontiguousarray(array, dtype) for array in given]
+    height, width, channels = (_count("compare", side) for side in {1: (1, *shape, 1), 2: (*shape, 1), 3: shape}[len(shape)])
+    pair = _c.ImagePair(ctypes.sizeof(_c.ImagePair), 0 if dtype == np.float32 else 1, width, height, channels, *map(_pointer, arrays))
+    found, messages = _c.ImageMetrics(ctypes.sizeof(_c.ImageMetrics)), ctypes.c_void_p()
+    _check(_c.library.glint_images_compare(ctypes.byref(pair), ctypes.byref(found), ctypes.byref(messages)), messages)
+    return ImageMetrics(*(getattr(found, field.name) for field in fields(ImageMetrics)))
 
 
 def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,

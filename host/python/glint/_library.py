@@ -29,6 +29,13 @@ AllHits = structure("AllHits", ("count", c_size_t), ("ray", POINTER(c_size_t)), 
                     *((name, POINTER(c_double)) for name in ("t", "normal", "position")))
 Hits = structure("Hits", *((name, c_void_p) for name in ("object", "t", "low", "high", "normal", "position", "certainty")))
 Occlusion = structure("Occlusion", ("occluded", c_void_p), ("certainty", c_void_p))
+ImagePair = structure("ImagePair", ("real", c_int), ("width", c_uint32), ("height", c_uint32), ("channels", c_uint32), ("reference", c_void_p),
+                      ("image", c_void_p))
+ImageMetrics = structure("ImageMetrics", *((name, c_uint64) for name in ("differing_values", "unmatched_values", "nonfinite_reference",
+                                                                         "nonfinite_image", "compared_values")),
+                         *((name, c_double) for name in ("max_abs", "rmse", "bias", "p99_9", "psnr", "rel_mse", "max_ulp")),
+                         ("worst_x", c_uint32), ("worst_y", c_uint32), ("srgb8_off_by_1", c_uint64), ("srgb8_off_by_2_or_more", c_uint64),
+                         *((name, c_double) for name in ("srgb8_psnr", "flip_mean", "flip_max")))
 
 _MESSAGES = POINTER(c_void_p)
 _FUNCTIONS = {
@@ -52,6 +59,7 @@ _FUNCTIONS = {
     "glint_trace_occlusion": (c_int, c_void_p, POINTER(Rays), POINTER(Occlusion), _MESSAGES),
     "glint_trace_all": (c_int, c_void_p, POINTER(Rays), c_size_t, POINTER(AllHits), _MESSAGES),
     "glint_all_hits_free": (None, POINTER(AllHits)),
+    "glint_images_compare": (c_int, POINTER(ImagePair), POINTER(ImageMetrics), _MESSAGES),
 }
 
 
