@@ -1,5 +1,5 @@
 // Renders a scene to a PPM file, prints the image's error and traces one ray along z:
-//     cc example.c $(pkg-config --cflags --libs glint) -o example
+//     cc example.c $(pkg-config --cflags --libs glint) -lm -o example
 //     ./example scene.yaml image.ppm
 #include <glint.h>
 #include <math.h>

@@ -203,6 +203,19 @@ class Occlusion(unittest.TestCase):
                 self.assertTrue(certain.mean() > 0.99 if precision == "certified" else not certain.any())
         self.assertTrue(0.05 < (offset < 1).mean() < 0.5)
 
+    def test_shadows_of_a_render(self):
+        """Rays from the light to the hit points of an image, with the advised tmax, find its shadows."""
+        small = {"sphere": {"center": [1.2, 1.6, -2], "radius": 0.4}}
+        scene = glint.Scene({**SPHERE, "objects": [*SPHERE["objects"], small]})
+        layers = scene.render_layers(("object", "position", "shadow"), 64, 48, precision="double")
+        hit = layers["object"] != glint.MISS
+        points, shadow = layers["position"][hit], layers["shadow"][hit][:, 0] == 1
+        light = np.broadcast_to([3.0, 4.0, -5.0], points.shape)
+        for precision in "double", "certified":
+            np.testing.assert_array_equal(scene.occluded(light, points - light, precision, tmax=1 - 1e-6), shadow)
+        facing = (layers["object"][hit] == 0) & (np.einsum("ij,ij->i", points, light) > 1.1)
+        self.assertTrue(0 < (shadow & facing).sum() < facing.sum(), "the small sphere shades a part of the large one")
+
     def test_ends(self):
         """Only what lies strictly between the ends occludes: a cube's faces at t 1 and 2."""
         scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)

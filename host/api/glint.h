@@ -218,7 +218,9 @@ typedef struct {
 } GlintOcclusion;
 
 // Finds whether each ray hits anything. It traces nearest hits, as glint_trace does and in the same time, and
-// is as certain as they are. A failure leaves the arrays undefined.
+// is as certain as they are. A ray that starts at a hit point may hit the same surface again, because the
+// point is rounded. For shadows, trace from the light to the point, with a tmax slightly below that of the
+// point. A failure leaves the arrays undefined.
 GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, GlintOcclusion *occlusion,
                                   char **messages);
 

@@ -324,6 +324,8 @@ class Scene:
                  device: Union[None, int, str] = None, lanes: int = 0, *, return_certain: bool = False) -> Any:
         """Returns whether anything lies strictly between tmin and tmax of each ray, as an array of bool.
 
+        Shadows: trace from the light to the points, with tmax=1 - 1e-6. A ray that starts at a hit point, which is rounded, may
+        hit the same surface again.
         return_certain: whether to return a second array, which is True where the first is proven, at "certified". It takes as
         long as `trace`, and 2 bytes per ray, not 77. The other arguments are those of `trace`.
         """
