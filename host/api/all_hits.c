@@ -110,12 +110,10 @@ static bool rays_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hi
     bool is_sound = true;
     for (size_t first = 0, count; first < rays->count && is_sound; first += count) {
         count = rays->count - first < most ? rays->count - first : most;
-        for (size_t i = 0; i < count && is_sound; i++) {
+        for (size_t i = 0; i < count; i++)
             batch.indices[i] = (uint32_t)i;
-            is_sound =
-                ray_read(&batch.rays[i], &batch.exponents[i], rays, first + i, tracer->precision, messages);
-        }
-        is_sound = is_sound && batch_trace(&batch, tracer->renderer, count, hits_max);
+        is_sound = rays_scale(batch.rays, batch.exponents, rays, first, count, tracer->precision, messages) &&
+                   batch_trace(&batch, tracer->renderer, count, hits_max);
         if (is_sound) batch_append(&batch, first, count, all);
     }
     batch_close(&batch);

@@ -53,6 +53,7 @@ enum { BATCH_RAYS = 1 << 16 }; // traced at once, which bounds the memory that r
 // Copies a caller's rays as struct_read does. Returns false with a message if they are invalid.
 bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);
 
-// Reads a ray and scales it (host/render/trace.h). Returns false with a message if it is invalid.
-bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index, GlintPrecision precision,
-              MessageList *messages);
+// Reads `count` rays from `first` on and scales them (host/render/trace.h). Returns false with a message if
+// one is invalid.
+bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t first, size_t count,
+                GlintPrecision precision, MessageList *messages);

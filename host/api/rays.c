@@ -1,8 +1,10 @@
 #include "host/api/handles.h"
 
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include <float.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -47,11 +49,10 @@ static void reals_read(double *values, size_t count, GlintReal real, const void 
         values[i] = real_at(real, reals, first + i);
 }
 
-bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index, GlintPrecision precision,
-              MessageList *messages)
+// Reads a ray. Returns what is wrong with it, or NULL.
+static const char *ray_read(TraceRay *ray, const GlintRays *rays, size_t index, GlintPrecision precision,
+                            double farthest)
 {
-    const double farthest =
-        precision == GLINT_DOUBLE || precision == GLINT_CERTIFIED ? DBL_MAX : (double)FLT_MAX;
     *ray = (TraceRay){.tmax = INFINITY};
     reals_read(ray->origin, 3, rays->real, rays->origins, 3 * index);
     reals_read(ray->direction, 3, rays->real, rays->directions, 3 * index);
@@ -63,14 +64,52 @@ bool ray_read(TraceRay *ray, int *exponent, const GlintRays *rays, size_t index,
         has_direction = has_direction || ray->direction[axis] != 0;
     }
     if (!is_finite || !has_direction)
-        return message_error(
-            messages,
-            "ray %zu: expected finite numbers within the precision's range and a direction other than 0",
-            index);
-    if (precision == GLINT_CERTIFIED && ray->tmin != 0)
-        return message_error(messages, "ray %zu: at certified a ray starts at its origin, tmin 0", index);
-    *ray = trace_ray_scaled(*ray, farthest, exponent);
-    return true;
+        return "expected finite numbers within the precision's range and a direction other than 0";
+    return precision == GLINT_CERTIFIED && ray->tmin != 0 ? "at certified a ray starts at its origin, tmin 0"
+                                                          : NULL;
+}
+
+typedef struct {
+    const GlintRays *rays;
+    size_t first; // of the batch, in `rays`
+    GlintPrecision precision;
+    double farthest;
+    TraceRay *scaled;
+    int *exponents;
+    _Atomic size_t wrong; // index of the first ray that is wrong, or SIZE_MAX
+} RayBatch;
+
+static void ray_batch_scale(void *context, size_t begin, size_t end)
+{
+    RayBatch *batch = context;
+    for (size_t i = begin; i < end; i++) {
+        const size_t index = batch->first + i;
+        if (ray_read(&batch->scaled[i], batch->rays, index, batch->precision, batch->farthest)) {
+            size_t wrong = batch->wrong;
+            while (index < wrong && !atomic_compare_exchange_weak(&batch->wrong, &wrong, index))
+                ;
+            return;
+        }
+        batch->scaled[i] = trace_ray_scaled(batch->scaled[i], batch->farthest, &batch->exponents[i]);
+    }
+}
+
+bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t first, size_t count,
+                GlintPrecision precision, MessageList *messages)
+{
+    const bool is_double = precision == GLINT_DOUBLE || precision == GLINT_CERTIFIED;
+    RayBatch batch = {.rays = rays,
+                      .first = first,
+                      .precision = precision,
+                      .farthest = is_double ? DBL_MAX : (double)FLT_MAX,
+                      .scaled = scaled,
+                      .wrong = SIZE_MAX};
+    batch.exponents = exponents;
+    parallel_run(count, RAYS_OF_THREAD_MIN, ray_batch_scale, &batch);
+    if (batch.wrong == SIZE_MAX) return true;
+    TraceRay ray;
+    return message_error(messages, "ray %zu: %s", batch.wrong,
+                         ray_read(&ray, rays, batch.wrong, precision, batch.farthest));
 }
 
 static void vector_write(double *vectors, size_t index, const double vector[3], bool is_hit)
@@ -103,6 +142,20 @@ static void hit_write(const TraceArrays *arrays, size_t index, TraceHit *hit, in
     if (arrays->occluded) arrays->occluded[index] = is_hit;
 }
 
+typedef struct {
+    const TraceArrays *arrays;
+    size_t first; // of the batch, in `arrays`
+    TraceHit *found;
+    const int *exponents;
+} HitBatch;
+
+static void hit_batch_write(void *context, size_t begin, size_t end)
+{
+    const HitBatch *batch = context;
+    for (size_t i = begin; i < end; i++)
+        hit_write(batch->arrays, batch->first + i, &batch->found[i], batch->exponents[i]);
+}
+
 // Traces rays in batches, which bounds the memory that they take. False with a message, or if the device
 // failed.
 static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
@@ -115,11 +168,10 @@ static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const TraceAr
     bool is_sound = true;
     for (size_t first = 0, count; first < rays->count && is_sound; first += count) {
         count = rays->count - first < batch ? rays->count - first : batch;
-        for (size_t i = 0; i < count && is_sound; i++)
-            is_sound = ray_read(&scaled[i], &exponents[i], rays, first + i, tracer->precision, messages);
-        is_sound = is_sound && renderer_trace_closest(tracer->renderer, scaled, count, found);
-        for (size_t i = 0; i < count && is_sound; i++)
-            hit_write(arrays, first + i, &found[i], exponents[i]);
+        is_sound = rays_scale(scaled, exponents, rays, first, count, tracer->precision, messages) &&
+                   renderer_trace_closest(tracer->renderer, scaled, count, found);
+        HitBatch hits = {arrays, first, found, exponents};
+        if (is_sound) parallel_run(count, RAYS_OF_THREAD_MIN, hit_batch_write, &hits);
     }
     free(exponents);
     free(found);

@@ -50,9 +50,7 @@ static size_t buffer_size(cl_mem buffer)
     return clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL) == CL_SUCCESS ? size : 0;
 }
 
-// Returns the smallest spare buffer of at least `size` bytes. Creates one if there is none, in place of the
-// largest spare, so that a renderer never has more buffers than it once used together.
-static cl_mem film_buffer(Renderer *renderer, size_t size)
+cl_mem spare_buffer_take(Renderer *renderer, size_t size)
 {
     SpareBuffers *spares = &renderer->spares;
     size_t best = spares->count, best_size = SIZE_MAX, largest = 0, largest_size = 0;
@@ -77,7 +75,7 @@ static cl_mem film_buffer(Renderer *renderer, size_t size)
     return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
 }
 
-static void buffer_spare(Renderer *renderer, cl_mem buffer)
+void spare_buffer_return(Renderer *renderer, cl_mem buffer)
 {
     if (buffer) array_push(renderer->spares, buffer);
 }
@@ -124,22 +122,22 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
 {
     buffers->rows = film.height;
-    buffers->film = film_buffer(renderer, band_film_size(&film, aovs, buffers));
-    buffers->ray_counts = film_buffer(renderer, RAYS_COUNT * sizeof(uint32_t));
+    buffers->film = spare_buffer_take(renderer, band_film_size(&film, aovs, buffers));
+    buffers->ray_counts = spare_buffer_take(renderer, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = renderer->pass != PASS_ALL;
     const size_t words = is_list            ? 4 * film_pixel_count(&film)
                          : renderer->repeat ? film_doubt_words(renderer, &film)
                                             : 0;
-    buffers->doubts = film_buffer(renderer, words * sizeof(uint32_t));
-    buffers->center_doubts = film_buffer(renderer, is_list ? 0 : words * sizeof(uint32_t));
+    buffers->doubts = spare_buffer_take(renderer, words * sizeof(uint32_t));
+    buffers->center_doubts = spare_buffer_take(renderer, is_list ? 0 : words * sizeof(uint32_t));
 }
 
 void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
 {
-    buffer_spare(renderer, buffers->film);
-    buffer_spare(renderer, buffers->ray_counts);
-    buffer_spare(renderer, buffers->doubts);
-    buffer_spare(renderer, buffers->center_doubts);
+    spare_buffer_return(renderer, buffers->film);
+    spare_buffer_return(renderer, buffers->ray_counts);
+    spare_buffer_return(renderer, buffers->doubts);
+    spare_buffer_return(renderer, buffers->center_doubts);
     *buffers = (BandBuffers){0};
 }
 

@@ -98,6 +98,12 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
 // Returns the pace of a kernel's launches, with the target of the settings.
 Pace *renderer_pace(Renderer *renderer, KernelKind kind);
 
+// Returns the smallest spare buffer of at least `size` bytes, with undefined contents. Creates one if there
+// is none, in place of the largest spare, so that a renderer never has more buffers than it once used
+// together. buffer_spare gives it back; it accepts NULL.
+cl_mem spare_buffer_take(Renderer *renderer, size_t size);
+void spare_buffer_return(Renderer *renderer, cl_mem buffer);
+
 // Maps `size` bytes of a buffer, beginning at `begin`, for the host to read or write, and adds the time to
 // the report. Returns NULL if the device failed. renderer_unmap releases the mapping and accepts NULL.
 void *renderer_map(Renderer *renderer, cl_mem buffer, size_t begin, size_t size, cl_map_flags access);

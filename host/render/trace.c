@@ -1,11 +1,23 @@
 // Traces explicit rays.
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/render/renderer_state.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 
 enum { TRACE_GROUP = 64, BATCH_RAYS_MAX = 1 << 18 };
+
+// Rays of one launch.
+typedef struct {
+    const Renderer *renderer;
+    KernelKind kind;
+    const TraceRay *rays;
+    TraceHit *hits;
+    void *ray_scalars; // as the kernel reads and writes them
+    const void *result_scalars;
+    const uint32_t *objects;
+} TraceBatch;
 
 static void scalar_set(void *scalars, size_t index, bool is_double, double value)
 {
@@ -46,48 +58,54 @@ static void bounces_read(TraceHit *hit, const void *scalars, size_t index, bool 
     }
 }
 
-// Returns the hit whose scalars begin at `index`.
-static TraceHit hit_at(const Renderer *renderer, KernelKind kind, const void *scalars, size_t index,
-                       uint32_t object)
+// Reads the hits `begin` to `end` - 1 of a TraceBatch.
+static void hits_read(void *context, size_t begin, size_t end)
 {
-    const bool is_double = renderer->report.is_double;
+    const TraceBatch *batch = context;
+    const Renderer *renderer = batch->renderer;
+    const void *scalars = batch->result_scalars;
+    const bool is_double = renderer->report.is_double, certifies = renderer_certifies(renderer);
     const double unit = renderer->compiled.unit;
-    TraceHit hit = {.object = object,
-                    .t = unit * scalar_at(scalars, index + RESULT_T, is_double),
-                    .low = unit * scalar_at(scalars, index + RESULT_LOW, is_double),
-                    .high = unit * scalar_at(scalars, index + RESULT_HIGH, is_double)};
-    vector_at(scalars, index + RESULT_NORMAL, is_double, hit.normal);
-    vector_at(scalars, index + RESULT_POSITION, is_double, hit.position);
-    for (size_t axis = 0; axis < 3; axis++)
-        hit.position[axis] *= unit;
-    if (renderer_certifies(renderer) && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0)
-        hit.certainty = renderer->pass == PASS_ALL ? TRACE_CERTAIN : TRACE_CERTAIN_IN_DOUBLE;
-    if (kind == KERNEL_TRACE) bounces_read(&hit, scalars, index, is_double, unit);
-    return hit;
+    const TraceCertainty certainty = renderer->pass == PASS_ALL ? TRACE_CERTAIN : TRACE_CERTAIN_IN_DOUBLE;
+    for (size_t i = begin; i < end; i++) {
+        const size_t index = i * result_scalars(batch->kind);
+        TraceHit *hit = &batch->hits[i];
+        hit->object = batch->objects[i];
+        hit->t = unit * scalar_at(scalars, index + RESULT_T, is_double);
+        hit->low = unit * scalar_at(scalars, index + RESULT_LOW, is_double);
+        hit->high = unit * scalar_at(scalars, index + RESULT_HIGH, is_double);
+        vector_at(scalars, index + RESULT_NORMAL, is_double, hit->normal);
+        vector_at(scalars, index + RESULT_POSITION, is_double, hit->position);
+        for (size_t axis = 0; axis < 3; axis++)
+            hit->position[axis] *= unit;
+        const bool is_certain = certifies && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0;
+        hit->certainty = is_certain ? certainty : TRACE_UNCERTAIN;
+        if (batch->kind == KERNEL_TRACE) bounces_read(hit, scalars, index, is_double, unit);
+    }
 }
 
-// Returns the rays' scalars as the kernel reads them; the caller frees them.
-static void *rays_pack(const Renderer *renderer, const TraceRay *rays, uint32_t count)
+// Writes the scalars of the rays `begin` to `end` - 1 of a TraceBatch.
+static void rays_write(void *context, size_t begin, size_t end)
 {
-    bool is_double = renderer->report.is_double;
-    double unit = renderer->compiled.unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
-    void *scalars = memory_allocate((size_t)count * RAY_SCALARS, renderer_scalar_size(renderer));
-    for (uint32_t i = 0; i < count; i++) {
-        const double *origin = rays[i].origin, *direction = rays[i].direction;
+    const TraceBatch *batch = context;
+    const bool is_double = batch->renderer->report.is_double, certifies = renderer_certifies(batch->renderer);
+    const double unit = batch->renderer->compiled.unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
+    void *scalars = batch->ray_scalars;
+    for (size_t i = begin; i < end; i++) {
+        const double *origin = batch->rays[i].origin, *direction = batch->rays[i].direction;
         // the kernel bounds the hits of rays that have no end; ends_apply applies tmax
-        const double tmax = renderer_certifies(renderer) ? INFINITY : rays[i].tmax;
+        const double tmax = certifies ? INFINITY : batch->rays[i].tmax;
         const double ray[RAY_SCALARS] = {
-            origin[0] / unit, origin[1] / unit, origin[2] / unit,    direction[0],
-            direction[1],     direction[2],     rays[i].tmin / unit, fmin(tmax / unit, farthest)};
+            origin[0] / unit, origin[1] / unit, origin[2] / unit,           direction[0],
+            direction[1],     direction[2],     batch->rays[i].tmin / unit, fmin(tmax / unit, farthest)};
         for (size_t k = 0; k < RAY_SCALARS; k++)
             scalar_set(scalars, i * RAY_SCALARS + k, is_double, ray[k]);
         // a coordinate that underflows must not seem to be exactly 0: the kernel flags origins below its
         // range
-        for (size_t axis = 0; axis < 3 && renderer_certifies(renderer); axis++)
+        for (size_t axis = 0; axis < 3 && certifies; axis++)
             if (origin[axis] != 0 && scalar_at(scalars, i * RAY_SCALARS + axis, is_double) == 0)
                 scalar_set(scalars, i * RAY_SCALARS + axis, is_double, is_double ? DBL_MIN : (double)FLT_MIN);
     }
-    return scalars;
 }
 
 // Launches the kernel and returns the launch's seconds.
@@ -106,38 +124,30 @@ static double trace_launch(Renderer *renderer, KernelKind kind, uint32_t count, 
     return renderer_launch(renderer, kind, 1, NULL, &items, &group);
 }
 
-static void hits_unpack(Renderer *renderer, KernelKind kind, uint32_t count, cl_mem results, cl_mem objects,
+static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t count,
                         TraceHit *hits)
 {
     Compute *compute = renderer->compute;
-    size_t result_size = (size_t)count * result_scalars(kind) * renderer_scalar_size(renderer);
-    const void *result = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
-    const uint32_t *object = renderer_map(renderer, objects, 0, (size_t)count * sizeof *object, CL_MAP_READ);
-    for (uint32_t i = 0; i < count && compute_ok(compute); i++)
-        hits[i] = hit_at(renderer, kind, result, i * result_scalars(kind), object[i]);
-    renderer_unmap(renderer, results, result);
-    renderer_unmap(renderer, objects, object);
-    compute_try(compute, clFinish(compute->queue));
-}
-
-static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *rays, uint32_t count,
-                        TraceHit *hits)
-{
-    Compute *compute = renderer->compute;
-    size_t scalar = renderer_scalar_size(renderer);
-    void *scalars = rays_pack(renderer, rays, count);
-    cl_mem ray_buffer =
-        buffer_create(compute, (size_t)count * RAY_SCALARS * scalar, scalars, CL_MEM_READ_ONLY);
-    free(scalars);
-    cl_mem results =
-        buffer_create(compute, (size_t)count * result_scalars(kind) * scalar, NULL, CL_MEM_WRITE_ONLY);
-    cl_mem objects = buffer_create(compute, (size_t)count * sizeof(uint32_t), NULL, CL_MEM_WRITE_ONLY);
-    const double seconds = trace_launch(renderer, kind, count, ray_buffer, results, objects);
+    const size_t scalar = renderer_scalar_size(renderer), ray_size = count * RAY_SCALARS * scalar,
+                 result_size = count * result_scalars(kind) * scalar, object_size = count * sizeof(uint32_t);
+    cl_mem ray_buffer = spare_buffer_take(renderer, ray_size),
+           results = spare_buffer_take(renderer, result_size),
+           objects = spare_buffer_take(renderer, object_size);
+    TraceBatch batch = {renderer, kind, rays, hits};
+    batch.ray_scalars = renderer_map(renderer, ray_buffer, 0, ray_size, CL_MAP_WRITE_INVALIDATE_REGION);
+    if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
+    renderer_unmap(renderer, ray_buffer, batch.ray_scalars);
+    const double seconds = trace_launch(renderer, kind, (uint32_t)count, ray_buffer, results, objects);
     pace_note_launch(renderer_pace(renderer, kind), count, seconds);
-    hits_unpack(renderer, kind, count, results, objects, hits);
-    buffer_release(ray_buffer);
-    buffer_release(results);
-    buffer_release(objects);
+    batch.result_scalars = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
+    batch.objects = renderer_map(renderer, objects, 0, object_size, CL_MAP_READ);
+    if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, hits_read, &batch);
+    renderer_unmap(renderer, results, batch.result_scalars);
+    renderer_unmap(renderer, objects, batch.objects);
+    compute_try(compute, clFinish(compute->queue));
+    spare_buffer_return(renderer, ray_buffer);
+    spare_buffer_return(renderer, results);
+    spare_buffer_return(renderer, objects);
 }
 
 static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
@@ -152,7 +162,7 @@ static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays
     for (size_t first = 0, count; first < ray_count && compute_ok(compute); first += count) {
         count = ray_count - first < BATCH_RAYS_MAX ? ray_count - first : BATCH_RAYS_MAX;
         if (count > pace_launch_samples(pace)) count = (size_t)pace_launch_samples(pace);
-        trace_batch(renderer, kind, rays + first, (uint32_t)count, hits + first);
+        trace_batch(renderer, kind, rays + first, count, hits + first);
     }
     report->launches.count = launch_count;
     report->reads.count = read_count;
@@ -215,27 +225,32 @@ bool renderer_trace_closest(Renderer *renderer, const TraceRay *rays, size_t ray
     return rays_trace(renderer, KERNEL_CLOSEST, rays, ray_count, hits);
 }
 
+// Returns value * 2^exponent, rounded once. ldexp takes several times as long as the product.
+static double scale_by_power(double value, int exponent, double power)
+{
+    return isnormal(power) ? value * power : ldexp(value, exponent);
+}
+
 TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent)
 {
     double *d = ray.direction;
     frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
+    const double power = ldexp(1, *exponent), inverse = ldexp(1, -*exponent);
     for (int axis = 0; axis < 3; axis++)
-        d[axis] = ldexp(d[axis], -*exponent);
-    ray.tmin = ldexp(ray.tmin, *exponent);
-    ray.tmax = fmin(ldexp(ray.tmax, *exponent), farthest);
+        d[axis] = scale_by_power(d[axis], -*exponent, inverse);
+    ray.tmin = scale_by_power(ray.tmin, *exponent, power);
+    ray.tmax = fmin(scale_by_power(ray.tmax, *exponent, power), farthest);
     return ray;
-}
-
-// Returns a bound times 2^exponent, rounded towards `outward` where that is not exact.
-static double bound_scaled(double bound, int exponent, double outward)
-{
-    const double scaled = ldexp(bound, exponent);
-    return ldexp(scaled, -exponent) == bound ? scaled : nextafter(scaled, outward);
 }
 
 void trace_hit_unscale(TraceHit *hit, int exponent)
 {
-    hit->t = ldexp(hit->t, -exponent);
-    hit->low = bound_scaled(hit->low, -exponent, -INFINITY);
-    hit->high = bound_scaled(hit->high, -exponent, INFINITY);
+    const double power = ldexp(1, -exponent), inverse = ldexp(1, exponent);
+    const double low = hit->low, high = hit->high;
+    hit->t = scale_by_power(hit->t, -exponent, power);
+    hit->low = scale_by_power(low, -exponent, power);
+    hit->high = scale_by_power(high, -exponent, power);
+    // where scaling is not exact, bounds are rounded outwards
+    if (scale_by_power(hit->low, exponent, inverse) != low) hit->low = nextafter(hit->low, -INFINITY);
+    if (scale_by_power(hit->high, exponent, inverse) != high) hit->high = nextafter(hit->high, INFINITY);
 }

@@ -20,17 +20,20 @@ typedef enum {
 } TraceCertainty;
 
 typedef struct {
-    uint32_t object;                                    // UINT32_MAX on a miss, where only `light` is valid
-    double t;                                           // in lengths of the ray's direction
-    double normal[3];                                   // geometric, unit, facing the ray
-    double position[3];                                 // the hit point, moved onto the surface
+    uint32_t object; // UINT32_MAX on a miss, where only `light` is valid
+    TraceCertainty certainty;
+    double t;           // in lengths of the ray's direction
+    double low, high;   // bounds on t, if it is certain
+    double normal[3];   // geometric, unit, facing the ray
+    double position[3]; // the hit point, moved onto the surface
+    // undefined where only the closest hit was asked for
     double reflected_origin[3], reflected_direction[3]; // of the reflected ray
     double refracted_origin[3], refracted_direction[3]; // of the refracted ray
     double transmission; // the refracted ray's weight; 0 at total internal reflection
     double light;        // transmittance along the ray from tmin to tmax
-    TraceCertainty certainty;
-    double low, high; // bounds on t, if it is certain
 } TraceHit;
+
+enum { RAYS_OF_THREAD_MIN = 4096 }; // fewer are not worth a thread
 
 // Returns the ray with its direction divided by 2^*exponent, and its tmin and tmax multiplied by that, so
 // that the direction's largest component lies in 0.5 to 1 and its squared length neither underflows nor
