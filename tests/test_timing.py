@@ -57,6 +57,7 @@ class Timing(TestCase):
             else:
                 self.assertEqual(event["ph"], "X")
                 events.setdefault(names[event["tid"]], []).append(event)
+        self.assertEqual({number: name for number, name in names.items() if number < 2}, {1: "host"})  # Perfetto's main thread
         host, bands, builds, commands = events.values()
         self.assertEqual(list(events)[1], f"bands of {list(events)[3]}")
         self.assertEqual([event["name"] for event in builds], ["building render", "building aov"])

@@ -6,12 +6,15 @@
 #include <math.h>
 #include <stdlib.h>
 
+// Perfetto takes the thread that has the number of its process, and thread 0, for the main one.
+enum { PROCESS = 1, HOST_THREAD = PROCESS, THREADS_OF_DEVICE = 4 };
+
 static void event_begin(Json *json, const char *phase, const char *name, size_t thread)
 {
     json_begin_object(json, NULL);
     json_text(json, "ph", phase);
     json_text(json, "name", name);
-    json_int64(json, "pid", 1);
+    json_int64(json, "pid", PROCESS);
     json_int64(json, "tid", (int64_t)thread);
 }
 
@@ -122,7 +125,6 @@ static void device_add(Json *json, const RenderReport *report, size_t thread, do
 
 void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *stage)
 {
-    enum { THREADS_OF_DEVICE = 4 };
     size_t span_count;
     const HostSpan *spans = stage_spans(stage, &span_count);
     const double origin = span_count > 0 ? spans[0].start_seconds : 0;
@@ -137,10 +139,10 @@ void timing_trace_print(Renderer *const *renderers, size_t count, const Stage *s
     json_bool(json, "kernels_from_cache", is_from_cache);
     json_end(json);
     json_begin_array(json, "traceEvents");
-    thread_name(json, 0, "host");
-    spans_add(json, "", spans, span_count, 0, origin);
+    thread_name(json, HOST_THREAD, "host");
+    spans_add(json, "", spans, span_count, HOST_THREAD, origin);
     for (size_t i = 0; i < count; i++)
-        device_add(json, renderer_report(renderers[i]), 1 + THREADS_OF_DEVICE * i, origin);
+        device_add(json, renderer_report(renderers[i]), HOST_THREAD + 1 + THREADS_OF_DEVICE * i, origin);
     json_end(json);
     json_print(json, stdout);
 }
