@@ -3,13 +3,30 @@
 
 run_tests: sanitize-long-only"""
 import pathlib
+import random
 import re
 import shutil
-import unittest
 
-from glint import ROOT, SPHERE, TestCase, main, png_read, read, write
+from glint import IS_LONG, ROOT, SPHERE, TestCase, main, png_read, read, shim_build, write
 
 LINE = r"size=24x18 samples=1 bounces=5 scene=[0-9a-f]{16}( (object|t|normal|shadow|path|color)=[0-9a-f]{16}){6} tiles=[0-9a-f]{384} s\.yaml\n"
+
+# Changes the lowest bit of word WORD of the MAP-th map of a device's results.
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+
+void *clEnqueueMapBuffer(void *queue, void *buffer, unsigned blocking, unsigned long flags, size_t offset, size_t size,
+                         unsigned count, const void *list, void *event, int *status)
+{
+    static long maps;
+    unsigned *words = ((void *(*)())dlsym(RTLD_NEXT, "clEnqueueMapBuffer"))(queue, buffer, 1, flags, offset, size, count, list,
+                                                                            event, status);
+    if (words && maps++ == atol(getenv("MAP"))) words[atol(getenv("WORD")) % (size / 4)] ^= 1;
+    return words;
+}
+"""
 
 
 class Golden(TestCase):
@@ -64,6 +81,18 @@ class Golden(TestCase):
         for layer in "object", "t", "normal", "shadow", "path", "color":
             write("golden.txt", re.sub(rf"( {layer}=)(.)", lambda found: found[1] + "0123456789abcdef"[(int(found[2], 16) + 1) % 16], line))
             self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: different, first in {layer}\n")
+
+    def test_every_bit_of_an_image_counts(self):
+        """An error of one ulp in one number, at a random place of each layer."""
+        shim = shim_build("flip", SHIM)
+        self.written()
+        layers = {}
+        chosen = random.Random(1)
+        for i in range(1000 if IS_LONG else 12):
+            env = {"LD_PRELOAD": shim, "MAP": str(i % 6), "WORD": str(chosen.randrange(1 << 30))}
+            out = self.glint("golden check", status=3, env=env).stdout
+            layers.setdefault(i % 6, set()).add(re.match(r"s\.yaml: different, first in (\w+)", out)[1])
+        self.assertEqual(sorted(map(list, layers.values())), [["color"], ["normal"], ["object"], ["path"], ["shadow"], ["t"]])
 
     def test_comments_and_line_ends(self):
         write("golden.txt", "# mine\n")
