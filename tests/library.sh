@@ -28,7 +28,7 @@ check "it compiles with the static library" cc -std=c11 $flags example.c $(pkg-c
 cd "$scratch"
 for program in shared static; do
     ./$program scene.yaml $program.ppm >$program.txt 2>/dev/null
-    check "the $program example compares, float being close to double" grep -qxE "RMSE [1-9][.0-9]*e-0[3-7], mean FLIP [1-9].*" $program.txt
+    check "the $program example compares, float being close to double" grep -qxE "RMSE [1-9][.0-9]*e-0[4-7], mean FLIP [1-9][.0-9]*e-0[5-9]" $program.txt
     check "it traces" test "$(tail -n 2 $program.txt)" = "object 1, t from 3.5511868 to 3.55119538, certain
 nothing before t = 3.5"
 done

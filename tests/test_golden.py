@@ -82,8 +82,8 @@ class Golden(TestCase):
             write("golden.txt", re.sub(rf"( {layer}=)(.)", lambda found: found[1] + "0123456789abcdef"[(int(found[2], 16) + 1) % 16], line))
             self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: different, first in {layer}\n")
 
-    def test_every_bit_of_an_image_counts(self):
-        """An error of one ulp in one number, at a random place of each layer."""
+    def test_one_changed_bit_is_found(self):
+        """The lowest bit of one number, at a random place of each layer."""
         shim = shim_build("flip", SHIM)
         self.written()
         layers = {}

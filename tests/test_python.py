@@ -227,8 +227,11 @@ class Occlusion(unittest.TestCase):
         occluded, certain = scene.occluded([[0.25, 0.5, -1]] * 3, [0, 0, 1], "certified", tmax=[0.999, 1, 1.001], return_certain=True)
         self.assertEqual((occluded.tolist(), certain.tolist()), ([False, False, True], [True, False, True]))
         self.assertEqual(scene.occluded(np.zeros((0, 3)), np.zeros((0, 3))).shape, (0,))
-        with self.assertRaisesRegex(glint.SceneError, "ray 1: expected finite numbers"):
-            scene.occluded([[0, 0, 0]] * 2, [[0, 0, 1], [0, 0, 0]])
+        directions = np.tile([0.0, 0, 1], (300000, 1))
+        directions[[299999, 290000, 270000]] = 0  # in the second batch, read by several threads
+        for trace in scene.occluded, scene.trace, scene.trace_all:
+            with self.assertRaisesRegex(glint.SceneError, "ray 270000: expected finite numbers"):
+                trace(np.zeros_like(directions), directions)
 
 
 class Compare(unittest.TestCase):
@@ -277,8 +280,28 @@ class Compare(unittest.TestCase):
         for wrong in (image, image[:8]), (image, image[:, :, 0]), (image[None], image[None]):
             with self.assertRaisesRegex(ValueError, "of one shape"):
                 glint.compare(*wrong)
-        with self.assertRaisesRegex(glint.SceneError, "have pixels and channels, not 0 x 9 with 3"):
-            glint.compare(image[:, :0], image[:, :0])
+        for wrong, message in ((image[:, :0],) * 2, "in floating point, or color=False, not float64 of shape"), ((np.uint8([[[1, 2, 3]]]),) * 2, "not uint8"), \
+                (([1j], [1j]), "real numbers, not complex"), ((image, image[:, :, 0]), "of one shape"):
+            with self.assertRaisesRegex(ValueError, message):
+                glint.compare(*wrong)
+        with self.assertRaisesRegex(ValueError, "colors have the shape"):
+            glint.compare([1.0], [2.0], color=True)
+
+    def test_data(self):
+        """Three channels are colors or data, as the caller says; of no comparable value there is no error."""
+        normals = np.random.default_rng(9).uniform(-1, 1, (9, 16, 3))
+        color, data = (glint.compare(normals, -normals, color=is_color) for is_color in (True, False))
+        self.assertEqual((data.rmse, data.srgb8_off_by_2_or_more), (color.rmse, 0))
+        self.assertTrue(color.flip_max > 0.5 and np.isnan(data.flip_max))
+        nothing = glint.compare(normals, normals * np.nan)
+        self.assertEqual((nothing.compared_values, nothing.unmatched_values), (0, normals.size))
+        self.assertTrue(all(np.isnan(value) for value in (nothing.max_abs, nothing.rmse, nothing.bias, nothing.p99_9, nothing.psnr, nothing.rel_mse)))
+        pair = glint._c.ImagePair(ctypes.sizeof(glint._c.ImagePair), 1, 1 << 31, 1 << 31, 4, normals.ctypes.data, normals.ctypes.data)
+        metrics, messages = glint._c.ImageMetrics(ctypes.sizeof(glint._c.ImageMetrics)), ctypes.c_void_p()
+        for found in ctypes.byref(metrics), None:
+            self.assertEqual(glint._c.library.glint_images_compare(ctypes.byref(pair), found, ctypes.byref(messages)), 1)
+            glint._c.library.glint_text_free(messages)
+            pair.width = pair.height = pair.channels = 1
 
     def test_other_versions(self):
         """A caller of an earlier version gets the metrics that it knows, and one of a later version 0 for those that this one lacks."""

@@ -126,10 +126,8 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
     MessageList list = {0};
     GlintRays given;
     GlintAllHits found = {0};
-    if (hits->size < ALL_HITS_SIZE_MIN) {
-        message_error(&list, "the size of a GlintAllHits is not set");
+    if (!struct_has_size(hits, ALL_HITS_SIZE_MIN, "GlintAllHits", &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
-    }
     struct_write(hits, &found, sizeof found);
     bool is_sound = rays_read(&given, rays, &list);
     if (is_sound && tracer->precision == GLINT_CERTIFIED)

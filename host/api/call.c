@@ -27,6 +27,19 @@ void struct_write(void *given, const void *own, size_t own_size)
     memcpy(given, &size, sizeof size);
 }
 
+bool struct_has_size(const void *given, size_t size_min, const char *name, MessageList *messages)
+{
+    size_t size = 0;
+    if (given) memcpy(&size, given, sizeof size);
+    return size >= size_min || message_error(messages, "the size of a %s is not set", name);
+}
+
+bool real_is_known(GlintReal real, MessageList *messages)
+{
+    return real == GLINT_FLOAT32 || real == GLINT_FLOAT64 ||
+           message_error(messages, "real is %d; expected GLINT_FLOAT32 or GLINT_FLOAT64", (int)real);
+}
+
 GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages)
 {
     if (compute && !compute_ok(compute)) {

@@ -10,10 +10,13 @@
 static bool pair_read(GlintImagePair *own, const GlintImagePair *given, MessageList *messages)
 {
     if (!struct_read(own, sizeof *own, given, messages)) return false;
-    if (own->real != GLINT_FLOAT32 && own->real != GLINT_FLOAT64)
-        return message_error(messages, "images are neither of 32 nor of 64 bits");
-    if (own->width == 0 || own->height == 0 || own->channels == 0)
-        return message_error(messages, "images to compare have pixels and channels, not %u x %u with %u",
+    if (!real_is_known(own->real, messages)) return false;
+    const size_t row_max =
+        SIZE_MAX / sizeof(double) / (own->width ? own->width : 1) / (own->height ? own->height : 1);
+    if (own->width == 0 || own->height == 0 || own->channels == 0 || own->channels > row_max)
+        return message_error(messages,
+                             "the images have %u x %u pixels of %u channels; expected at least 1 each, and "
+                             "at most the values that fit in memory",
                              own->width, own->height, own->channels);
     if (!own->reference || !own->image)
         return message_error(messages, "a comparison needs a reference and an image");
@@ -23,7 +26,8 @@ static bool pair_read(GlintImagePair *own, const GlintImagePair *given, MessageL
 // Returns a caller's array as an image, which uses it in place. Only the `values` of doubles are allocated.
 static Image image_of_array(const GlintImagePair *pair, const void *array)
 {
-    Image image = {.width = pair->width, .height = pair->height, .channels = pair->channels};
+    Image image = {
+        .width = pair->width, .height = pair->height, .channels = pair->channels, .data = pair->is_data != 0};
     if (pair->real == GLINT_FLOAT32) {
         image.values = (float *)(uintptr_t)array; // only read
         return image;
@@ -38,18 +42,19 @@ static Image image_of_array(const GlintImagePair *pair, const void *array)
 
 static GlintImageMetrics metrics_of(const ImageMetrics *found)
 {
+    const double none = found->linear.count > 0 ? 0 : (double)NAN; // without a value there is no error of it
     return (GlintImageMetrics){
         .differing_values = found->differing_count,
         .unmatched_values = found->unmatched_count,
         .nonfinite_reference = found->nonfinite_reference,
         .nonfinite_image = found->nonfinite_test,
         .compared_values = found->linear.count,
-        .max_abs = found->linear.largest,
-        .rmse = found->linear.rmse,
-        .bias = found->linear.bias,
-        .p99_9 = found->linear.percentile_999,
-        .psnr = found->linear.psnr,
-        .rel_mse = found->linear.rel_mse,
+        .max_abs = none + found->linear.largest,
+        .rmse = none + found->linear.rmse,
+        .bias = none + found->linear.bias,
+        .p99_9 = none + found->linear.percentile_999,
+        .psnr = none + found->linear.psnr,
+        .rel_mse = none + found->linear.rel_mse,
         .max_ulp = found->largest_ulp,
         .worst_x = found->worst_x,
         .worst_y = found->worst_y,
@@ -65,10 +70,9 @@ GlintStatus glint_images_compare(const GlintImagePair *images, GlintImageMetrics
 {
     MessageList list = {0};
     GlintImagePair pair;
-    bool is_sound = pair_read(&pair, images, &list);
-    if (is_sound && metrics->size < sizeof metrics->size)
-        is_sound = message_error(&list, "the size of a GlintImageMetrics is not set");
-    if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
+    if (!pair_read(&pair, images, &list) ||
+        !struct_has_size(metrics, sizeof metrics->size, "GlintImageMetrics", &list))
+        return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     const Image reference = image_of_array(&pair, pair.reference), image = image_of_array(&pair, pair.image);
     const ImageMetrics found = image_metrics(&reference, &image);
     if (pair.real == GLINT_FLOAT64) {

@@ -213,14 +213,16 @@ GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *h
 // Arrays of one value per ray, which the caller owns, or NULL where not wanted.
 typedef struct {
     size_t size;
-    uint8_t *occluded;  // 1 where anything lies strictly between tmin and tmax, otherwise 0
-    uint8_t *certainty; // GlintCertainty, as in GlintHits
+    uint8_t *occluded; // 1 where anything lies strictly between tmin and tmax, otherwise 0
+    // GlintCertainty of the nearest hit: it may be GLINT_UNCERTAIN where only the object is.
+    uint8_t *certainty;
 } GlintOcclusion;
 
-// Finds whether each ray hits anything. It traces nearest hits, as glint_trace does and in the same time, and
-// is as certain as they are. A ray that starts at a hit point may hit the same surface again, because the
-// point is rounded. For shadows, trace from the light to the point, with a tmax slightly below that of the
-// point. A failure leaves the arrays undefined.
+// Determines whether each ray hits anything. Time and certainty are those of glint_trace, because it finds
+// the nearest hit. A ray that starts at a hit point may hit the same surface again, because the point is
+// rounded. For shadows of a light with a place, trace from there to the points at GLINT_DOUBLE or
+// GLINT_CERTIFIED, with a tmax of 1 - 1e-6 where the directions end at the points; for others start outside
+// the scene. A failure leaves the arrays undefined.
 GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, GlintOcclusion *occlusion,
                                   char **messages);
 
@@ -246,13 +248,15 @@ void glint_all_hits_free(GlintAllHits *hits); // accepts NULL
 // Errors of images
 
 // An image and its reference: arrays of height x width x channels values from the top left, which the caller
-// owns. 3 channels are colors in linear light. Any other number of channels is data, such as t.
+// owns. 3 channels are colors in linear light, unless is_data is set. Any other number of channels is data,
+// such as t.
 typedef struct {
     size_t size;
     GlintReal real; // of both arrays
     uint32_t width, height, channels;
     const void *reference;
     const void *image;
+    int is_data;
 } GlintImagePair;
 
 // The figures of glint diff, with the names of its JSON report.
@@ -261,7 +265,7 @@ typedef struct {
     uint64_t differing_values; // in any bit
     uint64_t unmatched_values; // pairs of which one is infinite or NaN and the other is not the same
     uint64_t nonfinite_reference, nonfinite_image; // pixels
-    // The pairs of finite values, and their errors.
+    // The pairs of finite values, and their errors, which are NaN if there are none.
     uint64_t compared_values;
     double max_abs, rmse, bias, p99_9, psnr, rel_mse;
     double max_ulp; // in units in the last place of the arrays' type; infinite if a value is unmatched
@@ -271,8 +275,8 @@ typedef struct {
     double srgb8_psnr, flip_mean, flip_max;
 } GlintImageMetrics;
 
-// Compares an image with its reference and fills *metrics, whose size the caller has set. The error that a
-// precision makes shows in a render at it, compared with one at a higher precision.
+// Compares an image with its reference and fills *metrics, whose size the caller has set. To measure the
+// error of a precision, compare a render at it with one at a higher precision.
 GlintStatus glint_images_compare(const GlintImagePair *images, GlintImageMetrics *metrics, char **messages);
 
 #ifdef __GNUC__

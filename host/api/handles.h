@@ -34,6 +34,13 @@ void struct_write(void *given, const void *own, size_t own_size);
 // may be NULL. Returns `status`, or the status of the failure.
 GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages);
 
+// Returns whether the caller's struct, which may be NULL, states a size of at least `size_min` bytes; if not,
+// with a message.
+bool struct_has_size(const void *given, size_t size_min, const char *name, MessageList *messages);
+
+// Returns whether a type of numbers is known; if not, with a message.
+bool real_is_known(GlintReal real, MessageList *messages);
+
 // Returns a number of a caller's array.
 static inline double real_at(GlintReal real, const void *reals, size_t index)
 {
@@ -48,7 +55,7 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
 Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
                           MessageList *messages);
 
-enum { BATCH_RAYS = 1 << 16 }; // traced at once, which bounds the memory that rays take
+enum { BATCH_RAYS = 1 << 18 }; // traced at once, which bounds the memory that rays take
 
 // Copies a caller's rays as struct_read does. Returns false with a message if they are invalid.
 bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);

@@ -77,8 +77,7 @@ static bool vectors_read(Vector3 *vectors, GlintReal real, const void *reals, si
 static bool mesh_is_sound(const GlintMesh *given, MessageList *messages)
 {
     enum { TRIANGLES_MAX = 1 << 24 };
-    if (given->real != GLINT_FLOAT32 && given->real != GLINT_FLOAT64)
-        return message_error(messages, "vertices are neither of 32 nor of 64 bits");
+    if (!real_is_known(given->real, messages)) return false;
     if (!given->vertices || !given->triangles || given->triangle_count == 0 ||
         given->triangle_count > TRIANGLES_MAX || given->vertex_count > UINT32_MAX)
         return message_error(messages, "expected 1 to %d triangles and at most %u vertices, not %zu and %zu",

@@ -27,7 +27,7 @@ static const double widest_sensitivity = 0.04;
 // A color as three numbers of any of the spaces that follow.
 typedef struct {
     double x, y, z;
-} Color;
+} Tristimulus;
 
 // Converts between linear RGB with sRGB's primaries (IEC 61966-2-1:1999) and XYZ with the white x 0.31271, y
 // 0.32902 (D65, CIE 15:2004).
@@ -37,28 +37,28 @@ static const double xyz_from_rgb[3][3] = {{0.41238656, 0.35759149, 0.18045049},
 static const double rgb_from_xyz[3][3] = {{3.24100323, -1.53739897, -0.49861588},
                                           {-0.96922425, 1.87592998, 0.04155423},
                                           {0.05563942, -0.20401121, 1.05714898}};
-static const Color white = {0.95042854, 1, 1.0889004};
+static const Tristimulus white = {0.95042854, 1, 1.0889004};
 
-static Color transform(const double matrix[3][3], Color v)
+static Tristimulus transform(const double matrix[3][3], Tristimulus v)
 {
-    return (Color){matrix[0][0] * v.x + matrix[0][1] * v.y + matrix[0][2] * v.z,
-                   matrix[1][0] * v.x + matrix[1][1] * v.y + matrix[1][2] * v.z,
-                   matrix[2][0] * v.x + matrix[2][1] * v.y + matrix[2][2] * v.z};
+    return (Tristimulus){matrix[0][0] * v.x + matrix[0][1] * v.y + matrix[0][2] * v.z,
+                         matrix[1][0] * v.x + matrix[1][1] * v.y + matrix[1][2] * v.z,
+                         matrix[2][0] * v.x + matrix[2][1] * v.y + matrix[2][2] * v.z};
 }
 
 // Converts between linear RGB and YCxCz, a linear relative of L*a*b* (section 4.1.1).
-static Color ycc_from_rgb(Color rgb)
+static Tristimulus ycc_from_rgb(Tristimulus rgb)
 {
-    Color xyz = transform(xyz_from_rgb, rgb);
-    Color ratio = {xyz.x / white.x, xyz.y / white.y, xyz.z / white.z};
-    return (Color){116 * ratio.y - 16, 500 * (ratio.x - ratio.y), 200 * (ratio.y - ratio.z)};
+    Tristimulus xyz = transform(xyz_from_rgb, rgb);
+    Tristimulus ratio = {xyz.x / white.x, xyz.y / white.y, xyz.z / white.z};
+    return (Tristimulus){116 * ratio.y - 16, 500 * (ratio.x - ratio.y), 200 * (ratio.y - ratio.z)};
 }
 
-static Color rgb_from_ycc(Color ycc)
+static Tristimulus rgb_from_ycc(Tristimulus ycc)
 {
     double y = (ycc.x + 16) / 116;
     return transform(rgb_from_xyz,
-                     (Color){white.x * (y + ycc.y / 500), white.y * y, white.z * (y - ycc.z / 200)});
+                     (Tristimulus){white.x * (y + ycc.y / 500), white.y * y, white.z * (y - ycc.z / 200)});
 }
 
 static double lab_root(double ratio)
@@ -68,16 +68,16 @@ static double lab_root(double ratio)
 }
 
 // Converts linear RGB to L*a*b* (CIE 15:2004), with colors fading in the dark (Hunt; section 4.1.3).
-static Color hunt_lab(Color rgb)
+static Tristimulus hunt_lab(Tristimulus rgb)
 {
-    Color xyz = transform(xyz_from_rgb, rgb);
+    Tristimulus xyz = transform(xyz_from_rgb, rgb);
     double x = lab_root(xyz.x / white.x), y = lab_root(xyz.y / white.y), z = lab_root(xyz.z / white.z);
     double lightness = 116 * y - 16;
-    return (Color){lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
+    return (Tristimulus){lightness, 0.01 * lightness * 500 * (x - y), 0.01 * lightness * 200 * (y - z)};
 }
 
 // Returns the distance HyAB (Abasi, Tehran, Fairchild 2020; section 4.1.3).
-static double color_distance(Color p, Color q)
+static double color_distance(Tristimulus p, Tristimulus q)
 {
     return pow(fabs(p.x - q.x) + hypot(p.y - q.y, p.z - q.z), color_exponent);
 }
@@ -236,10 +236,10 @@ static Channel feature_strength(const Channel *gray, double (*shape)(double x, d
     return across;
 }
 
-static Color ycc_from_display(const float color[3])
+static Tristimulus ycc_from_display(const float color[3])
 {
-    return ycc_from_rgb(
-        (Color){srgb_decode((double)color[0]), srgb_decode((double)color[1]), srgb_decode((double)color[2])});
+    return ycc_from_rgb((Tristimulus){srgb_decode((double)color[0]), srgb_decode((double)color[1]),
+                                      srgb_decode((double)color[2])});
 }
 
 // An image as the eye perceives it.
@@ -255,7 +255,7 @@ static Seen seen_open(const float *image, uint32_t width, uint32_t height)
     for (int i = 0; i < 3; i++)
         seen.ycc[i] = channel_open(width, height);
     for (size_t i = 0; i < (size_t)width * height; i++) {
-        Color ycc = ycc_from_display(image + 3 * i);
+        Tristimulus ycc = ycc_from_display(image + 3 * i);
         seen.ycc[0].values[i] = (float)ycc.x;
         seen.ycc[1].values[i] = (float)ycc.y;
         seen.ycc[2].values[i] = (float)ycc.z;
@@ -282,16 +282,16 @@ static double clipped(double value)
     return fmax(0, fmin(value, 1));
 }
 
-static Color seen_color(Color ycc)
+static Tristimulus seen_color(Tristimulus ycc)
 {
-    Color rgb = rgb_from_ycc(ycc);
-    return hunt_lab((Color){clipped(rgb.x), clipped(rgb.y), clipped(rgb.z)});
+    Tristimulus rgb = rgb_from_ycc(ycc);
+    return hunt_lab((Tristimulus){clipped(rgb.x), clipped(rgb.y), clipped(rgb.z)});
 }
 
-static Color seen_color_at(const Seen *seen, size_t i)
+static Tristimulus seen_color_at(const Seen *seen, size_t i)
 {
-    return seen_color((Color){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
-                              (double)seen->ycc[2].values[i]});
+    return seen_color((Tristimulus){(double)seen->ycc[0].values[i], (double)seen->ycc[1].values[i],
+                                    (double)seen->ycc[2].values[i]});
 }
 
 // Compresses a distance to 0..1. The part up to compressed_to holds the smaller distances, and the remainder
@@ -304,9 +304,9 @@ static double compressed(double distance, double largest)
 }
 
 // Returns the difference of two perceived colors (section 4.1.3).
-static double color_difference(Color reference, Color test)
+static double color_difference(Tristimulus reference, Tristimulus test)
 {
-    double largest = color_distance(hunt_lab((Color){0, 1, 0}), hunt_lab((Color){0, 0, 1}));
+    double largest = color_distance(hunt_lab((Tristimulus){0, 1, 0}), hunt_lab((Tristimulus){0, 0, 1}));
     return compressed(color_distance(reference, test), largest);
 }
 

@@ -44,42 +44,6 @@ Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_cou
                   .real_size = renderer_scalar_size(renderer)};
 }
 
-static size_t buffer_size(cl_mem buffer)
-{
-    size_t size = 0;
-    return clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL) == CL_SUCCESS ? size : 0;
-}
-
-cl_mem spare_buffer_take(Renderer *renderer, size_t size)
-{
-    SpareBuffers *spares = &renderer->spares;
-    size_t best = spares->count, best_size = SIZE_MAX, largest = 0, largest_size = 0;
-    for (size_t i = 0; i < spares->count && best_size > size; i++) {
-        const size_t spare = buffer_size(spares->items[i]);
-        if (spare >= size && spare < best_size) {
-            best = i;
-            best_size = spare;
-        }
-        if (spare > largest_size) {
-            largest = i;
-            largest_size = spare;
-        }
-    }
-    const size_t chosen = best < spares->count ? best : largest;
-    if (chosen < spares->count) {
-        cl_mem buffer = spares->items[chosen];
-        spares->items[chosen] = spares->items[--spares->count];
-        if (chosen == best) return buffer;
-        buffer_release(buffer);
-    }
-    return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
-}
-
-void spare_buffer_return(Renderer *renderer, cl_mem buffer)
-{
-    if (buffer) array_push(renderer->spares, buffer);
-}
-
 static size_t divide_up(uint32_t count, uint32_t by)
 {
     return (count + by - 1) / by; // NOLINT(clang-analyzer-core.UndefinedBinaryOperatorResult): is defined
@@ -122,22 +86,22 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
 void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
 {
     buffers->rows = film.height;
-    buffers->film = spare_buffer_take(renderer, band_film_size(&film, aovs, buffers));
-    buffers->ray_counts = spare_buffer_take(renderer, RAYS_COUNT * sizeof(uint32_t));
+    buffers->film = spare_buffer_acquire(renderer, band_film_size(&film, aovs, buffers));
+    buffers->ray_counts = spare_buffer_acquire(renderer, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = renderer->pass != PASS_ALL;
     const size_t words = is_list            ? 4 * film_pixel_count(&film)
                          : renderer->repeat ? film_doubt_words(renderer, &film)
                                             : 0;
-    buffers->doubts = spare_buffer_take(renderer, words * sizeof(uint32_t));
-    buffers->center_doubts = spare_buffer_take(renderer, is_list ? 0 : words * sizeof(uint32_t));
+    buffers->doubts = spare_buffer_acquire(renderer, words * sizeof(uint32_t));
+    buffers->center_doubts = spare_buffer_acquire(renderer, is_list ? 0 : words * sizeof(uint32_t));
 }
 
 void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
 {
-    spare_buffer_return(renderer, buffers->film);
-    spare_buffer_return(renderer, buffers->ray_counts);
-    spare_buffer_return(renderer, buffers->doubts);
-    spare_buffer_return(renderer, buffers->center_doubts);
+    spare_buffer_release(renderer, buffers->film);
+    spare_buffer_release(renderer, buffers->ray_counts);
+    spare_buffer_release(renderer, buffers->doubts);
+    spare_buffer_release(renderer, buffers->center_doubts);
     *buffers = (BandBuffers){0};
 }
 

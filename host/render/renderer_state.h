@@ -5,6 +5,7 @@
 #include "host/opencl/passport.h"
 #include "host/render/pace.h"
 #include "host/render/renderer.h"
+#include "host/render/spare_buffers.h"
 
 typedef enum {
     KERNEL_RENDER,
@@ -42,13 +43,6 @@ static inline uint64_t padded_size(uint64_t size)
 typedef struct {
     uint64_t begins[FLAT_COUNT], array_sizes[FLAT_COUNT], buffer_sizes[SCENE_BUFFER_COUNT];
 } SceneLayout;
-
-// Buffers of finished bands. A driver for a GPU takes milliseconds to create such a buffer, because it pins
-// memory of the host, and often less than a tenth of that for the band.
-typedef struct {
-    cl_mem *items;
-    size_t count, capacity;
-} SpareBuffers;
 
 struct Renderer {
     Compute *compute;
@@ -97,12 +91,6 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
 
 // Returns the pace of a kernel's launches, with the target of the settings.
 Pace *renderer_pace(Renderer *renderer, KernelKind kind);
-
-// Returns the smallest spare buffer of at least `size` bytes, with undefined contents. Creates one if there
-// is none, in place of the largest spare, so that a renderer never has more buffers than it once used
-// together. buffer_spare gives it back; it accepts NULL.
-cl_mem spare_buffer_take(Renderer *renderer, size_t size);
-void spare_buffer_return(Renderer *renderer, cl_mem buffer);
 
 // Maps `size` bytes of a buffer, beginning at `begin`, for the host to read or write, and adds the time to
 // the report. Returns NULL if the device failed. renderer_unmap releases the mapping and accepts NULL.

@@ -98,13 +98,16 @@ static void rays_write(void *context, size_t begin, size_t end)
         const double ray[RAY_SCALARS] = {
             origin[0] / unit, origin[1] / unit, origin[2] / unit,           direction[0],
             direction[1],     direction[2],     batch->rays[i].tmin / unit, fmin(tmax / unit, farthest)};
-        for (size_t k = 0; k < RAY_SCALARS; k++)
-            scalar_set(scalars, i * RAY_SCALARS + k, is_double, ray[k]);
-        // a coordinate that underflows must not seem to be exactly 0: the kernel flags origins below its
-        // range
-        for (size_t axis = 0; axis < 3 && certifies; axis++)
-            if (origin[axis] != 0 && scalar_at(scalars, i * RAY_SCALARS + axis, is_double) == 0)
-                scalar_set(scalars, i * RAY_SCALARS + axis, is_double, is_double ? DBL_MIN : (double)FLT_MIN);
+        for (size_t k = 0; k < RAY_SCALARS; k++) {
+            // a coordinate that underflows must not seem to be exactly 0: the kernel flags origins below its
+            // range
+            const double rounded = is_double ? ray[k] : (double)(float)ray[k];
+            const bool underflows = certifies && k < 3 && rounded == 0 && origin[k] != 0;
+            scalar_set(scalars, i * RAY_SCALARS + k, is_double,
+                       !underflows ? ray[k]
+                       : is_double ? DBL_MIN
+                                   : (double)FLT_MIN);
+        }
     }
 }
 
@@ -130,9 +133,9 @@ static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *ray
     Compute *compute = renderer->compute;
     const size_t scalar = renderer_scalar_size(renderer), ray_size = count * RAY_SCALARS * scalar,
                  result_size = count * result_scalars(kind) * scalar, object_size = count * sizeof(uint32_t);
-    cl_mem ray_buffer = spare_buffer_take(renderer, ray_size),
-           results = spare_buffer_take(renderer, result_size),
-           objects = spare_buffer_take(renderer, object_size);
+    cl_mem ray_buffer = spare_buffer_acquire(renderer, ray_size),
+           results = spare_buffer_acquire(renderer, result_size),
+           objects = spare_buffer_acquire(renderer, object_size);
     TraceBatch batch = {renderer, kind, rays, hits};
     batch.ray_scalars = renderer_map(renderer, ray_buffer, 0, ray_size, CL_MAP_WRITE_INVALIDATE_REGION);
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
@@ -145,9 +148,9 @@ static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *ray
     renderer_unmap(renderer, results, batch.result_scalars);
     renderer_unmap(renderer, objects, batch.objects);
     compute_try(compute, clFinish(compute->queue));
-    spare_buffer_return(renderer, ray_buffer);
-    spare_buffer_return(renderer, results);
-    spare_buffer_return(renderer, objects);
+    spare_buffer_release(renderer, ray_buffer);
+    spare_buffer_release(renderer, results);
+    spare_buffer_release(renderer, objects);
 }
 
 static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,

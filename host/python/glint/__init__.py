@@ -324,17 +324,17 @@ class Scene:
                  device: Union[None, int, str] = None, lanes: int = 0, *, return_certain: bool = False) -> Any:
         """Returns whether anything lies strictly between tmin and tmax of each ray, as an array of bool.
 
-        Shadows: trace from the light to the points, with tmax=1 - 1e-6. A ray that starts at a hit point, which is rounded, may
-        hit the same surface again.
-        return_certain: whether to return a second array, which is True where the first is proven, at "certified". It takes as
-        long as `trace`, and 2 bytes per ray, not 77. The other arguments are those of `trace`.
+        Shadows: trace from the light, or from outside the scene if it is directional, to the points at "double" or "certified",
+        with tmax=1 - 1e-6. A ray that starts at a hit point, which is rounded, may hit the same surface again.
+        return_certain: whether to return a second array, which is True where the first is proven, at "certified".
+        Takes as long as `trace`, whose other arguments it has, but returns 1 or 2 bytes per ray instead of 77.
         """
         rays, keep = _rays(origins, directions, tmin, tmax)
-        occluded, certainty = np.empty(rays.count, bool), np.empty(rays.count, np.uint8)
+        occluded, certainty = np.empty(rays.count, bool), np.empty(rays.count, np.uint8) if return_certain else None
         found = _c.Occlusion(ctypes.sizeof(_c.Occlusion), _pointer(occluded), _pointer(certainty))
         self._call(_c.library.glint_trace_occlusion, device, precision, lanes, ctypes.byref(rays), ctypes.byref(found))
         del keep
-        return (occluded, certainty != 0) if return_certain else occluded
+        return occluded if certainty is None else (occluded, certainty != 0)
 
     def trace_all(self, origins: Any, directions: Any, precision: str = "double", tmin: Any = None, tmax: Any = None,
                   hits_max: Optional[int] = None, device: Union[None, int, str] = None, lanes: int = 0) -> AllHits:
@@ -409,7 +409,7 @@ def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) ->
 class ImageMetrics:
     """How far an image is from its reference: the figures of `glint diff`, with the names of its JSON report.
 
-    max_abs to rel_mse compare the values that are finite in both. max_ulp is in units in the last place of the arrays' type.
+    max_abs to rel_mse compare the values that are finite in both, and are NaN if there are none. max_ulp is in units in the last place of the arrays' type.
     srgb8_off_by_1 to flip_max compare colors as a screen shows them, and are 0 or NaN for data.
     """
     differing_values: int  #: in any bit
@@ -433,17 +433,27 @@ class ImageMetrics:
     flip_max: float
 
 
-def compare(reference: Any, image: Any) -> ImageMetrics:
-    """Compares an image with its reference: (height, width, 3) are colors in linear light, other shapes up to three dimensions
-    data, such as t. Arrays are compared as float32 if both are, else as float64."""
+def compare(reference: Any, image: Any, color: Optional[bool] = None) -> ImageMetrics:
+    """Compares an image with its reference, arrays of one shape: (height, width, channels), or fewer dimensions.
+
+    color: whether they are colors in linear light, by default if there are 3 channels; normals, say, are not. Other arrays are
+    data, such as t. Arrays are compared as float32 if both are, else as float64.
+    """
     given = np.asarray(reference), np.asarray(image)
     shape = given[0].shape
     if shape != given[1].shape or not 1 <= len(shape) <= 3:
         raise ValueError(f"compare: expected two arrays of one shape with 1 to 3 dimensions, not {shape} and {given[1].shape}")
+    is_color = shape[2:] == (3,) if color is None else color
+    if is_color and shape[2:] != (3,):
+        raise ValueError(f"compare: colors have the shape (height, width, 3), not {shape}")
+    for array in given:
+        if array.size == 0 or array.dtype.kind not in ("f" if is_color else "fiub"):
+            expected = "colors in floating point, or color=False" if is_color else "real numbers"
+            raise ValueError(f"compare: expected {expected}, not {array.dtype} of shape {shape}")
     dtype = np.float32 if all(array.dtype == np.float32 for array in given) else np.float64
     arrays = [np.ascontiguousarray(array, dtype) for array in given]
     height, width, channels = (_count("compare", side) for side in {1: (1, *shape, 1), 2: (*shape, 1), 3: shape}[len(shape)])
-    pair = _c.ImagePair(ctypes.sizeof(_c.ImagePair), 0 if dtype == np.float32 else 1, width, height, channels, *map(_pointer, arrays))
+    pair = _c.ImagePair(ctypes.sizeof(_c.ImagePair), 0 if dtype == np.float32 else 1, width, height, channels, *map(_pointer, arrays), not is_color)
     found, messages = _c.ImageMetrics(ctypes.sizeof(_c.ImageMetrics)), ctypes.c_void_p()
     _check(_c.library.glint_images_compare(ctypes.byref(pair), ctypes.byref(found), ctypes.byref(messages)), messages)
     return ImageMetrics(*(getattr(found, field.name) for field in fields(ImageMetrics)))

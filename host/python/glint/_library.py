@@ -30,7 +30,7 @@ AllHits = structure("AllHits", ("count", c_size_t), ("ray", POINTER(c_size_t)), 
 Hits = structure("Hits", *((name, c_void_p) for name in ("object", "t", "low", "high", "normal", "position", "certainty")))
 Occlusion = structure("Occlusion", ("occluded", c_void_p), ("certainty", c_void_p))
 ImagePair = structure("ImagePair", ("real", c_int), ("width", c_uint32), ("height", c_uint32), ("channels", c_uint32), ("reference", c_void_p),
-                      ("image", c_void_p))
+                      ("image", c_void_p), ("is_data", c_int))
 ImageMetrics = structure("ImageMetrics", *((name, c_uint64) for name in ("differing_values", "unmatched_values", "nonfinite_reference",
                                                                          "nonfinite_image", "compared_values")),
                          *((name, c_double) for name in ("max_abs", "rmse", "bias", "p99_9", "psnr", "rel_mse", "max_ulp")),
