@@ -49,16 +49,20 @@ static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
     cl_program program = clCreateProgramWithSource(compute.context, 1, &text, NULL, NULL);
     cl_must(clBuildProgram(program, 1, &device->id, "", NULL, NULL));
     cl_kernel kernel = clCreateKernel(program, "index", NULL);
-    cl_mem buffer = clCreateBuffer(compute.context, CL_MEM_READ_WRITE, 64, NULL, NULL);
-    cl_must(clSetKernelArg(kernel, 0, sizeof buffer, &buffer));
-    cl_must(clEnqueueNDRangeKernel(compute.queue, kernel, 1, NULL, &(size_t){16}, NULL, 0, NULL, NULL));
-    cl_must(clFinish(compute.queue));
+    cl_mem buffers[2]; // worker threads of PoCL keep pointers to the one that they used last
+    for (size_t i = 0; i < 2; i++) {
+        buffers[i] = clCreateBuffer(compute.context, CL_MEM_READ_WRITE, 64, NULL, NULL);
+        cl_must(clSetKernelArg(kernel, 0, sizeof *buffers, &buffers[i]));
+        cl_must(clEnqueueNDRangeKernel(compute.queue, kernel, 1, NULL, &(size_t){16}, NULL, 0, NULL, NULL));
+        cl_must(clFinish(compute.queue));
+    }
     cl_must(clReleaseKernel(kernel)); // PoCL's worker threads keep a pointer to what they ran
     kernel = clCreateKernel(program, "index", NULL);
 
     void *memory = memory_allocate(64, 1);
     if (forgotten != MEMORY) free(memory);
-    if (forgotten != BUFFER) cl_must(clReleaseMemObject(buffer));
+    if (forgotten != BUFFER) cl_must(clReleaseMemObject(buffers[0]));
+    cl_must(clReleaseMemObject(buffers[1]));
     if (forgotten != KERNEL) cl_must(clReleaseKernel(kernel));
     if (forgotten != PROGRAM) cl_must(clReleaseProgram(program));
     compute_close(&compute);
