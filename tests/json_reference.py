@@ -57,7 +57,8 @@ docs/glint.schema.json for the same as JSON Schema (2020-12), docs/accuracy.md f
 """
 NOTES = {
     "glint render --timing=json": "glint-mpi render adds `by_rank[]`, with the members `host`, `name`, `driver`, `lanes`, `share`, `bands`, "
-                                  "`busy_ms` and `idle_ms` for each rank but the first.",
+                                  "`busy_ms` and `idle_ms` for each rank but the first. With several scenes or "
+                                  "frames, each image that is rendered has one line with its object.",
     "glint check": "",
     "glint devices": "`passports[]` has the passports that are known, in other reports those that were needed. `refused[]` has each "
                      "`precision` that a passport refuses, and the `reason`. Both may be empty.",
@@ -115,6 +116,7 @@ MEANINGS = {
     "scene": "text; path",
     "size": "integer; width, height",
     "samples": "integer; per pixel",
+    "frame": "number; only with `--frames`",
     "precision": "text; `single`, `strict`, `double` or `certified`",
     "{repeated,undecided}_samples": "count; at `certified`: re-rendered in double, and undecided",
     "lanes": "integer; 1, 4, 8 or 16",

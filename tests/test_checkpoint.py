@@ -1,6 +1,7 @@
 #!/usr/bin/env -S python3 -B
 """A render that ends early can be resumed, and its image equals that of an undisturbed one: after kill -9, a full disk, an
 interrupt and a device's failure, on one device and on two. GLINT_LONG_TESTS=1: 200 kills."""
+import json
 import os
 import random
 import resource
@@ -142,6 +143,30 @@ class Checkpoints(TestCase):
         """A checkpoint of the image's own name is replaced by the image, not removed."""
         self.glint(f"{RENDER} -o same.npy --checkpoint same.npy", env=POCL)
         self.assertSameBytes("same.npy", "whole.npy")
+
+    def test_frames(self):
+        """Each frame has its bands in a file; complete frames are kept, and each of the others reports in one line."""
+        write("moving.yaml", SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 2: 0.5}}"))
+        frames = RENDER.replace("sphere.yaml", "moving.yaml")
+        self.glint(f"{frames} --frames 0-2 -o whole%d.npy", env=POCL)
+        command = f"{frames} --frames 0-2 --skip-existing --checkpoint saved-%02d -o image%d.npy --timing=json"
+        write("image0.npy", "kept")
+        limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
+        process = self.refuses(command, "cannot write the checkpoint 'saved-01': File too large", env=POCL, preexec_fn=limit)
+        self.assertIn("finished bands are in 'saved-01'", process.stderr)
+        os.remove("saved-02")
+        reports = [json.loads(line) for line in self.glint(command, env=POCL).stdout.splitlines()]
+        self.assertEqual([(report["scene"], report["frame"]) for report in reports], [("moving.yaml", 1), ("moving.yaml", 2)])
+        first, second = (report["by_device"][0]["share"] for report in reports)
+        self.assertTrue(0 < first < 1)
+        self.assertEqual(second, 1)
+        self.assertEqual(Path("image0.npy").read_text(encoding="utf-8"), "kept")
+        for frame in 1, 2:
+            self.assertSameBytes(f"image{frame}.npy", f"whole{frame}.npy")
+        self.assertEqual(list(Path().glob("saved*")), [])
+        self.refuses(f"{frames} --frames 1 --checkpoint same --skip-existing -o same", "would keep a --checkpoint")
+        self.glint(f"{frames} --frames 1 --checkpoint saved -o image1.npy", env=POCL)
+        self.assertSameBytes("image1.npy", "whole1.npy")
 
     def test_kills(self):
         """kill -9 at any moment; whatever is left, the next run resumes."""

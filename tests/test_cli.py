@@ -30,7 +30,7 @@ WRONG_COMMAND_LINES = [
     ("one scene", "{trace|check --json|check --object 0} sphere.yaml other.yaml"),
     ("would both be 'sphere.png'", "render sphere.yaml ./sphere.yaml"),
     ("--checkpoint takes one scene", "render sphere.yaml other.yaml --checkpoint saved"),
-    ("--timing=json and =trace take one scene", "render sphere.yaml other.yaml --timing={json|trace}"),
+    ("--timing=trace takes one image", "render sphere.yaml other.yaml --timing=trace"),
     ("must be a folder", "render sphere.yaml other.yaml -o {nowhere|sphere.yaml|''}"),
     ("'--nonsense'", "{render sphere.yaml|trace sphere.yaml|check sphere.yaml|devices} --nonsense"),
     ("rays", "trace sphere.yaml"),

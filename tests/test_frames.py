@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
 """Frames of an animation: each is the image of the scene with that frame's values."""
+import json
 import math
 import os
 from pathlib import Path
@@ -110,6 +111,18 @@ class Frames(TestCase):
         self.assertEqual(process.stderr, "glint: wrote moving.png, moving.t.npy\n")
         self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
 
+    def test_reports(self):
+        """One line each, also of scenes."""
+        write("moving.yaml", SCENE.format(**KEYS))
+        write("still.yaml", SPHERE)
+        for options, expected in ("moving.yaml --frames 3-4", [("moving.yaml", 3), ("moving.yaml", 4)]), \
+                ("moving.yaml still.yaml", [("moving.yaml", None), ("still.yaml", None)]):
+            lines = self.glint(f"render {options} {RENDER} --timing=json").stdout.splitlines()
+            reports = [json.loads(line) for line in lines]
+            self.assertEqual([(report["scene"], report.get("frame")) for report in reports], expected)
+            self.assertTrue(all(report["by_device"][0]["launches"] for report in reports))
+        self.assertEqual(self.json(f"render moving.yaml --frames 3 {RENDER} --timing=json")["frame"], 3)
+
     def test_standard_streams(self):
         """A scene of standard input; images on standard output, one after the other, with the bytes of files."""
         moving = SCENE.format(**KEYS)
@@ -155,8 +168,9 @@ class Frames(TestCase):
             "--frames all": "--frames all: 'moving.yaml' has no 'frames'; name them, such as 0-47",
             "--frames all -o a.png": "or have a place for the number",
             "--frames 0-3 still.yaml": "--frames takes one scene",
-            "--frames 0-3 --checkpoint c": "--checkpoint takes one frame; --skip-existing",
-            "--frames 0-3 --timing=json": "--timing=json and =trace take one frame",
+            "--frames 0-3 --checkpoint c-%d": "--checkpoint of several frames needs --skip-existing",
+            "--frames 0-3 --checkpoint c --skip-existing": "must have a place for the number, such as bands-%04d",
+            "--frames 0-3 --timing=trace": "--timing=trace takes one image",
         }.items():
             self.refuses(f"render moving.yaml {RENDER} {options}", message)
         self.refuses("render - --frames 0-1", "standard input only once")

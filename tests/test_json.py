@@ -108,7 +108,8 @@ class Json(TestCase):
     def test_render(self):
         fp64 = need_device()["fp64"]
         budget = "--max-error 0.5 " if fp64 else ""
-        outputs = [self.json(f"render plain.yaml {SMALL} {budget}--aov t,path --timing=json")]
+        outputs = [self.json(f"render plain.yaml {SMALL} {budget}--aov t,path --timing=json"),
+                   self.json(f"render plain.yaml {SMALL} --frames 1 --timing=json")]
         if fp64:
             outputs.append(self.json(f"render plain.yaml {SMALL} --precision certified --timing=json"))
         for device in [device for output in outputs for device in output["by_device"]]:

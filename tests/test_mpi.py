@@ -183,15 +183,20 @@ class Mpi(TestCase):
         os.mkdir("frames")
 
     def test_frames_of_an_animation(self):
-        """Each rank has its frames, all have the last one; the ones that exist are kept."""
+        """Each rank has its frames and their checkpoints, all have the last one; the ones that exist are kept. With reports on
+        standard output all have each frame."""
         write("moving.yaml", SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))
         command = "render moving.yaml --size 64x48 --precision strict --frames 0-4"
         self.glint(f"{command} --quiet -o one%d.npy", env=POCL)
         write("ranks1.npy", "kept")
-        process = self.mpirun(f"-n 2 {RANKS} {command} --skip-existing -o ranks%d.npy")
+        process = self.mpirun(f"-n 2 {RANKS} {command} --skip-existing --checkpoint saved%d -o ranks%d.npy")
         self.assertEqual(process.stderr.count("glint: kept ranks1.npy\n"), 1)
         for frame in 0, 2, 3, 4:
             self.assertSameBytes(f"one{frame}.npy", f"ranks{frame}.npy")
+        self.assertEqual(list(Path().glob("saved*")), [])
+        process = self.mpirun(f"-n 2 {RANKS} {command} -o ranks%d.npy --timing=json")
+        reports = [json.loads(line) for line in process.stdout.splitlines()]
+        self.assertEqual([(report["frame"], len(report["by_rank"])) for report in reports], [(frame, 1) for frame in range(5)])
 
     def test_frames(self):
         """Each rank renders whole ones, and all together what is left, or all where one sees other files or has other options. A mistake ends one frame."""

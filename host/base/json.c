@@ -162,3 +162,17 @@ void json_print(Json *json, FILE *stream)
     fwrite(text.items, 1, text.count, stream);
     text_free(&text);
 }
+
+void json_print_line(Json *json, FILE *stream)
+{
+    Text text = json_close(json);
+    // texts have no line breaks, so that an indent follows each
+    for (const char *line = text_c(&text); *line; line += strspn(line, "\n ")) {
+        const size_t length = strcspn(line, "\n");
+        fwrite(line, 1, length, stream);
+        line += length;
+    }
+    fputc('\n', stream);
+    fflush(stream);
+    text_free(&text);
+}

@@ -25,3 +25,5 @@ void json_number_print(char word[JSON_NUMBER_SIZE], double value);
 Text json_close(Json *json);
 // Prints the document and one newline, and frees it.
 void json_print(Json *json, FILE *stream);
+// Prints the document on one line at once, and frees it.
+void json_print_line(Json *json, FILE *stream);

@@ -10,6 +10,7 @@
 #include "host/cli/render_devices.h"
 #include "host/cli/render_options.h"
 #include "host/import/load.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -215,7 +216,11 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
-        HostTimes times = {.parse_seconds = clock_seconds() - start, .stage = options.common.stage};
+        HostTimes times = {.scene = options.scene,
+                           .frame = options.frame_count > 0 ? options.common.frame : NAN,
+                           .is_several = options.has_several,
+                           .parse_seconds = clock_seconds() - start,
+                           .stage = options.common.stage};
         if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)
             fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options.scene);
         open->has_warned_of_frames = true;
@@ -229,15 +234,21 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
     return status;
 }
 
+// Returns the pattern with the frame's number in its place, if it has one. The caller frees it.
+static char *frame_name_make(const char *pattern, uint32_t frame)
+{
+    const FramePlace place = frame_place_of(pattern);
+    if (!place.start) return memory_copy_text(pattern);
+    return text_format("%.*s%0*u%s", (int)(place.start - pattern), pattern, place.digits, frame, place.end);
+}
+
 // Returns the path of a frame's image. The caller frees it.
 static char *frame_path_make(const RenderOptions *options, uint32_t frame)
 {
     const char *output = options->output.path;
     if (options->has_format) return memory_copy_text(output);
-    const FramePlace place = output ? frame_place_of(output) : (FramePlace){0};
-    if (place.start)
-        return text_format("%.*s%0*u%s", (int)(place.start - output), output, place.digits, frame, place.end);
-    if (output && !output_is_folder(output)) return memory_copy_text(output);
+    if (output && (frame_place_of(output).start || !output_is_folder(output)))
+        return frame_name_make(output, frame);
     char *name = image_output_default_path(options->scenes[0]);
     char *path = text_format("%s%s%.*s-%04u.png", output ? output : "", output ? "/" : "",
                              (int)(strlen(name) - strlen(".png")), name, frame);
@@ -351,6 +362,11 @@ const char *render_command_path(const RenderCommand *command, size_t index)
     return command->paths[index];
 }
 
+bool render_command_reports_to_stdout(const RenderCommand *command)
+{
+    return timing_uses_stdout(command->options.timing);
+}
+
 bool render_command_open_devices(RenderCommand *command)
 {
     command->open.reference_selector = command->options.common.reference_device;
@@ -377,7 +393,13 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     render_devices_rest(open);
     progress_end_at_once(); // nothing checks the flag while a scene is read
     if (progress_interrupted()) return EXIT_INTERRUPTED;
-    const int status = file_render(command->options, command->paths[index], open, ranks);
+    RenderOptions of_image = *options;
+    char *checkpoint = options->checkpoint && options->frame_count > 0
+                           ? frame_name_make(options->checkpoint, options->first_frame + (uint32_t)index)
+                           : NULL;
+    if (checkpoint) of_image.checkpoint = checkpoint;
+    const int status = file_render(of_image, command->paths[index], open, ranks);
+    free(checkpoint);
     return render_devices_work(open) ? status : EXIT_MACHINE;
 }
 

@@ -20,6 +20,7 @@ bool render_command_open_devices(RenderCommand *command);
 size_t render_command_count(const RenderCommand *command); // the number of images: scenes, or frames of one
 const char *render_command_scene(const RenderCommand *command, size_t index);
 const char *render_command_path(const RenderCommand *command, size_t index); // the image
+bool render_command_reports_to_stdout(const RenderCommand *command);
 
 // Renders one image and returns its exit status. `ranks` may be NULL.
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);

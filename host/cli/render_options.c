@@ -85,7 +85,8 @@ static const char help_text[] =
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE until the image is complete; the\n"
                     "                        same command resumes where an earlier one ended\n"
-                    "      --frames A[-B]    render these frames, or all; -o has %d or %04d for the number\n"
+                    "      --frames A[-B]    render these frames, or all; FILEs have %d or %04d for the "
+                    "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
                     "      --format F        format of --output -: png, ppm or npy\n"
@@ -286,14 +287,16 @@ static bool several_fit(const RenderOptions *options)
     const FramePlace place = path ? frame_place_of(path) : (FramePlace){0};
     if (options->frame_count > 0 && has_scenes)
         option_usage_fault("render", "--frames takes one scene, but several are given");
-    else if (options->checkpoint)
+    else if (options->checkpoint && has_scenes)
+        option_usage_fault("render", "--checkpoint takes one scene, but several are given");
+    else if (options->checkpoint && !options->skips_existing)
+        option_usage_fault("render",
+                           "--checkpoint of several frames needs --skip-existing, which keeps finished ones");
+    else if (options->checkpoint && !frame_place_of(options->checkpoint).start)
         option_usage_fault(
-            "render", has_scenes ? "--checkpoint takes one scene, but several are given"
-                                 : "--checkpoint takes one frame; --skip-existing continues with the rest");
-    else if (timing_uses_stdout(options->timing))
-        option_usage_fault("render", has_scenes
-                                         ? "--timing=json and =trace take one scene, but several are given"
-                                         : "--timing=json and =trace take one frame, but several are given");
+            "render", "--checkpoint of several frames must have a place for the number, such as bands-%04d");
+    else if (options->timing == TIMING_TRACE)
+        option_usage_fault("render", "--timing=trace takes one image, but several are given");
     else if (has_scenes && path && !output_is_folder(path))
         option_usage_fault("render", "--output of several scenes must be a folder");
     else if (!has_scenes && strcmp(options->scenes[0], "-") == 0)
@@ -346,14 +349,17 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
         return option_usage_fault("render",
                                   "--max-error may choose another precision when a checkpoint is resumed; "
                                   "name its choice with --precision");
+    if (options->checkpoint && options->skips_existing && options->output.path &&
+        strcmp(options->checkpoint, options->output.path) == 0)
+        return option_usage_fault("render", "--skip-existing would keep a --checkpoint of the image's name");
     if (!stdout_fits(options) || !display_fits(&options->output)) return EXIT_USER;
-    if (options->skips_existing && timing_uses_stdout(options->timing))
-        return option_usage_fault("render",
-                                  "--skip-existing may leave --timing=json or =trace nothing to report");
     options->scenes = arguments + optind;
     options->scene_count = (size_t)(argument_count - optind);
-    const bool is_one = options->scene_count == 1 && options->frame_count <= 1 && !options->has_all_frames;
-    if (!is_one && !several_fit(options)) return EXIT_USER;
+    options->has_several = options->scene_count > 1 || options->frame_count > 1 || options->has_all_frames;
+    if (options->has_several && !several_fit(options)) return EXIT_USER;
+    if (!options->has_several && options->skips_existing && timing_uses_stdout(options->timing))
+        return option_usage_fault("render",
+                                  "--skip-existing may leave --timing=json or =trace nothing to report");
     return !options->has_all_frames || frames_count(options) ? OPTIONS_READ : EXIT_USER;
 }
 

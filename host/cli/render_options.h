@@ -9,8 +9,8 @@ typedef struct {
     CommonOptions common;
     char **scenes;
     size_t scene_count;
-    const char *scene; // the one that is rendered
-    const char *checkpoint;
+    const char *scene;         // the one that is rendered
+    const char *checkpoint;    // with several frames, their pattern
     ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
     uint32_t width, height;    // 0 if not given
     uint32_t sample_count, bounce_count;
@@ -18,6 +18,7 @@ typedef struct {
     uint32_t region[4];                // x, y, width, height
     uint32_t first_frame, frame_count; // of an animation; a count of 0 if not given
     bool has_all_frames, has_region, has_transfer, has_format, quiet, skips_existing;
+    bool has_several;   // scenes, or frames
     ErrorBudget budget; // a limit of 0 means none
     TimingStyle timing;
 } RenderOptions;

@@ -5,6 +5,7 @@
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/timing_trace.h"
+#include <math.h>
 #include <stdio.h>
 
 bool timing_style_read(const char *value, TimingStyle *style)
@@ -266,6 +267,8 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     Json *json = json_open();
     json_int64(json, "schema", 3);
     json_text(json, "glint", glint_version());
+    json_text(json, "scene", host->scene);
+    if (!isnan(host->frame)) json_number(json, "frame", host->frame);
     size_json(json, settings->region_width, settings->region_height);
     json_int64(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
@@ -282,7 +285,10 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     if (ranks) ranks_json(json, ranks, settings);
     json_number(json, "render_ms", 1e3 * host->render_seconds);
     json_number(json, "encode_ms", 1e3 * host->encode_seconds);
-    json_print(json, stdout);
+    if (host->is_several)
+        json_print_line(json, stdout);
+    else
+        json_print(json, stdout);
 }
 
 void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,

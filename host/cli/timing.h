@@ -15,6 +15,9 @@ static inline bool timing_uses_stdout(TimingStyle style)
 bool timing_style_read(const char *value, TimingStyle *style); // a value of NULL means text
 
 typedef struct {
+    const char *scene;
+    double frame;    // NAN without --frames
+    bool is_several; // a JSON report is one line of several
     double parse_seconds, encode_seconds;
     const Pilot *pilot;    // chose the precision, or NULL
     double render_seconds; // from the first band to the last, builds included

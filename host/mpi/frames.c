@@ -52,9 +52,10 @@ static uint64_t files_hash(const RenderCommand *command, Call call)
     return hash;
 }
 
-// Only one rank can read standard input, or write images to standard output in order.
+// Only one rank can read standard input, or write images or reports to standard output in order.
 static bool uses_standard_streams(const RenderCommand *command)
 {
+    if (render_command_reports_to_stdout(command)) return true;
     for (size_t i = 0; i < render_command_count(command); i++)
         if (strcmp(render_command_scene(command, i), "-") == 0 ||
             strcmp(render_command_path(command, i), "-") == 0)
