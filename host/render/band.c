@@ -216,6 +216,16 @@ static void doubts_clear(Renderer *renderer, cl_mem doubts, const Place *place)
     free(words);
 }
 
+// Sets the sums and their compensation to 0, which kernels do at sample 0 only.
+static void sums_clear(Renderer *renderer, const BandBuffers *buffers, const Place *place)
+{
+    const size_t pixels = (size_t)place->band.s[2] * place->band.s[3],
+                 size = 2 * 3 * pixels * renderer_scalar_size(renderer);
+    void *zeros = memory_allocate_zeroed(size, 1);
+    buffer_write(renderer->compute, buffers->film, size, zeros);
+    free(zeros);
+}
+
 static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
 {
     const uint32_t zeros[RAYS_COUNT] = {0};
@@ -245,7 +255,10 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 7, sizeof(cl_mem), &buffers->doubts);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 8, sizeof(cl_mem), &buffers->band_film);
-    if (first == 0) doubts_clear(renderer, buffers->doubts, place);
+    if (first == renderer->settings.first_sample) {
+        doubts_clear(renderer, buffers->doubts, place);
+        if (first > 0) sums_clear(renderer, buffers, place);
+    }
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
     const bool go_on = place_launch(renderer, KERNEL_RENDER, place, last - first);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);

@@ -124,13 +124,13 @@ static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows,
     const Place place = band_place(renderer, rows);
     bool go_on = true;
     pace_begin_band(pace);
-    if (first == 0) band_clear_doubts(renderer, buffers, rows);
+    if (first == renderer->settings.first_sample) band_clear_doubts(renderer, buffers, rows);
     while (go_on && first < end) {
         const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
         go_on = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(delivery);
         first += samples;
     }
-    if (go_on && renderer->repeat && end == renderer->settings.sample_count)
+    if (go_on && renderer->repeat && end == samples_end(&renderer->settings))
         go_on = band_repeat(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
     return go_on && compute_ok(renderer->compute);
 }
@@ -158,6 +158,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     const Compute *compute = renderer->compute;
     const Delivery delivery = {.queue = queue};
     const uint32_t step = settings->band_rows > 0 ? settings->band_rows : group_shape(renderer).height;
+    const uint32_t end = samples_end(settings);
     BandBuffers buffers = {0};
     band_buffers_open(&buffers, renderer, aovs, film_of_rows(renderer, 0, rows_max(renderer, aovs)));
     renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
@@ -165,11 +166,11 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     pace_begin_band(pace); // the last render's band may belong to another scene or size
     bool go_on = compute_ok(compute);
     while (go_on) {
-        uint32_t wanted = band_rows(renderer, pace, settings->sample_count, buffers.rows);
+        uint32_t wanted = band_rows(renderer, pace, end - settings->first_sample, buffers.rows);
         BandRows rows = queue->take(queue->context, wanted, step);
         if (rows.row_count == 0) break;
         const double start = clock_seconds();
-        go_on = band_sample(renderer, &buffers, rows, 0, settings->sample_count, &delivery) &&
+        go_on = band_sample(renderer, &buffers, rows, settings->first_sample, end, &delivery) &&
                 band_fill_aovs(renderer, &buffers, aovs, rows) &&
                 band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
         array_push(renderer->report.bands, ((HostSpan){"band", start, clock_seconds()}));

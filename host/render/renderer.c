@@ -228,9 +228,13 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     renderer->pass = pass;
     renderer->settings = pass_settings(settings, pass);
     RenderReport *report = &renderer->report;
+    report->build_from_cache = true;
+    if (earlier && settings->first_sample > 0) { // it rendered earlier samples of the image
+        *report = earlier->report;
+        earlier->report = (RenderReport){0};
+    }
     report->device = compute->device;
     report->reference_device = compute->reference ? compute->reference->device : NULL;
-    report->build_from_cache = true;
     report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
     report->lanes = device_lanes(compute->device, report->is_double, settings->lanes);
@@ -275,8 +279,8 @@ static void scene_changed(Renderer *renderer)
     const CompiledScene *compiled = &renderer->compiled;
     renderer->light_count = compiled->arrays[FLAT_LIGHTS].count;
     renderer->report.features = compiled->features;
-    renderer->report.flatten_seconds = compiled->flatten_seconds;
-    renderer->report.bvh_seconds = compiled->bvh_seconds;
+    renderer->report.flatten_seconds += compiled->flatten_seconds;
+    renderer->report.bvh_seconds += compiled->bvh_seconds;
     if (renderer->settings.hashes_scene) { // lengths are restored with the unit
         uint64_t hash = renderer->report.scene_hash;
         hash = hash_bytes(hash, &compiled->primitives_hash, sizeof compiled->primitives_hash);
@@ -407,8 +411,9 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
     if (!compute_ok(renderer->compute) || !settings_fit(&of_pass, renderer->compute, messages) ||
         !scene_assign(renderer, scene, &of_pass, messages))
         return false;
+    RenderReport *report = &renderer->report;
     renderer->settings = of_pass;
-    renderer->report.upload_seconds = 0;
+    report->upload_seconds = report->flatten_seconds = report->bvh_seconds = 0;
     arrays_upload(&renderer, 1, &renderer->compiled);
     scene_changed(renderer); // another eye may need another feature, or a deeper stack
     return compute_ok(renderer->compute) &&

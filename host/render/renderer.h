@@ -19,6 +19,10 @@ typedef struct {
     // squares begin at region_x, region_y, and there are region_width x region_height of them. At most 4096.
     uint32_t cell;
     uint32_t sample_count; // per pixel, at least 1
+    // Renders samples first_sample .. end_sample - 1 alone, as part of an image whose other samples another
+    // scene has; an end_sample of 0 means sample_count. Unless they include the last, colors are their sum,
+    // else their sum over sample_count. Both are 0 for renderer_accumulate.
+    uint32_t first_sample, end_sample;
     uint32_t bounce_count; // the limit per camera ray, 0..BOUNCES_MAX
     // Reflected and refracted rays whose weight in a pixel is below this in all channels are not traced; 0
     // traces all.

@@ -63,6 +63,12 @@ struct Renderer {
     Renderer *repeat;         // renders the next pass; NULL in the last
 };
 
+// Returns the index behind the last sample that is rendered.
+static inline uint32_t samples_end(const RenderSettings *settings)
+{
+    return settings->end_sample > 0 ? settings->end_sample : settings->sample_count;
+}
+
 size_t renderer_scalar_size(const Renderer *renderer);
 
 // Returns whether the renderer's kernels bound their errors and flag pixels, which they do at `certified` and

@@ -112,13 +112,25 @@ static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const Pix
     renderer_unmap(renderer, buffers->film, values);
 }
 
+// Writes a list's pixels and behind them their counts of uncertain samples, which kernels set at sample 0
+// only.
+static void list_write(Renderer *renderer, cl_mem doubts, const PixelList *list)
+{
+    const size_t size = list->count * sizeof *list->items,
+                 count_size = renderer->settings.first_sample > 0 ? list->count * sizeof(uint32_t) : 0;
+    char *bytes = memory_allocate_zeroed(size + count_size, 1);
+    memcpy(bytes, list->items, size);
+    buffer_write(renderer->compute, doubts, size + count_size, bytes);
+    free(bytes);
+}
+
 // Renders all samples of a list. Returns false if the device failed or settings.stop ended the render.
 static bool list_render(Renderer *renderer, const BandBuffers *buffers, const Place *place)
 {
-    const uint32_t end = renderer->settings.sample_count;
+    const uint32_t end = samples_end(&renderer->settings);
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
     pace_begin_band(pace);
-    for (uint32_t first = 0, samples; first < end; first += samples) {
+    for (uint32_t first = renderer->settings.first_sample, samples; first < end; first += samples) {
         samples = pace_begin_pass(pace, place_pixels(place), end - first);
         if (!band_render(renderer, buffers, place, first, first + samples)) return false;
     }
@@ -138,8 +150,9 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
     const Place place = list_place(repeat, (uint32_t)list->count);
     BandBuffers repeated = {0};
     band_buffers_open(&repeated, repeat, band->aovs, film);
-    repeated.band_film = repeat->compute == renderer->compute ? band->buffers->film : NULL;
-    buffer_write(repeat->compute, repeated.doubts, list->count * sizeof *list->items, list->items);
+    const bool is_last = samples_end(&repeat->settings) == repeat->settings.sample_count;
+    repeated.band_film = is_last && repeat->compute == renderer->compute ? band->buffers->film : NULL;
+    list_write(repeat, repeated.doubts, list);
     const bool whole = band->kind == KERNEL_RENDER
                            ? list_render(repeat, &repeated, &place)
                            : band_fill(repeat, band->kind, &repeated, band->aovs, &place);
@@ -182,9 +195,10 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
     free(words);
     if (list.count > 0) {
         RepeatCounts *counts = &buffers->repeats;
+        const RenderSettings *settings = &renderer->settings;
+        const uint32_t samples_of_pixel = samples_end(settings) - settings->first_sample;
         uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
-        counts->repeated +=
-            (uint64_t)list.count * (kind == KERNEL_RENDER ? renderer->settings.sample_count : 1);
+        counts->repeated += (uint64_t)list.count * (kind == KERNEL_RENDER ? samples_of_pixel : 1);
         doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
         is_whole = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
         if (is_whole) counts->undecided += list_keep_undecided(&list, undecided);
