@@ -198,6 +198,15 @@ class Mpi(TestCase):
         reports = [json.loads(line) for line in process.stdout.splitlines()]
         self.assertEqual([(report["frame"], len(report["by_rank"])) for report in reports], [(frame, 1) for frame in range(5)])
 
+    def test_motion_blur(self):
+        """In a frame that one rank renders, and in one that all render."""
+        write("moving.yaml", "shutter: 0.5\n" + SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))
+        command = "render moving.yaml --size 64x48 --precision strict --frames 0-2 --samples 5"
+        self.glint(f"{command} --quiet -o one%d.npy", env=POCL)
+        self.mpirun(f"-n 2 {RANKS} {command} -o ranks%d.npy")
+        for frame in range(3):
+            self.assertSameBytes(f"one{frame}.npy", f"ranks{frame}.npy")
+
     def test_frames(self):
         """Each rank renders whole ones, and all together what is left, or all where one sees other files or has other options. A mistake ends one frame."""
         command = self.write_frames({"bad": "camera: 5", "boxes": (ROOT / "scenes/boxes.yaml").read_text()}.items(), 1)

@@ -85,7 +85,7 @@ typedef struct {
     // the key.
     const char *const *overrides;
     size_t override_count;
-    double frame; // the frame of an animated scene
+    double frame; // the frame of an animated scene, which its shutter does not blur
     // The path of another scene, whose camera replaces the scene's, or NULL. Only glint_scene_load uses it.
     const char *camera;
 } GlintSceneOptions;

@@ -9,6 +9,7 @@
 #include "host/cli/progress.h"
 #include "host/cli/render_devices.h"
 #include "host/cli/render_options.h"
+#include "host/cli/shutter.h"
 #include "host/import/load.h"
 #include <math.h>
 #include <stdio.h>
@@ -17,23 +18,23 @@
 #include <unistd.h>
 
 typedef struct {
-    ImageOutput *output;
+    ImageOutput *output; // NULL unless this is the last time
+    Shutter *shutter;
     OpenDevices *devices;
-    Progress *progress;
     MessageList *messages;
     const RenderSettings *settings;
-    bool is_quiet, is_estimated;
+    bool is_quiet;
 } BandContext;
 
 // Prints one estimate of the time and the size of a long render.
 static void estimate_print(BandContext *take, double fraction_done)
 {
     enum { SECONDS_MIN = 60 };
-    if (take->is_quiet || take->is_estimated) return;
-    double left = progress_seconds_left(take->progress, fraction_done);
-    take->is_estimated = left >= 0;
+    if (take->is_quiet || take->shutter->is_estimated) return;
+    double left = progress_seconds_left(&take->shutter->progress, fraction_done);
+    take->shutter->is_estimated = left >= 0;
     if (left < SECONDS_MIN) return;
-    const double bytes = image_output_bytes(take->output);
+    const double bytes = take->output ? image_output_bytes(take->output) : 0;
     fprintf(stderr, "glint: %u x %u pixels: about %s%s%s\n", take->settings->region_width,
             take->settings->region_height, text_duration(left).text, bytes > 0 ? " and at most " : "",
             bytes > 0 ? text_size(bytes).text : "");
@@ -42,11 +43,22 @@ static void estimate_print(BandContext *take, double fraction_done)
 static bool band_take(void *context, const Film *band, double fraction_done)
 {
     BandContext *take = context;
+    Shutter *shutter = take->shutter;
+    bool is_taken = true;
     if (progress_interrupted()) return false;
-    bool written = image_output_write(take->output, band, take->messages);
-    if (written) estimate_print(take, fraction_done);
-    progress_show(take->progress, fraction_done);
-    return written;
+    if (shutter->time_count == 1) {
+        is_taken = image_output_write(take->output, band, take->messages);
+    } else if (take->output) {
+        Film mean = shutter_mean(shutter, band);
+        is_taken = image_output_write(take->output, &mean, take->messages);
+        free(mean.layers[LAYER_COLOR]);
+    } else {
+        shutter_add(shutter, band);
+    }
+    fraction_done = shutter_fraction(shutter, fraction_done);
+    if (is_taken) estimate_print(take, fraction_done);
+    progress_show(&shutter->progress, fraction_done);
+    return is_taken;
 }
 
 static void device_drop(void *context, size_t index)
@@ -83,29 +95,32 @@ static void rest_print(const RenderOptions *options)
                 options->checkpoint);
 }
 
-// Renders one image, writes its files and reports the times.
+// Renders one image, or one of the shutter's times. With the last, writes the files and reports how long it
+// took.
 static int image_render(RenderOptions *options, const Scene *scene, OpenDevices *devices,
                         Renderer *const *renderers, Ranks *ranks, const RenderSettings *settings,
-                        Checkpoint *checkpoint, HostTimes *times, MessageList *messages)
+                        Checkpoint *checkpoint, Shutter *shutter, HostTimes *times, MessageList *messages)
 {
-    Progress progress;
-    progress_open(&progress, options->quiet);
-    ImageOutput *output = image_output_open(&options->output, options->scene, scene, settings, renderers,
-                                            devices->count, ranks);
+    const bool is_last = shutter_is_last(shutter);
+    if (shutter->time == 0) progress_open(&shutter->progress, options->quiet);
+    ImageOutput *output = is_last ? image_output_open(&options->output, options->scene, scene, settings,
+                                                      renderers, devices->count, ranks)
+                                  : NULL;
     BandContext context = {.output = output,
+                           .shutter = shutter,
                            .devices = devices,
-                           .progress = &progress,
                            .messages = messages,
                            .settings = settings,
                            .is_quiet = options->quiet};
-    if (ranks) ranks->film = renderer_film_header(renderers[0], options->output.aovs);
+    const unsigned aovs = is_last ? options->output.aovs : 0;
+    if (ranks) ranks->film = renderer_film_header(renderers[0], aovs);
     const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,
                                   .serve = ranks ? ranks->serve : NULL,
                                   .shares = ranks ? ranks->shares : NULL,
                                   .context = ranks};
     const RenderJob job = {.renderers = renderers,
                            .count = devices->count,
-                           .aovs = options->output.aovs,
+                           .aovs = aovs,
                            .sink = band_take,
                            .dropped = device_drop,
                            .context = &context,
@@ -114,13 +129,13 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
     stage_begin(times->stage, "rendering", NULL, 0);
     double start = clock_seconds();
     bool whole = render_job_run(&job);
-    times->render_seconds = clock_seconds() - start;
-    times->repeats = image_output_repeats(output);
-    progress_close(&progress);
+    times->render_seconds += clock_seconds() - start;
+    if (output) times->repeats = image_output_repeats(output);
+    progress_close(&shutter->progress);
     stage_begin(times->stage, "writing", NULL, 0);
-    if (whole)
+    if (whole && output)
         whole = image_output_commit(output, messages, &times->encode_seconds);
-    else
+    else if (output)
         image_output_abandon(output);
     if (checkpoint) checkpoint_close(checkpoint, whole, messages);
     stage_end(times->stage);
@@ -128,7 +143,8 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
         message_warning(messages, "%llu sample%s undecided, as at precision double",
                         (unsigned long long)times->repeats.undecided,
                         times->repeats.undecided == 1 ? " is" : "s are");
-    for (size_t i = 0; i < devices->count && whole; i++)
+    const bool is_complete = whole && is_last;
+    for (size_t i = 0; i < devices->count && is_complete; i++)
         if (renderer_report(renderers[i])->is_out_of_line)
             message_warning(
                 messages,
@@ -142,9 +158,9 @@ static int image_render(RenderOptions *options, const Scene *scene, OpenDevices 
                  : progress_interrupted() ? EXIT_INTERRUPTED
                                           : EXIT_MACHINE;
     if (!whole) rest_print(options);
-    if (ranks && options->timing == TIMING_TRACE)
+    if (ranks && is_last && options->timing == TIMING_TRACE)
         fprintf(stderr, "glint: --timing=trace has the first rank's devices only\n");
-    if (whole && options->timing != TIMING_NONE)
+    if (is_complete && options->timing != TIMING_NONE)
         timing_print(options->timing, renderers, devices->count, ranks, settings, times);
     return status;
 }
@@ -171,12 +187,13 @@ static int precision_choose(Pilot *pilot, const RenderOptions *options, RenderSe
 }
 
 static int scene_render(RenderOptions *options, const Scene *scene, RenderDevices *open, Ranks *ranks,
-                        HostTimes *times)
+                        Shutter *shutter, HostTimes *times)
 {
     OpenDevices *devices = &open->devices;
     RenderSettings settings;
     Pilot pilot;
     if (!render_settings_make(&settings, options, scene)) return EXIT_USER;
+    shutter_choose_samples(shutter, &settings);
     if (options->budget.limit > 0) {
         const int status = precision_choose(&pilot, options, &settings, scene, devices->items[0].compute);
         if (status != EXIT_DONE) return status;
@@ -189,17 +206,68 @@ static int scene_render(RenderOptions *options, const Scene *scene, RenderDevice
     MessageList messages = {0};
     Checkpoint *checkpoint = NULL;
     int status = EXIT_USER;
-    if (!ranks || ranks->begin(ranks, &settings, options->output.aovs, options->common.device, &messages)) {
-        const bool can_start = render_devices_start(open, scene, &settings, ranks, &messages) &&
-                               checkpoint_start(&checkpoint, options, &settings, open->renderers,
-                                                devices->count, ranks, &messages);
+    const unsigned aovs = shutter_is_last(shutter) ? options->output.aovs : 0;
+    if (!ranks || ranks->begin(ranks, &settings, aovs, options->common.device, &messages)) {
+        const bool has_started = render_devices_start(open, scene, &settings, ranks, &messages);
+        if (has_started && shutter->time > 0) message_list_free(&messages); // the first time's warnings
+        const bool can_start =
+            has_started && checkpoint_start(&checkpoint, options, &settings, open->renderers, devices->count,
+                                            ranks, &messages);
         if (ranks) ranks->start(can_start);
         if (can_start)
             status = image_render(options, scene, devices, open->renderers, ranks, &settings, checkpoint,
-                                  times, &messages);
+                                  shutter, times, &messages);
     }
     messages_print(&messages, NULL);
     times->pilot = options->output.pilot = NULL;
+    return status;
+}
+
+// Rejects options that need one time. Returns false with a message.
+static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
+{
+    const char *const obstacle = shutter->time_count == 1           ? NULL
+                                 : options->checkpoint              ? "--checkpoint keeps bands of one time"
+                                 : options->budget.limit > 0        ? "--max-error measures one time"
+                                 : strcmp(options->scene, "-") == 0 ? "standard input is read once"
+                                                                    : NULL;
+    if (obstacle)
+        fprintf(stderr, "glint: '%s': %s, but 'shutter' needs several; --set shutter=0 closes it\n",
+                options->scene, obstacle);
+    return !obstacle;
+}
+
+// Replaces the scene by that of the shutter's time. The frame's scene had its warnings printed.
+static bool scene_advance(Scene *scene, RenderOptions *options, const Shutter *shutter, HostTimes *times)
+{
+    MessageList messages = {0};
+    const double start = clock_seconds();
+    scene_free(scene);
+    options->common.frame = shutter_frame(shutter);
+    const SceneOptions scene_options = scene_options_of(&options->common);
+    const bool is_read = scene_load(scene, options->scene, &scene_options, &messages);
+    if (is_read)
+        message_list_free(&messages);
+    else
+        messages_print(&messages, options->scene);
+    scene->frame = shutter->frame;
+    times->parse_seconds += clock_seconds() - start;
+    return is_read;
+}
+
+// Renders a scene at each of the shutter's times.
+static int shutter_render(RenderOptions *options, Scene *scene, RenderDevices *open, Ranks *ranks,
+                          HostTimes *times)
+{
+    Shutter shutter = shutter_open(scene, options->sample_count);
+    int status = shutter_fits(&shutter, options) ? EXIT_DONE : EXIT_USER;
+    while (status == EXIT_DONE && shutter.time < shutter.time_count) {
+        const bool is_moved = shutter.time_count == 1 || scene_advance(scene, options, &shutter, times);
+        if (shutter.time > 0) render_devices_rest(open);
+        status = is_moved ? scene_render(options, scene, open, ranks, &shutter, times) : EXIT_USER;
+        shutter.time++;
+    }
+    shutter_close(&shutter);
     return status;
 }
 
@@ -227,7 +295,7 @@ static int file_render(RenderOptions options, const char *path, RenderDevices *o
         open->reference_selector = options.common.reference_device;
         stage_begin(times.stage, "opening the devices", NULL, 0);
         if (render_devices_open(open, &options.common))
-            status = scene_render(&options, &scene, open, ranks, &times);
+            status = shutter_render(&options, &scene, open, ranks, &times);
     }
     scene_free(&scene);
     stage_close(options.common.stage);

@@ -300,6 +300,8 @@ typedef struct {
     bool is_animated;     // values depend on the frame
     uint32_t frame_count; // of the animation; 0: not given
     double frame;         // that the options named
+    double shutter;       // the part of the time to the next frame for which the shutter is open, 0 to 1
+    bool has_shutter;     // whether it is given
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;

@@ -29,7 +29,7 @@ typedef struct {
 
 // The keys of a scene that an included file may have. Collections are joined; other values count only where
 // the scene has none.
-enum { SECTION_COUNT = 8 };
+enum { SECTION_COUNT = 9 };
 static const struct {
     const char *name;
     bool is_joined;
@@ -40,6 +40,7 @@ static const struct {
     {"frames", false, YAML_SCALAR, NULL},        {"ambient", false, YAML_SCALAR, NULL},
     {"lights", true, YAML_SEQUENCE, "a list"},   {"materials", true, YAML_MAPPING, "a mapping"},
     {"define", true, YAML_MAPPING, "a mapping"}, {"objects", true, YAML_SEQUENCE, "a list"},
+    {"shutter", false, YAML_SCALAR, NULL},
 };
 
 // A mapping to which files are added.

@@ -116,16 +116,19 @@ typedef struct {
     Background background;
     Color ambient;
     uint32_t frame_count;
+    double shutter;
     const YamlNode *camera, *lights, *materials, *definitions, *objects;
 } Document;
 
 static void document_read(YamlReader *reader)
 {
+    static const Range range_shutter = {0, 1, false, "from 0 to 1"};
     static const Range range_frames = {1, FRAMES_MAX, false, "from 1 to 1000000"};
     static const Field fields[] = {
         {"include", read_include, 0, FORM_ANY, OPTIONAL, NULL},
         {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL, NULL},
         {"frames", read_frames, offsetof(Document, frame_count), FORM_ANY, OPTIONAL, &range_frames},
+        {"shutter", read_number, offsetof(Document, shutter), FORM_ANY, OPTIONAL, &range_shutter},
         {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
         {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
         {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
@@ -133,10 +136,12 @@ static void document_read(YamlReader *reader)
         {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL, NULL},
         {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL, NULL},
     };
-    Document document = {.ambient = vector_all(NAN)};
+    Document document = {.ambient = vector_all(NAN), .shutter = NAN};
     const YamlNode *root = reader->tree.nodes.items;
     fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document, NULL);
     reader->scene->frame_count = document.frame_count;
+    reader->scene->has_shutter = !isnan(document.shutter);
+    if (reader->scene->has_shutter) reader->scene->shutter = document.shutter;
     yaml_set_background(reader, &document.background, document.ambient);
     if (document.camera)
         yaml_read_camera(reader, document.camera);
