@@ -47,16 +47,17 @@ class DevicesAgree(TestCase):
         data = Path("image.npy").read_bytes()
         return [data[i : i + 12] for i in range(len(data) - WIDTH * HEIGHT * 12, len(data), 12)]
 
-    def paths(self, implementation, scene):
-        self.pixels(implementation, scene, options="--aov path")
-        return Path("image.path.npy").read_bytes()
-
     def trace(self, implementation, lanes=1):
         write("rays", "".join(" ".join(f"{number:.9g}" for number in ray) + "\n" for ray in rays()))
         return self.glint(f"trace {SCENE} --rays rays --precision strict --lanes {lanes}", **implementation).stdout
 
-    def check_image(self, what, implementation, scene=SCENE, lanes=1):
-        pairs = zip(self.pixels(implementation, scene, lanes), self.pixels(POCL, scene))
+    def check_image(self, what, implementation, scene=SCENE, lanes=1, options=""):
+        found = self.pixels(implementation, scene, lanes, options)
+        if options:
+            os.rename("image.path.npy", "found.path.npy")
+        pairs = zip(found, self.pixels(POCL, scene, options=options))
+        if options:
+            self.assertSameBytes("found.path.npy", "image.path.npy")
         differing = [(i % WIDTH, i // WIDTH) for i, (one, other) in enumerate(pairs) if one != other]
         self.assertEqual(differing, [], f"{what}: these pixels (x, y) are not PoCL's")
 
@@ -91,9 +92,9 @@ class DevicesAgree(TestCase):
             kept = [line for line in objects.splitlines() if line.startswith(f"  - {shape}")]
             self.assertTrue(kept, shape)
             scene = write("apart.yaml", "\n".join([head + "objects:", *kept]))
-            self.check_image(shape, RUSTICL, scene)
-        # the compiler of Mesa 22.3 crashes in the kernel of paths at loops over anything but an array
-        self.assertEqual(self.paths(RUSTICL, scene), self.paths(POCL, scene))
+            # the compiler of Mesa 22.3 crashes in the kernel of paths at loops over anything but an array
+            options = "--aov path" if shape == RUSTICL_SHAPES[-1] else ""
+            self.check_image(shape, RUSTICL, scene, options=options)
 
 
 if __name__ == "__main__":
