@@ -3,6 +3,7 @@
 where, and that a failure leaves an earlier image as it was."""
 import glob
 import itertools
+import json
 import math
 import os
 import re
@@ -500,6 +501,26 @@ class Images(CliTestCase):
 
 
 class Aovs(CliTestCase):
+    def test_capture(self):
+        """Each launch has a file, and names the files of its kernel's text and of its buffers by hashes of their contents."""
+        self.glint(f"render sphere.yaml {SMALL} --capture launches --aov t -o image.npy")
+        files = {path.name: path.read_bytes() for path in Path("launches").iterdir()}
+        launches = {launch["kernel"]: launch for launch in map(json.loads, (files[name] for name in files if name.endswith(".json")))}
+        self.assertEqual(sorted(launches), ["aov", "render"])
+        used = set()
+        for kernel, launch in launches.items():
+            self.assertEqual([argument["index"] for argument in launch["arguments"]], list(range({"aov": 9, "render": 13}[kernel])))
+            self.assertIn(f"kernel void {kernel}(".encode(), files[launch["text"]])
+            self.assertIn("-cl-std=CL1.2", launch["options"])
+            used |= {launch["text"], *(argument["buffer"] for argument in launch["arguments"] if argument.get("buffer"))}
+        self.assertEqual(used, {name for name in files if not name.endswith(".json")})
+        for name in sorted(files, key=lambda name: len(files[name]))[:5]:
+            hashed = 0xCBF29CE484222325
+            for byte in files[name]:
+                hashed = (hashed ^ byte) * 0x100000001B3 % 2**64
+            self.assertEqual(name.partition(".")[0], f"{hashed:016x}")
+        self.refuses("render sphere.yaml --capture none/launches", "--capture: cannot create the folder 'none/launches'")
+
     def test_aovs(self):
         layouts = {"t": ((6, 8), "<f4"), "normal": ((6, 8, 3), "<f4"), "position": ((6, 8, 3), "<f8"),
                    "object": ((6, 8), "<u4"), "shadow": ((6, 8, 2), "<u4"), "ray": ((6, 8, 3), "<f4"),

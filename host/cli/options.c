@@ -352,6 +352,7 @@ static void driver_options_apply(DeviceList *list, const CommonOptions *common)
         list->items[i].work_group[0] = common->work_group[0];
         list->items[i].work_group[1] = common->work_group[1];
         list->items[i].kernel_folder = common->kernel_folder;
+        list->items[i].capture_folder = common->capture_folder;
     }
 }
 

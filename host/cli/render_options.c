@@ -25,6 +25,7 @@ enum {
     OPTION_CHECKPOINT,
     OPTION_FRAMES,
     OPTION_SKIP_EXISTING,
+    OPTION_CAPTURE,
     OPTION_FORMAT,
     OPTION_QUIET
 };
@@ -47,6 +48,7 @@ static const struct option long_options[] = {
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"frames", required_argument, NULL, OPTION_FRAMES},
     {"skip-existing", no_argument, NULL, OPTION_SKIP_EXISTING},
+    {"capture", required_argument, NULL, OPTION_CAPTURE},
     {"format", required_argument, NULL, OPTION_FORMAT},
     {"quiet", no_argument, NULL, OPTION_QUIET},
     COMMON_LONG_OPTIONS,
@@ -83,12 +85,12 @@ static const char help_text[] =
                     "clips at 1)\n"
                     "      --dither          hide the steps of 8 bits in a pattern\n"
                     "      --checkpoint FILE\n"
-                    "                        keep finished bands in FILE until the image is complete; the\n"
-                    "                        same command resumes where an earlier one ended\n"
+                    "                        keep finished bands in FILE; the same command resumes there\n"
                     "      --frames A[-B]    render these frames, or all; FILEs have %d or %04d for the "
                     "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
+                    "      --capture FOLDER  write each launch, for glint locate\n"
                     "      --format F        format of --output -: png, ppm or npy\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER
@@ -265,6 +267,9 @@ static bool option_take(RenderOptions *options, int option, const char *value)
     case OPTION_SKIP_EXISTING:
         options->skips_existing = true;
         return true;
+    case OPTION_CAPTURE:
+        options->common.capture_folder = value;
+        return option_folder("capture", value);
     case OPTION_QUIET:
         options->quiet = true;
         return true;

@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/opencl/capture.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,6 +31,7 @@ void compute_close(Compute *compute)
     if (compute->reference) compute_close(compute->reference);
     free(compute->reference);
     free(compute->failure.detail);
+    capture_close(compute);
     *compute = (Compute){0};
 }
 
@@ -211,12 +213,24 @@ cl_mem buffer_take(Compute *compute, size_t size, void *bytes)
     return buffer;
 }
 
-void kernel_argument(Compute *compute, cl_kernel kernel, cl_uint index, size_t size, const void *value)
+static void argument_set(Compute *compute, cl_kernel kernel, cl_uint index, bool is_buffer, size_t size,
+                         const void *value)
 {
     if (!compute_ok(compute)) return;
+    if (compute->device->capture_folder) capture_argument(compute, kernel, index, is_buffer, size, value);
     cl_int status = clSetKernelArg(kernel, index, size, value);
     if (status == CL_SUCCESS) return;
     char name[64] = "?";
     clGetKernelInfo(kernel, CL_KERNEL_FUNCTION_NAME, sizeof name, name, NULL);
     compute_fail(compute, "clSetKernelArg", status, "argument %u of %s, %zu bytes", index, name, size);
+}
+
+void kernel_argument(Compute *compute, cl_kernel kernel, cl_uint index, size_t size, const void *value)
+{
+    argument_set(compute, kernel, index, false, size, value);
+}
+
+void kernel_buffer(Compute *compute, cl_kernel kernel, cl_uint index, cl_mem buffer)
+{
+    argument_set(compute, kernel, index, true, sizeof buffer, &buffer);
 }

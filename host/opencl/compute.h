@@ -16,6 +16,14 @@ typedef struct {
     char *detail;  // what else is known, such as a build log; NULL: nothing
 } ComputeFailure;
 
+// The value that an argument of a kernel was set to last.
+typedef struct {
+    cl_kernel kernel;
+    cl_uint index;
+    bool is_buffer;
+    Text value;
+} CapturedArgument;
+
 typedef struct Compute {
     const Device *device; // outlives the Compute
     cl_context context;
@@ -23,6 +31,10 @@ typedef struct Compute {
     ComputeFailure failure;       // the first
     ComputeFailure unmap_failure; // the first of an unmap; a failure of the Compute at the next launch
     struct Compute *reference;    // another device, for work in double; NULL: this one does it
+    struct {
+        CapturedArgument *items;
+        size_t count, capacity;
+    } captured; // empty unless the device has a capture folder
 } Compute;
 
 // Opens the device. Returns false if that failed. compute_close closes it either way.
@@ -161,5 +173,7 @@ LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimens
 // is clock_seconds() before the enqueue. Returns zeros if that failed.
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start);
 
-// Sets argument `index`, with the kernel's name in the detail of a failure.
+// Set argument `index` to a value or a buffer, which may be NULL, with the kernel's name in the detail of a
+// failure.
 void kernel_argument(Compute *compute, cl_kernel kernel, cl_uint index, size_t size, const void *value);
+void kernel_buffer(Compute *compute, cl_kernel kernel, cl_uint index, cl_mem buffer);

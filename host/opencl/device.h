@@ -39,6 +39,7 @@ typedef struct {
     // The folder that receives the text and the build log of each kernel that is built; outlives the device;
     // or NULL.
     const char *kernel_folder;
+    const char *capture_folder; // receives launches (host/opencl/capture.h); outlives the device; or NULL
 } Device;
 
 typedef struct {

@@ -38,9 +38,9 @@ LaunchTime probe_launch(Measurement *measurement, cl_uint probe, cl_uint first, 
     const cl_uint numbers[] = {probe, first, round_count, operand_count};
     for (cl_uint i = 0; i < 4; i++)
         kernel_argument(compute, measurement->kernel, i, sizeof numbers[i], &numbers[i]);
-    kernel_argument(compute, measurement->kernel, 4, sizeof(cl_mem), &measurement->operands);
+    kernel_buffer(compute, measurement->kernel, 4, measurement->operands);
     kernel_argument(compute, measurement->kernel, 5, sizeof count, &count);
-    kernel_argument(compute, measurement->kernel, 6, sizeof(cl_mem), &measurement->results);
+    kernel_buffer(compute, measurement->kernel, 6, measurement->results);
     const size_t items = count / measurement->passport->lanes;
     const LaunchTime time = kernel_launch(compute, measurement->kernel, 1, &items, NULL);
     if (compute_ok(compute)) array_push(measurement->launches, time);

@@ -246,15 +246,15 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
     Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
     const uint32_t cell = settings_cell(&renderer->settings);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof(cl_mem), &renderer->sample_offsets);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof(cl_mem), &buffers->film);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, renderer->sample_offsets);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof place->band, &place->band);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof first, &first);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof last, &last);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 5, sizeof(cl_mem), &buffers->ray_counts);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 5, buffers->ray_counts);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 7, sizeof(cl_mem), &buffers->doubts);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 8, sizeof(cl_mem), &buffers->band_film);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 7, buffers->doubts);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 8, buffers->band_film);
     if (first == renderer->settings.first_sample) {
         doubts_clear(renderer, buffers->doubts, place);
         if (first > 0) sums_clear(renderer, buffers, place);
@@ -275,11 +275,11 @@ bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, 
     offsets.name = (unsigned)(buffers->layer_begins[LAYER_##NAME] / ARENA_UNIT);
     LAYER_LIST(OFFSET_SET)
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof place->band, &place->band);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof(cl_mem), &buffers->film);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof offsets, &offsets);
     const bool is_list = renderer->pass != PASS_ALL;
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof(cl_mem),
-                    is_list ? &buffers->doubts : &buffers->center_doubts);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3,
+                  is_list ? buffers->doubts : buffers->center_doubts);
     const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
     if (kind == KERNEL_AOV)
         kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);

@@ -5,6 +5,7 @@
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/compile/features.h"
+#include "host/opencl/capture.h"
 #include "host/render/renderer_state.h"
 #include <stdlib.h>
 #include <string.h>
@@ -23,10 +24,10 @@ static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
     const cl_mem *buffers = renderer->buffers;
 #define OFFSET_VALUE(NAME, Type, name, names) (unsigned)(renderer->layout.begins[FLAT_##NAME] / ARENA_UNIT),
     const ArenaOffsets offsets = {ARENA_LIST(OFFSET_VALUE)};
-    kernel_argument(compute, kernel, ARGUMENT_ARENA, sizeof(cl_mem), &buffers[BUFFER_ARENA]);
+    kernel_buffer(compute, kernel, ARGUMENT_ARENA, buffers[BUFFER_ARENA]);
     kernel_argument(compute, kernel, ARGUMENT_OFFSETS, sizeof offsets, &offsets);
-    kernel_argument(compute, kernel, ARGUMENT_NODES, sizeof(cl_mem), &buffers[BUFFER_NODES]);
-    kernel_argument(compute, kernel, ARGUMENT_TEXELS, sizeof(cl_mem), &buffers[BUFFER_TEXELS]);
+    kernel_buffer(compute, kernel, ARGUMENT_NODES, buffers[BUFFER_NODES]);
+    kernel_buffer(compute, kernel, ARGUMENT_TEXELS, buffers[BUFFER_TEXELS]);
 }
 
 // Returns a capacity of at least `count`. There are few different capacities, so that few kernels are built:
@@ -208,6 +209,8 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
 {
     KernelSlot *slot = &renderer->variant.kernels[kind];
     fault_note_kernel(kernel_sources[kind].name);
+    capture_launch(renderer->compute, &(Launch){slot->kernel, &slot->request, slot->program.is_easy,
+                                                dimensions, first, items, group});
     LaunchTime time = kernel_launch_from(renderer->compute, slot->kernel, dimensions, first, items, group);
     fault_note_kernel(NULL);
     const bool is_fixed = renderer->compute->device->work_group[0] > 0;

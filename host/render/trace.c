@@ -117,10 +117,10 @@ static double trace_launch(Renderer *renderer, KernelKind kind, uint32_t count, 
 {
     Compute *compute = renderer->compute;
     cl_kernel kernel = renderer_kernel(renderer, kind);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof rays, &rays);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, rays);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof count, &count);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof results, &results);
-    kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof objects, &objects);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 2, results);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3, objects);
     const size_t *fixed = compute->device->work_group,
                  items = (count + renderer->report.lanes - 1) / renderer->report.lanes,
                  group = fixed[0] > 0 ? fixed[0] * fixed[1] : TRACE_GROUP;

@@ -1,0 +1,118 @@
+#include "host/opencl/capture.h"
+
+#include "host/base/array.h"
+#include "host/base/base64.h"
+#include "host/base/hash.h"
+#include "host/base/json.h"
+#include "host/base/memory.h"
+#include "host/base/output.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+void capture_argument(Compute *compute, cl_kernel kernel, cl_uint index, bool is_buffer, size_t size,
+                      const void *value)
+{
+    const CapturedArgument unset = {.kernel = kernel, .index = index, .is_buffer = is_buffer};
+    size_t i = 0;
+    while (i < compute->captured.count &&
+           (compute->captured.items[i].kernel != kernel || compute->captured.items[i].index != index))
+        i++;
+    if (i == compute->captured.count) array_push(compute->captured, unset);
+    text_free(&compute->captured.items[i].value);
+    text_append(&compute->captured.items[i].value, value, size);
+}
+
+void capture_close(Compute *compute)
+{
+    for (size_t i = 0; i < compute->captured.count; i++)
+        text_free(&compute->captured.items[i].value);
+    free(compute->captured.items);
+}
+
+// Writes a file named by the hash of its bytes, unless it exists, and adds its name to the JSON object.
+static void file_write(const Compute *compute, Json *json, const char *key, const char *ending,
+                       const void *bytes, size_t size)
+{
+    char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
+         *path = text_format("%s/%s", compute->device->capture_folder, name);
+    MessageList messages = {0};
+    OutputFile output;
+    if (access(path, F_OK) != 0 && output_open(&output, path, &messages)) {
+        if (output_write(&output, bytes, size, &messages))
+            output_commit(&output, &messages);
+        else
+            output_abandon(&output);
+    }
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    if (json) json_text(json, key, name);
+    free(path);
+    free(name);
+}
+
+static void buffer_write_file(Compute *compute, Json *json, cl_mem buffer)
+{
+    size_t size = 0;
+    if (!buffer) json_none(json, "buffer");
+    if (!buffer || !compute_try(compute, clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL)))
+        return;
+    char *bytes = memory_allocate(size, 1);
+    if (buffer_read(compute, buffer, size, bytes)) file_write(compute, json, "buffer", "bin", bytes, size);
+    free(bytes);
+}
+
+static void argument_write(Compute *compute, Json *json, const CapturedArgument *argument)
+{
+    json_begin_object(json, NULL);
+    json_int64(json, "index", argument->index);
+    if (argument->is_buffer) {
+        cl_mem buffer;
+        memcpy(&buffer, text_c(&argument->value), sizeof buffer);
+        buffer_write_file(compute, json, buffer);
+    } else {
+        Text value = {0};
+        base64_append(&value, (const uint8_t *)argument->value.items, argument->value.count);
+        json_text(json, "value", text_c(&value));
+        text_free(&value);
+    }
+    json_end(json);
+}
+
+static void sizes_write(Json *json, const char *key, cl_uint dimensions, const size_t *sizes)
+{
+    if (!sizes) return;
+    json_begin_array(json, key);
+    for (cl_uint i = 0; i < dimensions; i++)
+        json_int64(json, NULL, (int64_t)sizes[i]);
+    json_end(json);
+}
+
+void capture_launch(Compute *compute, const Launch *launch)
+{
+    if (!compute->device->capture_folder || !compute_ok(compute)) return;
+    const ProgramRequest *request = launch->request;
+    char *text = program_text(request->root, launch->is_easy ? request->easy_prelude : request->prelude);
+    Text options = {0};
+    program_options_append(&options, compute->device, request->options);
+    Json *json = json_open();
+    json_text(json, "device", compute->device->name);
+    json_text(json, "driver", compute->device->driver);
+    json_text(json, "kernel", request->kernel);
+    json_text(json, "options", text_c(&options));
+    file_write(compute, json, "text", "cl", text, strlen(text));
+    sizes_write(json, "first", launch->dimensions, launch->first);
+    sizes_write(json, "items", launch->dimensions, launch->items);
+    sizes_write(json, "group", launch->dimensions, launch->group);
+    json_begin_array(json, "arguments");
+    for (size_t i = 0; i < compute->captured.count; i++)
+        if (compute->captured.items[i].kernel == launch->kernel)
+            argument_write(compute, json, &compute->captured.items[i]);
+    json_end(json);
+    Text index = json_close(json);
+    if (compute_ok(compute)) file_write(compute, NULL, NULL, "json", index.items, index.count);
+    text_free(&index);
+    text_free(&options);
+    free(text);
+}
