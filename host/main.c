@@ -9,8 +9,10 @@
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 static const struct {
     const char *name;
@@ -51,6 +53,15 @@ static bool file_exists(const char *path)
     return stat(path, &status) == 0 && !S_ISDIR(status.st_mode);
 }
 
+// Starts glint-NAME if there is such a program on the PATH, as git does: the Python package has glint-locate.
+static void program_start(const char *name, char **arguments)
+{
+    if (strchr(name, '/')) return;
+    char *program = text_format("glint-%s", name);
+    execvp(program, arguments);
+    free(program);
+}
+
 static int command_run(int argument_count, char **arguments)
 {
     if (argument_count < 2) {
@@ -82,6 +93,7 @@ static int command_run(int argument_count, char **arguments)
         arguments[0] = render_name;
         return command_render(argument_count, arguments);
     }
+    program_start(name, arguments + 1);
     const char *near = text_nearest(name, names, COMMAND_COUNT);
     fprintf(stderr, "glint: unknown command \"%s\"", name);
     if (near) fprintf(stderr, "; did you mean %s?", near);
