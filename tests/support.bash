@@ -42,7 +42,7 @@ skip_all() {
 }
 # python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: $PYTHON or python3, the system's, else
 # a virtual environment above the system's, which the tests of a run share. There pip installs what is missing, by the
-# module's own name where no requirement is given. Skips the test where that fails; once pip had no network, no test
+# module's own name where no requirement is given; a requirement may be several, with spaces between. Skips the test where that fails; once pip had no network, no test
 # asks it for ten minutes.
 python_with() {
     local import module missing=() folder=$XDG_CACHE_HOME/glint-tests
@@ -59,7 +59,7 @@ python_with() {
         "$python" -m venv --clear --system-site-packages "$folder/python" >"$log" 2>&1 ||
         skip_all "${*%%=*}: not here, and no virtual environment can be made: $(tail -n 1 "$log")"
     python=$folder/python/bin/python
-    for module; do "$python" -c "import ${module%%=*}" 2>/dev/null || missing+=("${module#*=}"); done
+    for module; do "$python" -c "import ${module%%=*}" 2>/dev/null || missing+=(${module#*=}); done
     if [ ${#missing[@]} -gt 0 ]; then
         [ ! "$(find "$offline" -mmin -10 2>/dev/null)" ] || skip_all "${missing[*]}: not here, and pip had no network"
         timeout 300 "$python" -m pip install -q --no-input "${missing[@]}" >"$log" 2>&1

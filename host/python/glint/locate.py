@@ -1,0 +1,429 @@
+#!/usr/bin/env python3
+"""Finds the operation that an OpenCL device computes differently from another one.
+
+    glint render scene.yaml --precision strict --capture launches
+    python3 -m glint.locate launches --device "the suspect" --reference pocl
+
+Repeats each captured launch on both devices until a pixel differs, then that pixel's work-group by a kernel that records
+every operation, and finds the first one that has equal operands and unequal results. Writes it as a program of its own.
+"""
+import argparse
+import base64
+import functools
+import json
+import os
+import re
+import shlex
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pyopencl as cl
+
+from . import _instrument as instrument
+from ._exact import NAN, exact, number
+
+os.environ.setdefault("POCL_WORK_GROUP_SPECIALIZATION", "0")  # as host/opencl/device.c does
+FILM, BAND = 5, 6  # arguments of the kernel `render`
+TRACE_WORDS = 1 << 22
+
+
+class Failure(Exception):
+    """What ends the search, with a message for the user."""
+
+
+class Launch:
+    """A captured launch: text, options, sizes and arguments."""
+
+    def __init__(self, path):
+        index = json.loads(path.read_text(encoding="utf-8"))
+        self.kernel, self.options = index["kernel"], shlex.split(index["options"])
+        self.text = (path.parent / index["text"]).read_text(encoding="utf-8")
+        self.items, self.device = index["items"], index["device"]
+        self.first, self.group = index.get("first") or [0] * len(self.items), index.get("group")
+        self.arguments = {}  # by index: the bytes of a buffer, or those of a value in a tuple
+        for argument in index["arguments"]:
+            if "value" in argument:
+                value = (base64.b64decode(argument["value"]),)
+            else:
+                value = argument["buffer"] and (path.parent / argument["buffer"]).read_bytes()
+            self.arguments[argument["index"]] = value
+        self.lanes = int(re.search(r"(?m)^#define LANES (\d+)", self.text)[1])
+        self.repairs_divide = "#define REPAIRS_DIVIDE 1" in self.text
+        self.pixel_words = 6 if "#define IS_DOUBLE 1" in self.text else 3
+
+    @functools.lru_cache(maxsize=None)
+    def program(self, definitions):
+        """The parsed text, for a compiler that defines the macros."""
+        return instrument.parse(instrument.preprocess(self.text, definitions), self.kernel)
+
+    @property
+    def band(self):
+        """x and y of the first pixel, width and height."""
+        return np.frombuffer(self.arguments[BAND][0], np.uint32)
+
+
+class Device:
+    """A device with its compiler, which tests replace."""
+
+    def __init__(self, device, compiler=lambda text: text, options=()):
+        self.device, self.compiler, self.options = device, compiler, list(options)
+        self.context = cl.Context([device])
+        self.queue = cl.CommandQueue(self.context)
+        self.programs = {}
+        self.name = f"{device.platform.name}, {device.name}".strip() + "".join(f" {each}" for each in options)
+
+    def kernel(self, text, name, options):
+        key = text, tuple(options)
+        if key not in self.programs:
+            self.programs[key] = cl.Program(self.context, self.compiler(text)).build([*options, *self.options, "-w"], cache_dir=False)
+        return cl.Kernel(self.programs[key], name)
+
+    def buffer(self, data):
+        contents = data if isinstance(data, np.ndarray) else bytearray(data)
+        return cl.Buffer(self.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=contents)
+
+    def read(self, buffer):
+        data = np.empty(buffer.size // 4, np.uint32)
+        cl.enqueue_copy(self.queue, data, buffer)
+        return data
+
+    def group_fit(self, kernel, group):
+        """The work-group reduced to what device and kernel allow, as host/opencl/launch.c does."""
+        group, sides = list(group), self.device.max_work_item_sizes
+        most = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.device)
+        while int(np.prod(group)) > most or any(side > limit for side, limit in zip(group, sides)):
+            longest = max(range(len(group)), key=lambda i: (group[i], i))
+            group[longest] //= 2
+        return group
+
+    def run(self, launch, text, item=None, extra=()):
+        """The film after the whole launch, or after that of the work-group of one item; and the buffers among `extra`."""
+        kernel = self.kernel(text, launch.kernel, launch.options)
+        buffers = {index: self.buffer(value) for index, value in launch.arguments.items() if isinstance(value, bytes)}
+        for index, value in launch.arguments.items():
+            kernel.set_arg(index, buffers.get(index, value[0] if value else None))
+        added = [self.buffer(value) if isinstance(value, np.ndarray) else value for value in extra]
+        for index, value in enumerate(added, len(launch.arguments)):
+            kernel.set_arg(index, value)
+        group = self.group_fit(kernel, launch.group or [1] * len(launch.items))
+        first, items = list(launch.first), [-(-count // side) * side for count, side in zip(launch.items, group)]
+        if item:
+            first = [begin + (at - begin) // side * side for begin, at, side in zip(launch.first, item, group)]
+            items = group
+        cl.enqueue_nd_range_kernel(self.queue, kernel, items, group, first).wait()
+        return self.read(buffers[FILM]), [self.read(value) for value in added if isinstance(value, cl.Buffer)]
+
+
+class Pixel(NamedTuple):
+    x: int  # in the image
+    y: int
+    at: int  # its index in the film
+    item: tuple  # the work-item that renders it
+
+
+def first_pixel(launch, film, other):
+    """The first pixel whose bits differ, or None."""
+    left, top, width, height = map(int, launch.band)
+    size = launch.pixel_words * width * height
+    differing = np.nonzero(film[:size] != other[:size])[0]
+    if len(differing) == 0:
+        return None
+    at = int(differing[0]) // launch.pixel_words
+    x, y = at % width, at // width
+    return Pixel(left + x, top + y, at, (x // launch.lanes, y // launch.lanes))
+
+
+class Record(NamedTuple):
+    site: instrument.Site
+    values: list
+
+    @property
+    def operands(self):
+        return self.values if self.site.is_entry else self.values[:-1]
+
+
+def records(words, sites):
+    """The records of a trace, each with the position behind it. Ends before one that is cut off."""
+    words = words.tolist()
+    at = 0
+    try:
+        while at < len(words):
+            site, values = sites[words[at]], []
+            at += 1
+            for _ in range(site.count):
+                value, at = instrument.read_value(words, at)
+                values.append(value)
+            yield at, Record(site, values)
+    except IndexError:
+        return
+
+
+class Finding(NamedTuple):
+    """The first difference between two traces, and the entries of functions since the last camera ray."""
+    kind: str  # operation, data or branch
+    ours: Record  # of the suspect
+    theirs: Record
+    entries: list
+
+    @property
+    def site(self):
+        return self.ours.site
+
+    @property
+    def right(self):
+        """The only right result, or None."""
+        return None if None in self.ours.values else exact(self.site.operation, self.ours.operands, self.ours.values[-1])
+
+
+class Search:
+    """The comparison of a suspect with a reference by one launch."""
+
+    def __init__(self, launch, suspect, reference, definitions=()):
+        self.launch, self.suspect, self.reference = launch, suspect, reference
+        self.program = launch.program(tuple(definitions))
+
+    def color(self, film):
+        """The bits of the pixel."""
+        return film[self.launch.pixel_words * self.pixel.at:][:self.launch.pixel_words].tolist()
+
+    def trace_arguments(self, begin, size):
+        return [np.concatenate([np.array([0, begin, size], np.uint32), np.zeros(size, np.uint32)]), *map(np.uint32, self.pixel.item)]
+
+    def is_equal(self, selected, device=None):
+        """Whether the suspect's pixel is the reference's by a kernel that records the selected sites (None: one without traces)."""
+        text = instrument.Generator().visit(self.program) if selected is None else instrument.Instrumenter(self.program, selected).text
+        extra = () if selected is None else self.trace_arguments(0, 0)
+        return self.color((device or self.suspect).run(self.launch, text, self.pixel.item, extra)[0]) == self.bits[1]
+
+    def find(self):
+        """Returns a Finding, or the smallest list of functions or sites whose recording makes the difference vanish."""
+        films = [device.run(self.launch, self.launch.text)[0] for device in (self.suspect, self.reference)]
+        self.pixel = first_pixel(self.launch, *films)
+        if self.pixel is None:
+            return None
+        self.bits = [self.color(film) for film in films]
+        traced = instrument.Instrumenter(self.program)
+        self.sites = traced.sites
+        if not self.is_equal(range(len(traced.sites)), self.reference):
+            raise Failure("the reference has other bits once operations are recorded; choose another one")
+        return self.vanished(traced) if self.is_equal(range(len(traced.sites))) else self.compare(traced.text)
+
+    def compare(self, text):
+        """The first difference between the traces of the pixel's work-item."""
+        begin, entries, first_other = 0, [], None
+        while True:
+            traces, totals = [], []
+            for device in (self.suspect, self.reference):
+                _, (words,) = device.run(self.launch, text, self.pixel.item, self.trace_arguments(begin, TRACE_WORDS))
+                totals.append(int(words[0]))
+                traces.append(words[instrument.HEAD:][:min(totals[-1] - begin, TRACE_WORDS)])
+            end = 0
+            for (end, ours), (_, theirs) in zip(records(traces[0], self.sites), records(traces[1], self.sites)):
+                if ours.site.is_entry:
+                    entries = [] if ours.site.function == "camera_ray" else entries
+                    entries.append(ours)
+                if ours.site is not theirs.site:
+                    return first_other or Finding("branch", ours, theirs, entries)
+                if ours == theirs:
+                    continue
+                finding = Finding("operation" if ours.operands == theirs.operands else "data", ours, theirs, entries[:])
+                if finding.kind == "operation" and self.is_wrong(finding):
+                    return finding
+                first_other = first_other or finding
+            begin += end
+            if end == 0 or begin >= min(totals):
+                if first_other is None:
+                    raise Failure("every recorded operation agrees: the difference is in what stores the pixel")
+                return first_other
+
+    def is_wrong(self, finding):
+        """Whether one of two results must be wrong. Bits of a NaN may differ, and quotients and roots that the kernel repairs."""
+        is_of_nan = finding.site.operation.startswith("as_") and NAN.get(finding.ours.operands[0].type) in finding.ours.operands[0].lanes
+        is_repaired = self.launch.repairs_divide and finding.site.function.startswith(("device_", "uniform_"))
+        return finding.right is not None and not is_of_nan and not is_repaired
+
+    def vanished(self, traced):
+        """The smallest set of functions whose recording makes the difference vanish, then of the sites in them."""
+        if self.is_equal(None):
+            raise Failure("the preprocessed text gives equal pixels, so the difference is in a part of it for certain compilers, such as "
+                          "#ifdef __clang__; define the macros that the compiler has by --define")
+        if self.is_equal([]):
+            raise Failure("the difference vanishes as soon as functions have another parameter")
+        _, (words,) = self.reference.run(self.launch, traced.text, self.pixel.item, self.trace_arguments(0, TRACE_WORDS))
+        used = {id(record.site) for _, record in records(words[instrument.HEAD:][:int(words[0])], self.sites)}
+        sites = [number for number, site in enumerate(self.sites) if id(site) in used]
+        functions = [*dict.fromkeys(self.sites[number].function for number in sites)]
+        kept = smallest(functions, lambda some: self.is_equal([number for number in sites if self.sites[number].function in some]))
+        return smallest([number for number in sites if self.sites[number].function in kept], self.is_equal)
+
+
+def smallest(units, holds):
+    """A smallest list of units for which `holds`, which is true for all of them, by one binary search per unit found."""
+    kept = []
+    while not holds(kept):
+        if not units:
+            raise Failure("recording the same functions does not always make the difference vanish")
+        low, high = 1, len(units)
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if holds(kept + units[:middle]) else (middle + 1, high)
+        kept.append(units[low - 1])
+        units = units[:low - 1]
+    return kept
+
+
+def type_name(value):
+    name = "int" if value.type == "bool" else value.type
+    return name if len(value.lanes) == 1 else f"{name}{len(value.lanes)}"
+
+
+def words_of(value):
+    """The bits as 32-bit words."""
+    return [word for bits in value.lanes for word in ([bits & 0xFFFFFFFF, bits >> 32] if value.type in ("long", "ulong", "double") else [bits])]
+
+
+ALONE = """\
+// {title}
+// Run by: python3 -m glint.locate --run FILE
+// options: {options}
+// inputs: {inputs}
+// expected: {expected} ({right})
+// The inputs come from memory, 32 words each, so that no compiler computes the result.
+#pragma OPENCL FP_CONTRACT OFF
+kernel void operation(global const uint *inputs, global uint *result)
+{{
+{loads}
+    *(global {result} *)result = {form};
+}}
+"""
+
+
+def program_write(path, finding, launch):
+    """Writes the operation as a program of its own."""
+    names = "abcdefgh"[:len(finding.ours.operands)]
+    result, right = finding.ours.values[-1], finding.right
+    inputs, loads = [], []
+    for place, (name, value) in enumerate(zip(names, finding.ours.operands)):
+        inputs += (words_of(value) + [0] * 32)[:32]
+        loads.append(f"    {type_name(value)} {name} = *(global const {type_name(value)} *)(inputs + {32 * place});  // {value}")
+    expected = right or finding.theirs.values[-1]
+    path.write_text(ALONE.format(
+        title=f"{finding.site.form.format(*names)}, of {finding.site.function}, {finding.site.place}", options=shlex.join(launch.options),
+        inputs=" ".join(f"{word:x}" for word in inputs), expected=" ".join(f"{word:x}" for word in words_of(expected)),
+        right=f"{expected}, {'exact' if right else 'of the reference'}", loads="\n".join(loads), result=type_name(result),
+        form=finding.site.form.format(*names)), encoding="utf-8")
+
+
+def program_run(path, device):
+    """The result of a written operation, and the expected one, as words."""
+    text = Path(path).read_text(encoding="utf-8")
+    options, inputs, expected = (re.search(rf"(?m)^// {name}: ([^(\n]*)", text)[1] for name in ("options", "inputs", "expected"))
+    kernel = device.kernel(text, "operation", shlex.split(options))
+    result = device.buffer(bytes(128))
+    kernel(device.queue, (1,), None, device.buffer(np.array([int(word, 16) for word in inputs.split()], np.uint32)), result)
+    expected = [int(word, 16) for word in expected.split()]
+    return device.read(result)[:len(expected)].tolist(), expected
+
+
+def describe_ray(entries):
+    """The sample, ray and hits of a work-item when it had entered the functions."""
+    names = [entry.site.function for entry in entries]
+    value = {(at, name): number(value.type, value.lanes[0])
+             for at, entry in enumerate(entries) for name, value in zip(entry.site.names, entry.values)}
+    text = f"sample {value.get((0, 'index'), 0)}" if names[:1] == ["camera_ray"] else "no camera ray"
+    if "rays_shade" in names:
+        text += f", ray {names.count('rays_shade')} of its tree"
+    queries = [at for at, name in enumerate(names) if name == "traversal_begin"]
+    if queries:
+        lights = [value[at, "index"] for at, name in enumerate(names[:queries[-1]]) if name == "light_reach"]
+        is_shadow = value.get((queries[-1], "query")) == 2 and lights
+        text += f", last query: {f'shadow of light {lights[-1]}' if is_shadow else 'closest hit'}"
+    hits = [str(value[at, "id"]) for at, name in enumerate(names) if name.startswith("traversal_record") and (at, "id") in value]
+    return text + (f", hits recorded: {' '.join(hits)}" if hits else "")
+
+
+def report(search, found, path):
+    """What was found, as lines for the user; writes the program of an operation to `path`."""
+    suspect, reference = search.suspect, search.reference
+    yield f"pixel {search.pixel.x},{search.pixel.y}: color " + " instead of ".join(" ".join(f"{bits:08x}" for bits in color) for color in search.bits)
+    if isinstance(found, list):
+        yield "No recorded operation differs, since recording it makes the difference vanish: the compiler gets it wrong in its surroundings."
+        yield "The difference vanishes as soon as " + ("this is" if len(found) == 1 else "these are") + " recorded:"
+        for site in (search.sites[number] for number in found):
+            yield f"  {site.place}, {site.function}: {'its parameters' if site.is_entry else site.operation + ', ' + site.form}"
+        return
+    site = found.site
+    yield describe_ray(found.entries)
+    if found.kind == "branch":
+        yield f"Control flow differs although every operation before agrees: {site.place}, {site.function}, instead of " \
+              f"{found.theirs.site.place}, {found.theirs.site.function}"
+    elif found.kind == "data":
+        yield f"Data differs although every operation before agrees, so a load, store or copy is wrong: {site.place}, {site.function}, {site.form}"
+        for ours, theirs in zip(found.ours.operands, found.theirs.operands):
+            yield f"  {ours}" + (f" instead of {theirs}" if ours != theirs else "")
+    else:
+        yield f"{site.place}, {site.function}: {site.operation}, {site.form}"
+        for at, value in enumerate(found.ours.operands):
+            yield f"  {{{at}}} = {value}"
+        for device, record in (suspect, found.ours), (reference, found.theirs):
+            verdict = "" if found.right is None else ": right" if found.right == record.values[-1] else ": WRONG"
+            yield f"  {record.values[-1]} by {device.name}{verdict}"
+        yield f"  {found.right} is exact" if found.right else "  The standard allows more than one result."
+        program_write(path, found, search.launch)
+        result, expected = program_run(path, suspect)
+        yield f"{path} " + ("repeats it" if result != expected else
+                            "gives the right result: the compiler gets the operation wrong in its surroundings")
+
+
+def device_find(name):
+    """The device that an index or a part of "PLATFORM, DEVICE" names."""
+    devices = [device for platform in cl.get_platforms() for device in platform.get_devices()]
+    found = [device for index, device in enumerate(devices)
+             if name == str(index) or not name.isdigit() and name.lower() in f"{device.platform.name}, {device.name}".lower()]
+    if not found:
+        raise Failure(f"no device \"{name}\"; there are: " + "; ".join(f"{i}: {each.platform.name}, {each.name}" for i, each in enumerate(devices)))
+    return found[0]
+
+
+def main(arguments=None):
+    parser = argparse.ArgumentParser(prog="glint locate", description="Finds the operation that an OpenCL device computes differently from another.")
+    parser.add_argument("folder", nargs="?", type=Path, help="of glint render --capture")
+    parser.add_argument("--device", help="index or part of the name of the suspect (default: the device of the capture)")
+    parser.add_argument("--reference", default="portable computing language", help="index or part of the name of the reference (default: PoCL)")
+    parser.add_argument("--device-options", default="", help="for the suspect's compiler, after those of the capture")
+    parser.add_argument("--reference-options", default="", help="such as -cl-opt-disable, which makes the suspect a reference")
+    parser.add_argument("--define", action="append", default=[], metavar="MACRO[=VALUE]", help="that the suspect's compiler defines")
+    parser.add_argument("-o", "--output", type=Path, default=Path("operation.cl"), help="the program that is written (default: %(default)s)")
+    parser.add_argument("--run", type=Path, metavar="FILE", help="run a program that was written")
+    options = parser.parse_args(arguments)
+    try:
+        if options.run:
+            result, expected = program_run(options.run, Device(device_find(options.device or "0"), options=shlex.split(options.device_options)))
+            for name, words in ("result", result), ("expected", expected):
+                print(f"{name}: {' '.join(f'{word:08x}' for word in words)}")
+            return 3 * (result != expected)
+        if not options.folder:
+            parser.error("no folder given")
+        launches = [Launch(path) for path in sorted(options.folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)]
+        launches = [launch for launch in launches if launch.kernel == "render"]
+        if not launches:
+            raise Failure(f"{options.folder}: no launch of the kernel render")
+        suspect = Device(device_find(options.device or launches[0].device), options=shlex.split(options.device_options))
+        reference = Device(device_find(options.reference), options=shlex.split(options.reference_options))
+        for launch in launches:
+            search = Search(launch, suspect, reference, options.define)
+            found = search.find()
+            if found is not None:
+                print(*report(search, found, options.output), sep="\n")
+                return 3
+        print(f"{len(launches)} launch{'es' if len(launches) > 1 else ''}: no pixel differs between {suspect.name} and {reference.name}")
+        return 0
+    except (Failure, cl.Error, OSError, KeyError, json.JSONDecodeError) as error:
+        print(f"glint locate: {error}", file=sys.stderr)
+        return 2 if isinstance(error, cl.Error) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
