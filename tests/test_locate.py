@@ -234,7 +234,11 @@ class Parts(TestCase):
             self.assertEqual(locate.main(["strict"]), 0)
             self.assertEqual(locate.main(["strict", "--reference", "no such device"]), 1)
             self.assertEqual(locate.main(["none"]), 1)
-        self.assertRegex(output.getvalue(), "^1 launch: no pixel differs between .* and .*\n$")
+            self.assertEqual(locate.main(["strict", "-o", "found.cl"], Compiler(Mutant("sqrt"))), 3)
+            self.assertEqual(locate.main(["--run", "found.cl"]), 0)
+        self.assertRegex(output.getvalue(), r"^1 launch: no pixel differs between .* and .*\npixel \d+,\d+: color .*\nsample [01], ray 1 of its tree, .*\n"
+                                            r"perturb\.h:\d+, device_sqrt: sqrt, sqrt\(\{0}\)\n(  .*\n){4}found\.cl repeats it\n"
+                                            r"result: ([0-9a-f]{8})\nexpected: \2\n$")
         self.assertRegex(errors.getvalue(), 'no device "no such device"; there are: 0: .*\n.*none: no launch')
 
 

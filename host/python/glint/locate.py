@@ -2,10 +2,11 @@
 """Finds the operation that an OpenCL device computes differently from another one.
 
     glint render scene.yaml --precision strict --capture launches
-    python3 -m glint.locate launches --device "the suspect" --reference pocl
+    python3 -m glint.locate launches --device "the suspect" --reference "another"
 
 Repeats each captured launch on both devices until a pixel differs, then that pixel's work-group by a kernel that records
 every operation, and finds the first one that has equal operands and unequal results. Writes it as a program of its own.
+If the difference vanishes with all operations recorded, finds the fewest whose recording makes it vanish.
 """
 import argparse
 import base64
@@ -387,7 +388,8 @@ def device_find(name):
     return found[0]
 
 
-def main(arguments=None):
+def main(arguments=None, compiler=lambda text: text):
+    """Runs the command. Tests replace the suspect's compiler."""
     parser = argparse.ArgumentParser(prog="glint locate", description="Finds the operation that an OpenCL device computes differently from another.")
     parser.add_argument("folder", nargs="?", type=Path, help="of glint render --capture")
     parser.add_argument("--device", help="index or part of the name of the suspect (default: the device of the capture)")
@@ -410,7 +412,7 @@ def main(arguments=None):
         launches = [launch for launch in launches if launch.kernel == "render"]
         if not launches:
             raise Failure(f"{options.folder}: no launch of the kernel render")
-        suspect = Device(device_find(options.device or launches[0].device), options=shlex.split(options.device_options))
+        suspect = Device(device_find(options.device or launches[0].device), compiler, shlex.split(options.device_options))
         reference = Device(device_find(options.reference), options=shlex.split(options.reference_options))
         for launch in launches:
             search = Search(launch, suspect, reference, options.define)
