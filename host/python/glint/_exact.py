@@ -23,6 +23,9 @@ class Value(NamedTuple):
     type: str
     lanes: tuple
 
+    def lane(self, at):
+        return self if len(self.lanes) == 1 else self._replace(lanes=self.lanes[at:at + 1])
+
     def __str__(self):
         lanes = [f"{number(self.type, bits)!r} (0x{bits:0{max(BITS[self.type] // 4, 1)}x})" for bits in self.lanes]
         return f"{self.type}{len(lanes)}({', '.join(lanes)})" if len(lanes) > 1 else f"{self.type} {''.join(lanes)}"

@@ -104,12 +104,10 @@ def parse(text, kernel):
 
 
 class Generator(GnuCGenerator):
-    """Writes OpenCL C; pycparserext writes a vector of one value, that of the comma operator."""
+    """Writes OpenCL C, in which a cast may be the literal of a vector: (float4)(a, b) and, a literal with a subscript, (float4)(a)[b]."""
 
     def visit_Cast(self, n):
-        if isinstance(n.expr, c_ast.ExprList):
-            return f"(({self.visit(n.to_type)})({self.visit(n.expr)}))"
-        return super().visit_Cast(n)
+        return f"(({self._generate_type(n.to_type, emit_declname=False)})({self.visit(n.expr)}))"
 
 
 PUT = "static void __attribute__((overloadable, noinline)) trace_put(global uint *trace"

@@ -172,6 +172,11 @@ class Finding(NamedTuple):
     def site(self):
         return self.ours.site
 
+    def first_lane(self):
+        """The number of lanes of the results, and the first that differs."""
+        ours, theirs = (record.values[-1].lanes for record in (self.ours, self.theirs))
+        return len(ours), [a == b for a, b in zip(ours, theirs)].index(False)
+
     @property
     def right(self):
         """The only right result, or None."""
@@ -365,13 +370,14 @@ def report(search, found, path):
         for ours, theirs in zip(found.ours.operands, found.theirs.operands):
             yield f"  {ours}" + (f" instead of {theirs}" if ours != theirs else "")
     else:
-        yield f"{site.place}, {site.function}: {site.operation}, {site.form}"
+        count, lane = found.first_lane()
+        yield f"{site.place}, {site.function}: {site.operation}, {site.form}" + (f", lane {lane} of {count}" if count > 1 else "")
         for at, value in enumerate(found.ours.operands):
-            yield f"  {{{at}}} = {value}"
+            yield f"  {{{at}}} = {value.lane(lane)}"
         for device, record in (suspect, found.ours), (reference, found.theirs):
             verdict = "" if found.right is None else ": right" if found.right == record.values[-1] else ": WRONG"
-            yield f"  {record.values[-1]} by {device.name}{verdict}"
-        yield f"  {found.right} is exact" if found.right else "  The standard allows more than one result."
+            yield f"  {record.values[-1].lane(lane)} by {device.name}{verdict}"
+        yield f"  {found.right.lane(lane)} is exact" if found.right else "  The standard allows more than one result."
         program_write(path, found, search.launch)
         result, expected = program_run(path, suspect)
         yield f"{path} " + ("repeats it" if result != expected else
