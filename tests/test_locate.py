@@ -9,6 +9,7 @@ import itertools
 import os
 import re
 import sys
+import unittest.mock
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
@@ -237,7 +238,8 @@ class Parts(TestCase):
             self.assertEqual(locate.main(["strict-1"]), 0)
             self.assertEqual(locate.main(["strict-1", "--reference", "no such device"]), 1)
             self.assertEqual(locate.main(["none"]), 1)
-            self.assertEqual(locate.main(["strict-1", "-o", "found.cl"], Compiler(Mutant("sqrt"))), 3)
+            with unittest.mock.patch.object(locate, "TRACE_WORDS", 200):  # in several parts
+                self.assertEqual(locate.main(["strict-1", "-o", "found.cl"], Compiler(Mutant("sqrt"))), 3)
             self.assertEqual(locate.main(["--run", "found.cl"]), 0)
         self.assertRegex(output.getvalue(), r"^1 launch: no pixel differs between .* and .*\npixel \d+,\d+: color .*\nsample [01].*\n"
                                             r"perturb\.h:\d+, device_sqrt: sqrt, sqrt\(\{0}\)\n(  .*\n){4}found\.cl repeats it\n"

@@ -25,7 +25,7 @@ UNRECORDED = re.compile("(v(load|store)|atomic_|prefetch|get_|barrier|mem_fence|
 OPERATORS = {"-": "neg", "!": "!", "~": "~"}
 
 
-@dataclass
+@dataclass(eq=False)
 class Site:
     """A place that records: an operation, or the entry of a function with its parameters as operands."""
     operation: str

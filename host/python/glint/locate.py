@@ -180,7 +180,7 @@ class Finding(NamedTuple):
     @property
     def right(self):
         """The only right result, or None."""
-        return None if None in self.ours.values else exact(self.site.operation, self.ours.operands, self.ours.values[-1])
+        return exact(self.site.operation, self.ours.operands, self.ours.values[-1])
 
 
 class Search:
@@ -234,7 +234,8 @@ class Search:
                     return first_other or Finding("branch", ours, theirs, entries)
                 if ours == theirs:
                     continue
-                finding = Finding("operation" if ours.operands == theirs.operands else "data", ours, theirs, entries[:])
+                is_known = ours.operands == theirs.operands and None not in ours.values + theirs.values
+                finding = Finding("operation" if is_known else "data", ours, theirs, entries[:])
                 if finding.kind == "operation" and self.is_wrong(finding):
                     return finding
                 first_other = first_other or finding
@@ -366,7 +367,8 @@ def report(search, found, path):
         yield f"Control flow differs although every operation before agrees: {site.place}, {site.function}, instead of " \
               f"{found.theirs.site.place}, {found.theirs.site.function}"
     elif found.kind == "data":
-        yield f"Data differs although every operation before agrees, so a load, store or copy is wrong: {site.place}, {site.function}, {site.form}"
+        yield f"{site.place}, {site.function}: {'parameters differ' if site.is_entry else f'operands differ, {site.form}'}"
+        yield "Every operation before agrees, so what is not recorded is wrong: a load, a store, a copy, ++, && or a vector's parts."
         for ours, theirs in zip(found.ours.operands, found.theirs.operands):
             yield f"  {ours}" + (f" instead of {theirs}" if ours != theirs else "")
     else:
@@ -415,9 +417,9 @@ def main(arguments=None, compiler=lambda text: text):
         if not options.folder:
             parser.error("no folder given")
         launches = [Launch(path) for path in sorted(options.folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)]
-        launches = [launch for launch in launches if launch.kernel == "render"]
+        launches = [launch for launch in launches if launch.kernel == "render" and "#define IS_PIXEL_LIST 0" in launch.text]
         if not launches:
-            raise Failure(f"{options.folder}: no launch of the kernel render")
+            raise Failure(f"{options.folder}: no launch of the kernel render for all pixels")
         suspect = Device(device_find(options.device or launches[0].device), compiler, shlex.split(options.device_options))
         reference = Device(device_find(options.reference), options=shlex.split(options.reference_options))
         for launch in launches:
