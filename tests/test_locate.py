@@ -89,7 +89,7 @@ class Parser(OpenCLCParser):
 
 @functools.lru_cache
 def parsed(text):
-    return Parser().parse(_instrument.preprocess(text, []), initial_type_symbols={"__auto_type"})
+    return _instrument.parse(_instrument.preprocess(text, []), Parser)
 
 
 def operation_of(node):

@@ -90,16 +90,23 @@ def constant_of(n):
     return None
 
 
-def parse(text, kernel):
-    """The program without what the kernel does not use, most of it, which would have to be compiled."""
-    program = OpenCLCParser().parse(text)
+def is_kernel(function):
+    return any(str(each).endswith("kernel") for each in function.decl.funcspec)
+
+
+def parse(text, parser=OpenCLCParser):
+    """The program without what its kernels do not use, most of it, which would have to be compiled."""
+    program = parser().parse(text, initial_type_symbols={"__auto_type"})
     Pruner().visit(program)
-    functions = {each.decl.name: each for each in program.ext if isinstance(each, c_ast.FuncDef)}
-    used, waiting = set(), {kernel}
+    functions = [each for each in program.ext if isinstance(each, c_ast.FuncDef)]
+    names = {}  # that occur in the functions of a name
+    for function in functions:
+        names.setdefault(function.decl.name, set()).update(Names(function.body).names)
+    used, waiting = set(), {function.decl.name for function in functions if is_kernel(function)}
     while waiting:
         used |= waiting
-        waiting = set().union(*(Names(functions[name].body).names for name in waiting)) & functions.keys() - used
-    program.ext = [each for each in program.ext if not isinstance(each, c_ast.FuncDef) or each.decl.name in used]
+        waiting = set().union(*(names[name] for name in waiting)) & names.keys() - used
+    program.ext = [each for each in program.ext if each not in functions or each.decl.name in used]
     return program
 
 
@@ -258,7 +265,7 @@ class Instrumenter(Generator):
         return text
 
     def visit_FuncDef(self, n):
-        self.is_kernel = any(str(each).endswith("kernel") for each in n.decl.funcspec)
+        self.is_kernel = is_kernel(n)
         head = self.visit(n.decl)
         self.function = n.decl.name
         parameters = [] if self.is_kernel or not n.decl.type.args else n.decl.type.args.params

@@ -57,7 +57,7 @@ class Launch:
     @functools.lru_cache(maxsize=None)
     def program(self, definitions):
         """The parsed text, for a compiler that defines the macros."""
-        return instrument.parse(instrument.preprocess(self.text, definitions), self.kernel)
+        return instrument.parse(instrument.preprocess(self.text, definitions))
 
     @property
     def band(self):
