@@ -141,7 +141,7 @@ def header(has_double):
     """The functions that store values."""
     lines = ["#pragma OPENCL EXTENSION cl_khr_fp64 : enable"] if has_double else []
     lines += ["static void trace_word(global uint *trace, uint word) { uint at = trace[0]++ - trace[1]; if (at < trace[2]) trace[3 + at] = word; }",
-              "static void trace_id(global uint *trace, uint id) { if (trace) trace_word(trace, id); }"]
+              "static void __attribute__((noinline)) trace_id(global uint *trace, uint id) { if (trace) trace_word(trace, id); }"]
     lines += [lane_write(base) for base in BITS if has_double or base != "double"]
     for code, name in enumerate(TYPES):
         if has_double or not name.startswith("double"):
