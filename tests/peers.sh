@@ -40,9 +40,16 @@ other_work_is_reported() {
     [ $? = 3 ]
 }
 
-rungs=(spheres-16 bunny-2000 sun-2000x4 soup-500)
-check "spheres and meshes, a directional light and samples by Embree and glint are timed" bench "$build/peers/embree" "${rungs[@]}"
+rungs=(spheres-16 bunny-2000 sun-2000x4 soup-500 forest-50)
+check "spheres, meshes and instances, a directional light and samples by Embree and glint are timed" bench "$build/peers/embree" "${rungs[@]}"
 check "all of Embree's images are glint's" agree_within 0.05 "Embree packets" "Embree packets, our spheres" "Embree single rays"
+stretched_instances_are_refused() {
+    sed 's/{scale: [0-9.]*}/{scale: [1, 2, 1]}/' "$scratch/scenes/forest-50.yaml" >"$scratch/scenes/stretched.yaml"
+    message=$("$python" -B -c 'import sys; sys.path.insert(0, "tools/peers"); import scene; scene.read_scene(sys.argv[1])' \
+        "$scratch/scenes/stretched.yaml" 2>&1)
+    [[ $message == *"only instances with one positive scale"* ]]
+}
+check "instances that are stretched are refused" stretched_instances_are_refused
 check "an image of other work makes the run fail" other_work_is_reported
 
 growth_has_rows_and_lines() {

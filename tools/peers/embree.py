@@ -42,4 +42,6 @@ def write_scene(scene, path, _size=None):
             write(f"faces {len(mesh.faces)}\n")
             for face in mesh.faces:
                 write("%d %d %d\n" % tuple(face))
-            write(f"{names[mesh.material]}\n")
+            write(f"{names[mesh.material]}\ninstances {len(mesh.instances)}\n")
+            for columns in mesh.instances:
+                write(" ".join(map(triple, columns)) + "\n")

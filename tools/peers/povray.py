@@ -49,9 +49,13 @@ def write_shapes(write, scene, end):
         write_shape(f"cone {{ {vector(start)}, {radius:.9g}, {vector(to)}, {to_radius:.9g} open" if radius != to_radius else
                     f"cylinder {{ {vector(start)}, {vector(to)}, {radius:.9g} open", name)
     for mesh in scene.meshes:
-        if end(mesh.material) is not None:
-            write_mesh(write, mesh)
-            write(f"{end(mesh.material)}\n")
+        if end(mesh.material) is None:
+            continue
+        write("#declare Shared = " if mesh.instances else "")
+        write_mesh(write, mesh)
+        write("}\n" if mesh.instances else f"{end(mesh.material)}\n")
+        for columns in mesh.instances:
+            write_shape(f"object {{ Shared matrix {vector(sum(columns, []))}", mesh.material)
 
 
 def write_scene(scene, path, size):

@@ -1,4 +1,4 @@
-"""Reads what a YAML scene of spheres, planes and meshes holds, for the writers of other programs' formats."""
+"""Reads what a YAML scene of spheres, planes, meshes and their instances holds, for the writers of other programs' formats."""
 import math
 import pathlib
 import re
@@ -19,6 +19,7 @@ class Mesh:
     faces: list     # triples of indices of vertices
     normals: list   # one a vertex, or none: flat
     material: str
+    instances: list = field(default_factory=list)  # of four columns of a matrix 3x4; if there are any, only they are drawn
 
 
 @dataclass
@@ -123,6 +124,29 @@ def read_mesh(keys, folder):
     return Mesh(vertices, faces, normals, keys["material"])
 
 
+def read_definition(group, folder):
+    refuse_other_keys("a definition", group, ["objects"])
+    if [list(item) for item in group["objects"]] != [["mesh"]]:
+        raise ValueError("only definitions of one mesh can be compared")
+    return read_mesh(group["objects"][0]["mesh"], folder)
+
+
+def read_instance(keys):
+    """Returns the four columns of its matrix, 3x4. It turns normals, because its scale is uniform."""
+    refuse_other_keys("an instance", keys, ["of", "transform"])
+    columns = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]]
+    steps = keys.get("transform", [])
+    for step in steps if isinstance(steps, list) else [steps]:
+        refuse_other_keys("an instance's transform", step, ["scale", "rotate", "translate"])
+        scale, degrees = step.get("scale", 1), step.get("rotate", [0, 0, 0])
+        if isinstance(scale, list) or scale <= 0 or not isinstance(degrees, list):
+            raise ValueError("only instances with one positive scale and rotations about x, y and z can be compared")
+        turn = rotation(degrees)
+        columns = [[scale * dot(row, column) for row in turn] for column in columns]
+        columns[3] = [part + by for part, by in zip(columns[3], step.get("translate", [0, 0, 0]))]
+    return columns
+
+
 def refuse_other_keys(what, mapping, known):
     for key in mapping:
         if key not in known:
@@ -147,6 +171,7 @@ def read_scene(path):
             scene.lights.append((keys["position"], color))
         else:
             scene.suns.append((keys["direction"], color))
+    definitions = {name: read_definition(group, path.parent) for name, group in data.get("define", {}).items()}
     for text in item_texts(objects):
         quick = SPHERE.match(text.strip())  # yaml takes minutes for a million
         if quick:
@@ -162,6 +187,11 @@ def read_scene(path):
             scene.planes.append((keys["point"], keys["normal"], keys["material"]))
         elif kind == "mesh":
             scene.meshes.append(read_mesh(keys, path.parent))
+        elif kind == "instance":
+            mesh = definitions[keys["of"]]
+            if not mesh.instances:
+                scene.meshes.append(mesh)
+            mesh.instances.append(read_instance(keys))
         else:
-            raise ValueError(f"only spheres, planes and meshes can be compared, not a {kind}")
+            raise ValueError(f"only spheres, planes, meshes and instances can be compared, not a {kind}")
     return scene

@@ -41,6 +41,8 @@ def write_scene(scene, path, size):
         raise NotModelled("no cones")
     if any(material.get("transmission", 0) > 0 for material in scene.materials.values()):
         raise NotModelled("no refraction")
+    if any(mesh.instances for mesh in scene.meshes):
+        raise NotModelled("no instances")
     with open(path, "w") as file:
         write = file.write
         write(f"Begin_Scene\nResolution {size[0]} {size[1]}\nCamera\nZoom 1\n"

@@ -101,6 +101,9 @@ static Mesh read_mesh(Reader *reader, size_t material_count)
     for (size_t i = 0; i < 3 * mesh.face_count; i++)
         mesh.faces[i] = read_index(reader, mesh.vertex_count);
     mesh.material = read_index(reader, material_count);
+    mesh.instance_count = read_list(reader, "instances");
+    mesh.instances = memory_get(INSTANCE_PARTS * mesh.instance_count, sizeof *mesh.instances);
+    read_numbers(reader, INSTANCE_PARTS * mesh.instance_count, mesh.instances);
     return mesh;
 }
 
@@ -145,8 +148,11 @@ Description description_read(const char *path)
     }
     scene.mesh_count = read_list(&reader, "meshes");
     scene.meshes = memory_get(scene.mesh_count, sizeof *scene.meshes);
-    for (size_t i = 0; i < scene.mesh_count; i++)
+    for (size_t i = 0; i < scene.mesh_count; i++) {
         scene.meshes[i] = read_mesh(&reader, scene.material_count);
+        scene.meshes[i].first_instance = scene.instance_count;
+        scene.instance_count += scene.meshes[i].instance_count;
+    }
     free(text);
     return scene;
 }

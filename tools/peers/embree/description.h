@@ -38,10 +38,14 @@ typedef struct {
     float radius;
 } Sphere;
 
+enum { INSTANCE_PARTS = 12 }; // the columns of a matrix 3x4: a rotation times a factor, and a translation
+
 typedef struct {
     float *vertices, *normals; // three numbers of each; no normals: flat
     int *faces;                // three vertices of each
-    size_t vertex_count, face_count;
+    float *instances;          // INSTANCE_PARTS of each; if there are any, only they are drawn
+    size_t vertex_count, face_count, instance_count;
+    size_t first_instance; // number of instances of earlier meshes
     int material;
 } Mesh;
 
@@ -54,7 +58,7 @@ typedef struct {
     Sphere *spheres;
     int *sphere_materials;
     Mesh *meshes;
-    size_t light_count, material_count, plane_count, sphere_count, mesh_count;
+    size_t light_count, material_count, plane_count, sphere_count, mesh_count, instance_count;
 } Description;
 
 // Ends the program with a message if the file cannot be read or is not a description. The result lives until

@@ -110,6 +110,7 @@ static void rays_intersect(const Renderer *renderer, const int *valid, struct RT
         rays->ray.tfar[i] = one.ray.tfar;
         rays->hit.geomID[i] = one.hit.geomID;
         rays->hit.primID[i] = one.hit.primID;
+        rays->hit.instID[0][i] = one.hit.instID[0];
         rays->hit.u[i] = one.hit.u;
         rays->hit.v[i] = one.hit.v;
         rays->hit.Ng_x[i] = one.hit.Ng_x;
@@ -143,11 +144,6 @@ static void rays_occlude(const Renderer *renderer, const int *valid, struct RTCR
     }
 }
 
-static unsigned mesh_geometry(const Description *scene, size_t mesh)
-{
-    return (unsigned)mesh + (scene->sphere_count > 0);
-}
-
 // Normals of a mesh's vertices, blended where the rays meet it, in place of the triangles' own.
 static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit16 *hit, const int *flip,
                         Vectors *normal)
@@ -168,6 +164,29 @@ static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit
         normal->x[i] = inverse_length * x;
         normal->y[i] = inverse_length * y;
         normal->z[i] = inverse_length * z;
+    }
+}
+
+// Turns the normals of hits on the mesh's instances from its space to the scene's, and makes them unit.
+static void mesh_turn(const Description *scene, size_t k, const struct RTCHit16 *hit, float *normal_x,
+                      float *normal_y, float *normal_z)
+{
+    const Mesh *mesh = &scene->meshes[k];
+    if (mesh->instance_count == 0) return;
+    const unsigned geometry = mesh_geometry(scene, k), first = instance_geometry(scene, mesh, 0);
+    const float *instances = mesh->instances;
+    FOR_LANES
+    {
+        if (hit->geomID[i] != geometry) continue;
+        int at = INSTANCE_PARTS * (int)(hit->instID[0][i] - first);
+        float u = normal_x[i], v = normal_y[i], w = normal_z[i];
+        float x = instances[at] * u + instances[at + 3] * v + instances[at + 6] * w;
+        float y = instances[at + 1] * u + instances[at + 4] * v + instances[at + 7] * w;
+        float z = instances[at + 2] * u + instances[at + 5] * v + instances[at + 8] * w;
+        float inverse_length = 1 / sqrtf(x * x + y * y + z * z);
+        normal_x[i] = inverse_length * x;
+        normal_y[i] = inverse_length * y;
+        normal_z[i] = inverse_length * z;
     }
 }
 
@@ -214,24 +233,29 @@ static bool surfaces_find(const Description *scene, const int *valid, const stru
     return lanes_any(surfaces->found);
 }
 
-static void surfaces_place(const Description *scene, const struct RTCRayHit16 *rays, Surfaces *surfaces)
+static void surfaces_place(const Description *scene, struct RTCRayHit16 *rays, Surfaces *surfaces)
 {
     const struct RTCRay16 *ray = &rays->ray;
+    struct RTCHit16 *hit = &rays->hit;
+    for (size_t k = 0; k < scene->mesh_count; k++)
+        mesh_turn(scene, k, hit, hit->Ng_x, hit->Ng_y, hit->Ng_z);
     Vectors outward;
     alignas(64) int flip[LANES];
     FOR_LANES
     {
-        outward.x[i] = rays->hit.Ng_x[i];
-        outward.y[i] = rays->hit.Ng_y[i];
-        outward.z[i] = rays->hit.Ng_z[i];
+        outward.x[i] = hit->Ng_x[i];
+        outward.y[i] = hit->Ng_y[i];
+        outward.z[i] = hit->Ng_z[i];
         flip[i] =
             outward.x[i] * ray->dir_x[i] + outward.y[i] * ray->dir_y[i] + outward.z[i] * ray->dir_z[i] > 0;
     }
     normals_face(&outward, flip);
     surfaces->normal = outward;
     for (size_t k = 0; k < scene->mesh_count; k++) {
-        if (scene->meshes[k].normals)
-            mesh_smooth(&scene->meshes[k], mesh_geometry(scene, k), &rays->hit, flip, &surfaces->normal);
+        if (!scene->meshes[k].normals) continue;
+        Vectors *normal = &surfaces->normal;
+        mesh_smooth(&scene->meshes[k], mesh_geometry(scene, k), hit, flip, normal);
+        mesh_turn(scene, k, hit, normal->x, normal->y, normal->z);
     }
     const Vector eye = scene->camera.eye;
     FOR_LANES

@@ -22,13 +22,25 @@ static inline bool lanes_any(const int *lanes)
 
 typedef struct {
     const Description *description;
-    RTCScene scene;  // geometry 0 is the spheres, if there are any; then come the meshes
+    RTCScene scene;
     bool one_by_one; // not in packets of 16
     enum RTCIntersectContextFlags coherence;
     unsigned width, height, samples;
     const float *offsets; // x and y of each sample, from -1 to 1 across the pixel
     float *film;          // height * width * 3, from the top left
 } Renderer;
+
+// The IDs of geometries: 0 for the spheres, if there are any, then those of the meshes, then those of the
+// instances, mesh by mesh. A mesh that has instances keeps its ID in the scene that they share.
+static inline unsigned mesh_geometry(const Description *scene, size_t mesh)
+{
+    return (unsigned)mesh + (scene->sphere_count > 0);
+}
+
+static inline unsigned instance_geometry(const Description *scene, const Mesh *mesh, size_t instance)
+{
+    return mesh_geometry(scene, scene->mesh_count) + (unsigned)(mesh->first_instance + instance);
+}
 
 // Renders the pixels from x, y on that are in the image.
 void packet_render(const Renderer *renderer, unsigned x, unsigned y);
