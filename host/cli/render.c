@@ -234,10 +234,15 @@ static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
     if (obstacle)
         fprintf(stderr, "glint: '%s': %s, but 'shutter' needs several; --set shutter=0 closes it\n",
                 options->scene, obstacle);
+    if (shutter->is_open && options->sample_count == 1)
+        fprintf(
+            stderr,
+            "glint: warning: '%s': 'shutter' has an effect from --samples 2 on: each sample shows one time\n",
+            options->scene);
     return !obstacle;
 }
 
-// Replaces the scene by that of the shutter's time. The frame's scene had its warnings printed.
+// Replaces the scene by that of the shutter's time. Warnings were printed when the frame's scene was read.
 static bool scene_advance(Scene *scene, RenderOptions *options, const Shutter *shutter, HostTimes *times)
 {
     MessageList messages = {0};
@@ -262,8 +267,15 @@ static int shutter_render(RenderOptions *options, Scene *scene, RenderDevices *o
     Shutter shutter = shutter_open(scene, options->sample_count);
     int status = shutter_fits(&shutter, options) ? EXIT_DONE : EXIT_USER;
     while (status == EXIT_DONE && shutter.time < shutter.time_count) {
+        if (shutter.time > 0) {
+            progress_end_at_once(); // nothing checks the flag while a scene is read
+            if (progress_interrupted()) {
+                status = EXIT_INTERRUPTED;
+                break;
+            }
+            render_devices_rest(open);
+        }
         const bool is_moved = shutter.time_count == 1 || scene_advance(scene, options, &shutter, times);
-        if (shutter.time > 0) render_devices_rest(open);
         status = is_moved ? scene_render(options, scene, open, ranks, &shutter, times) : EXIT_USER;
         shutter.time++;
     }

@@ -5,13 +5,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Each time leaves an edge where something moves, with 256 times of 1/256 of its contrast.
+// Each time leaves an edge behind what moves; with 256 times its contrast is 1/256.
 enum { TIMES_MAX = 256 };
 
 Shutter shutter_open(const Scene *scene, uint32_t sample_count)
 {
     const bool moves = scene->is_animated && scene->shutter > 0;
-    return (Shutter){.frame = scene->frame,
+    return (Shutter){.is_open = moves,
+                     .frame = scene->frame,
                      .duration = scene->shutter,
                      .sample_count = sample_count,
                      .time_count = !moves                     ? 1
@@ -29,13 +30,13 @@ bool shutter_is_last(const Shutter *shutter)
     return shutter->time + 1 == shutter->time_count;
 }
 
-// Returns the index of the time's first sample, or with `behind` 1, of the next one's. Times are in order,
-// except that the one in the middle is the last to be rendered.
-static uint32_t first_sample(const Shutter *shutter, uint32_t behind)
+// Returns the index of the time's first sample or, with an `offset` of 1, that of the next time's. Times are
+// in order, except that the one in the middle is the last to be rendered.
+static uint32_t first_sample(const Shutter *shutter, uint32_t offset)
 {
     const uint32_t middle = shutter->time_count / 2;
     const uint32_t index = shutter_is_last(shutter) ? middle : shutter->time + (shutter->time >= middle);
-    return (uint32_t)((uint64_t)(index + behind) * shutter->sample_count / shutter->time_count);
+    return (uint32_t)((uint64_t)(index + offset) * shutter->sample_count / shutter->time_count);
 }
 
 double shutter_frame(const Shutter *shutter)

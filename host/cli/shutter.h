@@ -7,6 +7,7 @@
 #include "host/render/renderer.h"
 
 typedef struct {
+    bool is_open;
     double frame, duration;    // in frames
     uint32_t sample_count;     // of a pixel
     uint32_t time, time_count; // a count of 1 means that nothing accumulates

@@ -32,45 +32,54 @@ void capture_close(Compute *compute)
 }
 
 // Writes a file named by the hash of its bytes, unless it exists, and adds its name to the JSON object.
-static void file_write(const Compute *compute, Json *json, const char *key, const char *ending,
+// Returns false with a message if that failed.
+static bool file_write(const Compute *compute, Json *json, const char *key, const char *ending,
                        const void *bytes, size_t size)
 {
+    bool is_written = true;
     char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
          *path = text_format("%s/%s", compute->device->capture_folder, name);
     MessageList messages = {0};
     OutputFile output;
-    if (access(path, F_OK) != 0 && output_open(&output, path, &messages)) {
-        if (output_write(&output, bytes, size, &messages))
-            output_commit(&output, &messages);
-        else
+    if (access(path, F_OK) != 0) {
+        is_written = output_open(&output, path, &messages);
+        if (is_written && !output_write(&output, bytes, size, &messages)) {
             output_abandon(&output);
+            is_written = false;
+        } else if (is_written) {
+            is_written = output_commit(&output, &messages);
+        }
     }
     message_list_print(&messages, stderr);
     message_list_free(&messages);
     if (json) json_text(json, key, name);
     free(path);
     free(name);
+    return is_written;
 }
 
-static void buffer_write_file(Compute *compute, Json *json, cl_mem buffer)
+static bool buffer_write_file(Compute *compute, Json *json, cl_mem buffer)
 {
     size_t size = 0;
     if (!buffer) json_none(json, "buffer");
     if (!buffer || !compute_try(compute, clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL)))
-        return;
+        return compute_ok(compute);
     char *bytes = memory_allocate(size, 1);
-    if (buffer_read(compute, buffer, size, bytes)) file_write(compute, json, "buffer", "bin", bytes, size);
+    const bool is_written =
+        buffer_read(compute, buffer, size, bytes) && file_write(compute, json, "buffer", "bin", bytes, size);
     free(bytes);
+    return is_written;
 }
 
-static void argument_write(Compute *compute, Json *json, const CapturedArgument *argument)
+static bool argument_write(Compute *compute, Json *json, const CapturedArgument *argument)
 {
+    bool is_written = true;
     json_begin_object(json, NULL);
     json_int64(json, "index", argument->index);
     if (argument->is_buffer) {
         cl_mem buffer;
         memcpy(&buffer, text_c(&argument->value), sizeof buffer);
-        buffer_write_file(compute, json, buffer);
+        is_written = buffer_write_file(compute, json, buffer);
     } else {
         Text value = {0};
         base64_append(&value, (const uint8_t *)argument->value.items, argument->value.count);
@@ -78,6 +87,7 @@ static void argument_write(Compute *compute, Json *json, const CapturedArgument 
         text_free(&value);
     }
     json_end(json);
+    return is_written;
 }
 
 static void sizes_write(Json *json, const char *key, cl_uint dimensions, const size_t *sizes)
@@ -101,17 +111,22 @@ void capture_launch(Compute *compute, const Launch *launch)
     json_text(json, "driver", compute->device->driver);
     json_text(json, "kernel", request->kernel);
     json_text(json, "options", text_c(&options));
-    file_write(compute, json, "text", "cl", text, strlen(text));
+    bool is_written = file_write(compute, json, "text", "cl", text, strlen(text));
     sizes_write(json, "first", launch->dimensions, launch->first);
     sizes_write(json, "items", launch->dimensions, launch->items);
     sizes_write(json, "group", launch->dimensions, launch->group);
     json_begin_array(json, "arguments");
-    for (size_t i = 0; i < compute->captured.count; i++)
-        if (compute->captured.items[i].kernel == launch->kernel)
-            argument_write(compute, json, &compute->captured.items[i]);
+    // a released kernel may have had this one's address, and more arguments
+    cl_uint argument_count = 0;
+    compute_try(compute, clGetKernelInfo(launch->kernel, CL_KERNEL_NUM_ARGS, sizeof argument_count,
+                                         &argument_count, NULL));
+    for (size_t i = 0; i < compute->captured.count && is_written; i++)
+        if (compute->captured.items[i].kernel == launch->kernel &&
+            compute->captured.items[i].index < argument_count)
+            is_written = argument_write(compute, json, &compute->captured.items[i]);
     json_end(json);
     Text index = json_close(json);
-    if (compute_ok(compute)) file_write(compute, NULL, NULL, "json", index.items, index.count);
+    if (is_written) file_write(compute, NULL, NULL, "json", index.items, index.count);
     text_free(&index);
     text_free(&options);
     free(text);

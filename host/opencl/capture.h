@@ -12,7 +12,7 @@ typedef struct {
     const size_t *first, *items, *group; // as for kernel_launch_from
 } Launch;
 
-// Writes a launch and the present contents of its buffers to the device's capture folder, if it has one. Each
+// Writes a launch and the current contents of its buffers to the device's capture folder, if it has one. Each
 // file is named by a hash of its contents, so that launches share texts and buffers. Prints an error for a
 // file that cannot be written.
 void capture_launch(Compute *compute, const Launch *launch);

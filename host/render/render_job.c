@@ -55,6 +55,15 @@ static void thread_start(Worker *worker)
     scheduler_drop(worker->scheduler, worker->number);
 }
 
+static void share_set(WorkerShare *share, const WorkerShare *now, bool is_part)
+{
+    const WorkerShare earlier = is_part ? *share : (WorkerShare){0};
+    *share = (WorkerShare){.rows = now->rows,
+                           .bands = earlier.bands + now->bands,
+                           .busy_seconds = earlier.busy_seconds + now->busy_seconds,
+                           .idle_seconds = earlier.idle_seconds + now->idle_seconds};
+}
+
 bool render_job_run(const RenderJob *job)
 {
     const RemoteWorkers *remote = job->remote;
@@ -82,10 +91,12 @@ bool render_job_run(const RenderJob *job)
     free(workers);
     WorkerShare *shares = memory_allocate_zeroed(count + remote_count, sizeof *shares);
     bool whole = scheduler_close(scheduler, shares);
+    // the parts of an image add up, whose first sample is 0 only in the first
+    const bool is_part = job->renderers[0]->settings.first_sample > 0;
     for (size_t i = 0; i < count; i++)
-        job->renderers[i]->report.share = shares[i];
+        share_set(&job->renderers[i]->report.share, &shares[i], is_part);
     for (size_t i = 0; i < remote_count; i++)
-        remote->shares[i] = shares[count + i];
+        share_set(&remote->shares[i], &shares[count + i], is_part);
     free(shares);
     return whole;
 }

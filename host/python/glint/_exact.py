@@ -158,6 +158,8 @@ def exact(operation, operands, result):
         lanes = []
         for lane in range(count):
             of = [(operand.type, operand.lanes[lane if len(operand.lanes) > 1 else 0]) for operand in operands]
+            if re.search(r"_(rt[ezpn]|sat)\b|_sat_", operation):
+                raise Undefined  # kernels do not use them
             if operation == "select":
                 is_true = number(*of[0]) < 0 if len(operands[0].lanes) > 1 else of[0][1] != 0
                 of, name = [of[1 if is_true else 2]], "convert"

@@ -11,6 +11,7 @@ import subprocess
 from dataclasses import dataclass
 
 from pycparser import c_ast
+from pycparser.c_parser import ParseError  # noqa: F401 (locate reports it)
 from pycparserext.ext_c_generator import GnuCGenerator
 from pycparserext.ext_c_parser import OpenCLCParser
 
@@ -299,7 +300,7 @@ def is_pure(n, may_read=False):
     if isinstance(n, c_ast.ArrayRef):
         return may_read and is_pure(n.name, True) and is_pure(n.subscript, True)
     if isinstance(n, c_ast.UnaryOp):
-        return n.op in ("-", "~", "!", "*" if may_read else "-") and is_pure(n.expr, may_read)
+        return n.op in ({"-", "~", "!", "*"} if may_read else {"-", "~", "!"}) and is_pure(n.expr, may_read)
     if isinstance(n, c_ast.Cast):
         return not isinstance(n.expr, c_ast.InitList) and is_pure(n.expr, may_read)
-    return isinstance(n, c_ast.BinaryOp) and n.op not in "/%" and is_pure(n.left, may_read) and is_pure(n.right, may_read)
+    return isinstance(n, c_ast.BinaryOp) and n.op not in {"/", "%"} and is_pure(n.left, may_read) and is_pure(n.right, may_read)

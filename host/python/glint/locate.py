@@ -15,6 +15,7 @@ import json
 import os
 import re
 import shlex
+import subprocess
 import sys
 from pathlib import Path
 from typing import NamedTuple
@@ -420,6 +421,9 @@ def main(arguments=None, compiler=lambda text: text):
         launches = [launch for launch in launches if launch.kernel == "render" and "#define IS_PIXEL_LIST 0" in launch.text]
         if not launches:
             raise Failure(f"{options.folder}: no launch of the kernel render for all pixels")
+        for launch in launches:
+            if "#define IS_STRICT 1" not in launch.text and "#define IS_DOUBLE 1" not in launch.text:
+                raise Failure(f"{options.folder}: captured at single, where devices may differ; use --precision strict or double")
         suspect = Device(device_find(options.device or launches[0].device), compiler, shlex.split(options.device_options))
         reference = Device(device_find(options.reference), options=shlex.split(options.reference_options))
         for launch in launches:
@@ -430,7 +434,10 @@ def main(arguments=None, compiler=lambda text: text):
                 return 3
         print(f"{len(launches)} launch{'es' if len(launches) > 1 else ''}: no pixel differs between {suspect.name} and {reference.name}")
         return 0
-    except (Failure, cl.Error, OSError, KeyError, json.JSONDecodeError) as error:
+    except subprocess.CalledProcessError as error:
+        print(f"glint locate: the C preprocessor failed: {error.stderr or error}", file=sys.stderr)
+        return 1
+    except (Failure, cl.Error, OSError, KeyError, TypeError, instrument.ParseError, json.JSONDecodeError) as error:
         print(f"glint locate: {error}", file=sys.stderr)
         return 2 if isinstance(error, cl.Error) else 1
 
