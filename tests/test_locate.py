@@ -169,7 +169,7 @@ class Mutants(TestCase):
 
     def test_mutants(self):
         """At least nine of ten are found, each with its operation, function, operands and exact result, or what of it can be found."""
-        mutants = MUTANTS if IS_LONG else MUTANTS[:4]
+        mutants = MUTANTS if IS_LONG else MUTANTS[2:4]
         launches = {variant: captured(*variant) for variant in {(mutant.precision, mutant.lanes) for mutant in mutants}}
         reference = locate.Device(self.device)
         failures = []
