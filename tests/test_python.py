@@ -217,7 +217,7 @@ class Occlusion(unittest.TestCase):
         self.assertTrue(0 < (shadow & facing).sum() < facing.sum(), "the small sphere shades a part of the large one")
 
     def test_ends(self):
-        """Only what lies strictly between the ends occludes: a cube's faces at t 1 and 2."""
+        """Only surfaces strictly between the ends occlude: a cube's faces at t 1 and 2."""
         scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
         below, above = np.nextafter((1, 2), 0), np.nextafter((1, 2), 3)
         tmin, tmax = [0, 0, 0, 1, below[1], 2], [below[0], 1, above[0], 2, above[1], 3]
@@ -288,7 +288,7 @@ class Compare(unittest.TestCase):
             glint.compare([1.0], [2.0], color=True)
 
     def test_data(self):
-        """Three channels are colors or data, as the caller says; of no comparable value there is no error."""
+        """Three channels are colors or data, as the caller says; without comparable values errors are NaN."""
         normals = np.random.default_rng(9).uniform(-1, 1, (9, 16, 3))
         color, data = (glint.compare(normals, -normals, color=is_color) for is_color in (True, False))
         self.assertEqual((data.rmse, data.srgb8_off_by_2_or_more), (color.rmse, 0))

@@ -42,7 +42,7 @@ static Image image_of_array(const GlintImagePair *pair, const void *array)
 
 static GlintImageMetrics metrics_of(const ImageMetrics *found)
 {
-    const double none = found->linear.count > 0 ? 0 : (double)NAN; // without a value there is no error of it
+    const double none = found->linear.count > 0 ? 0 : (double)NAN; // errors of no values
     return (GlintImageMetrics){
         .differing_values = found->differing_count,
         .unmatched_values = found->unmatched_count,

@@ -36,19 +36,17 @@ void capture_close(Compute *compute)
 static bool file_write(const Compute *compute, Json *json, const char *key, const char *ending,
                        const void *bytes, size_t size)
 {
-    bool is_written = true;
     char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
          *path = text_format("%s/%s", compute->device->capture_folder, name);
     MessageList messages = {0};
     OutputFile output;
-    if (access(path, F_OK) != 0) {
-        is_written = output_open(&output, path, &messages);
-        if (is_written && !output_write(&output, bytes, size, &messages)) {
-            output_abandon(&output);
-            is_written = false;
-        } else if (is_written) {
+    bool is_written = access(path, F_OK) == 0;
+    if (!is_written && output_open(&output, path, &messages)) {
+        is_written = output_write(&output, bytes, size, &messages);
+        if (is_written)
             is_written = output_commit(&output, &messages);
-        }
+        else
+            output_abandon(&output);
     }
     message_list_print(&messages, stderr);
     message_list_free(&messages);

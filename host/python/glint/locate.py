@@ -5,7 +5,7 @@
     python3 -m glint.locate launches --device "the suspect" --reference "another"
 
 Repeats each captured launch on both devices until a pixel differs, then that pixel's work-group by a kernel that records
-every operation, and finds the first one that has equal operands and unequal results. Writes it as a program of its own.
+every operation, and finds the first one that has equal operands and unequal results. Writes it as a separate program.
 If the difference vanishes with all operations recorded, finds the fewest whose recording makes it vanish.
 """
 import argparse
@@ -309,7 +309,7 @@ kernel void operation(global const uint *inputs, global uint *result)
 
 
 def program_write(path, finding, launch):
-    """Writes the operation as a program of its own."""
+    """Writes the operation as a separate program."""
     names = "abcdefgh"[:len(finding.ours.operands)]
     result, right = finding.ours.values[-1], finding.right
     inputs, loads = [], []
