@@ -520,6 +520,12 @@ class Aovs(CliTestCase):
                 hashed = (hashed ^ byte) * 0x100000001B3 % 2**64
             self.assertEqual(name.partition(".")[0], f"{hashed:016x}")
         self.refuses("render sphere.yaml --capture none/launches", "--capture: cannot create the folder 'none/launches'")
+        # locate would repeat what is left of other renders
+        self.refuses("render sphere.yaml --capture launches", "--capture: the folder 'launches' is not empty")
+        limit = (4096, resource.RLIM_INFINITY)  # below the size of a kernel's text
+        self.refuses(f"render sphere.yaml {SMALL} --capture full -o none.npy", "capture on .*: cannot write 'full/.*': File too large", 2,
+                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit))
+        self.assertFalse(Path("none.npy").exists())
 
     def test_aovs(self):
         layouts = {"t": ((6, 8), "<f4"), "normal": ((6, 8, 3), "<f4"), "position": ((6, 8, 3), "<f8"),

@@ -5,6 +5,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include <dirent.h>
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
@@ -110,6 +111,18 @@ bool option_folder(const char *option, const char *path)
     if (access(path, W_OK | X_OK) == 0) return true;
     fprintf(stderr, "glint: --%s: cannot write to '%s': %s\n", option, path, strerror(errno));
     return false;
+}
+
+bool option_empty_folder(const char *option, const char *path)
+{
+    if (!option_folder(option, path)) return false;
+    DIR *folder = opendir(path);
+    bool is_empty = true;
+    for (const struct dirent *item; folder && (item = readdir(folder));)
+        is_empty &= strcmp(item->d_name, ".") == 0 || strcmp(item->d_name, "..") == 0;
+    if (folder) closedir(folder);
+    if (!is_empty) fprintf(stderr, "glint: --%s: the folder '%s' is not empty\n", option, path);
+    return is_empty;
 }
 
 static bool perturb_read(const char *value, CommonOptions *common)

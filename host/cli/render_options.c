@@ -269,7 +269,7 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         return true;
     case OPTION_CAPTURE:
         options->common.capture_folder = value;
-        return option_folder("capture", value);
+        return option_empty_folder("capture", value);
     case OPTION_QUIET:
         options->quiet = true;
         return true;

@@ -32,9 +32,9 @@ void capture_close(Compute *compute)
 }
 
 // Writes a file named by the hash of its bytes, unless it exists, and adds its name to the JSON object.
-// Returns false with a message if that failed.
-static bool file_write(const Compute *compute, Json *json, const char *key, const char *ending,
-                       const void *bytes, size_t size)
+// Returns false if that failed, which is a failure of the Compute.
+static bool file_write(Compute *compute, Json *json, const char *key, const char *ending, const void *bytes,
+                       size_t size)
 {
     char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
          *path = text_format("%s/%s", compute->device->capture_folder, name);
@@ -48,7 +48,7 @@ static bool file_write(const Compute *compute, Json *json, const char *key, cons
         else
             output_abandon(&output);
     }
-    message_list_print(&messages, stderr);
+    if (!is_written) compute_fail(compute, "capture", CL_SUCCESS, "%s", messages.items[0].text);
     message_list_free(&messages);
     if (json) json_text(json, key, name);
     free(path);

@@ -13,8 +13,8 @@ typedef struct {
 } Launch;
 
 // Writes a launch and the current contents of its buffers to the device's capture folder, if it has one. Each
-// file is named by a hash of its contents, so that launches share texts and buffers. Prints an error for a
-// file that cannot be written.
+// file is named by a hash of its contents, so that launches share texts and buffers. A file that cannot be
+// written is a failure of the Compute.
 void capture_launch(Compute *compute, const Launch *launch);
 
 // Records the value of an argument for the launches that follow.

@@ -101,11 +101,11 @@ void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped)
 static char *failure_text(const Compute *compute, const ComputeFailure *failure)
 {
     Text text = {0};
-    text_appendf(&text, "%s: ", failure->call);
-    if (failure->status == CL_SUCCESS)
-        text_appendf(&text, "NULL with CL_SUCCESS");
-    else
-        text_appendf(&text, "%s (%d)", cl_status_name(failure->status), failure->status);
+    text_appendf(&text, "%s", failure->call);
+    if (failure->status != CL_SUCCESS)
+        text_appendf(&text, ": %s (%d)", cl_status_name(failure->status), failure->status);
+    else if (!failure->detail)
+        text_appendf(&text, ": NULL with CL_SUCCESS");
     const Device *device = compute->device;
     text_appendf(&text, " on %s%s%s%s", device->name, device->pci[0] ? " at " : "", device->pci,
                  fault_limits());

@@ -11,8 +11,8 @@
 #include "host/opencl/device.h"
 
 typedef struct {
-    char call[40]; // the OpenCL function; empty: none failed
-    cl_int status; // CL_SUCCESS: the call returned NULL all the same
+    char call[40]; // the OpenCL function, or "capture"; empty: none failed
+    cl_int status; // CL_SUCCESS: the call returned NULL all the same, or a capture failed
     char *detail;  // what else is known, such as a build log; NULL: nothing
 } ComputeFailure;
 
