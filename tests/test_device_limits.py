@@ -31,6 +31,7 @@ WORKS = (
     # a passport's results alone need 4 MiB
     (f"memory={16 * MEBI},buffer={4 * MEBI}", f"{STRICT} --size 1920x{270 * SCALE} --aov {ALL_AOVS}"),
     (f"memory={32 * MEBI},buffer={8 * MEBI}", f"{STRICT} --size 1920x512 --work-group 1x256 --aov {ALL_AOVS}"),
+    (f"group=1,constant=16384,memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision certified --lanes 1 --samples 2"),
     ("buffers=8", f"{RENDER} --precision certified --lanes 1 --samples 2 --aov t,path,doubt"),
     # the watchdog: no launch grows more than fourfold
     ("first=4096", f"{STRICT} --size {960 * SCALE}x400 --aov {ALL_AOVS}"),

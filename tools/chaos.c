@@ -9,7 +9,6 @@
 //   full N    the same from call N on, if it writes or creates: ENOSPC
 //   short     reads and writes there do half of what they are asked for
 //   deny N    system call of number N, always: EPERM
-//   device    the device has work-groups of 1, 64 MiB of memory, 16 KiB of constant memory, and no images
 //   (else)    nothing
 //   child …   the same in the processes that this one starts, not in itself
 // GLINT_CHAOS_LOG is a file that receives "failed NAME" when something is made to fail, and the number of
@@ -103,30 +102,7 @@ typedef long (*ClFunction)(long, long, long, long, long, long, long, long, long,
 #define PARAMETERS long a, long b, long c, long d, long e, long f, long g, long h, long i, long j, long k
 #define ARGUMENTS  a, b, c, d, e, f, g, h, i, j, k
 
-enum { CL_OUT_OF_RESOURCES = -5, CL_MEM_OBJECT_ALLOCATION_FAILURE = -4, CL_INVALID_WORK_GROUP_SIZE = -54 };
-enum { MEBI = 1 << 20 };
-
-static const struct {
-    long what;
-    uint64_t value; // at most
-} device_limits[] = {
-    {0x1004, 1},         {0x1010, 16 * MEBI}, {0x1016, 0},        // work-group, allocation, images
-    {0x101F, 64 * MEBI}, {0x1020, 16 << 10},  {0x1023, 16 << 10}, // memory, constant and local memory
-};
-
-static void device_limit(long what, long size, void *value)
-{
-    if (what == 0x1005 && value) // CL_DEVICE_MAX_WORK_ITEM_SIZES
-        for (long side = 0; side < size / 8; side++)
-            ((uint64_t *)value)[side] = 1;
-    for (size_t n = 0; n < sizeof device_limits / sizeof *device_limits; n++) {
-        if (device_limits[n].what != what || !value) continue;
-        if (size == 8)
-            *(uint64_t *)value = device_limits[n].value;
-        else
-            *(uint32_t *)value = (uint32_t)device_limits[n].value;
-    }
-}
+enum { CL_OUT_OF_RESOURCES = -5 };
 
 // status at argument `place`, or -1 of a function that returns it
 static long cl_call(const char *name, long *status, bool is_release, ClFunction function, PARAMETERS)
@@ -159,11 +135,14 @@ static long cl_call(const char *name, long *status, bool is_release, ClFunction 
 STATUS(clGetPlatformIDs)
 STATUS(clGetPlatformInfo)
 STATUS(clGetDeviceIDs)
+STATUS(clGetDeviceInfo)
+STATUS(clGetKernelWorkGroupInfo)
 CREATE(clCreateContext, f)
 CREATE(clCreateCommandQueue, d)
 CREATE(clCreateProgramWithSource, e)
 CREATE(clCreateProgramWithBinary, g)
 CREATE(clCreateKernel, c)
+CREATE(clCreateBuffer, e)
 CREATE(clEnqueueMapBuffer, j)
 RELEASE(clReleaseContext)
 RELEASE(clReleaseCommandQueue)
@@ -178,69 +157,13 @@ STATUS(clGetProgramBuildInfo)
 STATUS(clGetProgramInfo)
 STATUS(clGetKernelInfo)
 STATUS(clSetKernelArg)
+STATUS(clEnqueueNDRangeKernel)
 STATUS(clEnqueueReadBuffer)
 STATUS(clEnqueueWriteBuffer)
 STATUS(clFinish)
 STATUS(clWaitForEvents)
 STATUS(clGetEventInfo)
 STATUS(clGetEventProfilingInfo)
-
-// Those below also keep to the limits of a small device.
-static long create_buffer(PARAMETERS)
-{
-    static ClFunction function;
-    if (!function) function = (ClFunction)real("clCreateBuffer");
-    if (!is_kind("device") || c <= 16 * MEBI) return function(ARGUMENTS);
-    *(int *)e = CL_MEM_OBJECT_ALLOCATION_FAILURE;
-    return 0;
-}
-
-long clCreateBuffer(PARAMETERS)
-{
-    return cl_call("clCreateBuffer", (long *)e, false, create_buffer, ARGUMENTS);
-}
-
-static long enqueue_kernel(PARAMETERS)
-{
-    static ClFunction function;
-    if (!function) function = (ClFunction)real("clEnqueueNDRangeKernel");
-    for (long side = 0; is_kind("device") && f && side < (unsigned)c; side++)
-        if (((size_t *)f)[side] > 1) return CL_INVALID_WORK_GROUP_SIZE;
-    return function(ARGUMENTS);
-}
-
-long clEnqueueNDRangeKernel(PARAMETERS)
-{
-    return cl_call("clEnqueueNDRangeKernel", NULL, false, enqueue_kernel, ARGUMENTS);
-}
-
-static long get_device_info(PARAMETERS)
-{
-    static ClFunction function;
-    if (!function) function = (ClFunction)real("clGetDeviceInfo");
-    long result = function(ARGUMENTS);
-    if (is_kind("device") && (int)result == 0) device_limit((unsigned)b, c, (void *)d);
-    return result;
-}
-
-long clGetDeviceInfo(PARAMETERS)
-{
-    return cl_call("clGetDeviceInfo", NULL, false, get_device_info, ARGUMENTS);
-}
-
-static long get_work_group_info(PARAMETERS)
-{
-    static ClFunction function;
-    if (!function) function = (ClFunction)real("clGetKernelWorkGroupInfo");
-    long result = function(ARGUMENTS);
-    if (is_kind("device") && (int)result == 0 && (unsigned)c == 0x11B0 && e) *(size_t *)e = 1;
-    return result;
-}
-
-long clGetKernelWorkGroupInfo(PARAMETERS)
-{
-    return cl_call("clGetKernelWorkGroupInfo", NULL, false, get_work_group_info, ARGUMENTS);
-}
 
 // ---- allocations, of the main program alone
 
