@@ -297,6 +297,16 @@ class Documents(unittest.TestCase):
             tool.print_table(measured("ulp-ladder")["rungs"], measured("ulp-ladder")["tests"])
         self.assertIn(table.getvalue().strip(), read(ROOT / "docs/measurements/README.md"))
 
+    def test_shims(self):
+        """The table of limits and violations has all that the tests' shims know."""
+        table = read(ROOT / "docs/measurements/README.md").partition("### Limits and violations")[2].lower()
+        limits = re.findall(r"^//   ([a-z][\w, -]*?)(?:=N)?  ", read(ROOT / "tests/shims/limits.c"), re.M)
+        violations = re.findall(r'^    "([\w, -]+)": \(', read(ROOT / "tests/test_passport.py"), re.M)
+        self.assertGreater(min(len(limits), len(violations)), 14)
+        for name in (*", ".join(limits).split(", "), *violations):
+            with self.subTest(name):
+                self.assertRegex(table, rf"[`| ]{name.lower()}\b")
+
     def test_links(self):
         """Links of the documents lead to files and headings, and files that sources and tools name are there."""
         def anchors(page):
