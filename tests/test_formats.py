@@ -4,9 +4,14 @@ Sanitizers see the same writers in test_json.
 
 run_tests: sanitize-long-only"""
 import csv
+import importlib.util
 import io
 import json
+import os
 import pathlib
+import re
+import subprocess
+import sys
 import unittest
 import xml.etree.ElementTree as ElementTree
 
@@ -130,8 +135,18 @@ class Formats(TestCase):
             entries = [entry for entry in report["benchmarks"] if entry["name"] == name]
             self.assertEqual([entry["repetition_index"] for entry in entries], list(range(entries[0]["repetitions"])))
             for entry in entries:
-                self.assertEqual((entry["run_type"], entry["time_unit"], entry["run_name"]), ("iteration", "ms", name))
-                self.assertGreater(entry["real_time"], 0)
+                self.assertEqual((entry["run_type"], entry["time_unit"], entry["run_name"]), ("iteration", "us", name))
+                self.assertGreater(entry["real_time"], 1)
+
+    def test_benchmark_compare(self):
+        """google/benchmark's compare.py, of Debian's libbenchmark-tools, compares two runs."""
+        compare = "/usr/share/benchmark/compare.py"
+        if not os.path.exists(compare) or not importlib.util.find_spec("scipy"):
+            self.skipTest("libbenchmark-tools or python3-scipy is not installed")
+        for name in "a.json", "b.json":
+            self.glint(f"{COMMANDS['bench'][0]} --format benchmark --output {name}")
+        out = subprocess.run([sys.executable, compare, "--no-color", "benchmarks", "a.json", "b.json"], check=True, capture_output=True, text=True).stdout
+        self.assertEqual(len(re.findall(r"^s\.yaml/.*_pvalue .* U Test", out, re.M)), 2)
 
     def test_output(self):
         """The text stays on standard output; the file's ending gives the format; nothing is written by a wrong call."""

@@ -282,7 +282,7 @@ static void junit_row(Writing *writing, const Row *row)
 }
 
 // Writes one entry per run, as google/benchmark does with repetitions, so that its tools compare
-// distributions.
+// distributions. The times are milliseconds; its compare.py prints no decimals, hence microseconds.
 static void benchmark_row(Writing *writing, const Row *row)
 {
     Text name = {0};
@@ -294,11 +294,11 @@ static void benchmark_row(Writing *writing, const Row *row)
     for (size_t i = 0; i < count; i++) {
         const double time = json_number_value(json_is_number(times) ? times : json_array_get(times, i));
         const json_t *of_processor = json_array_get(processor, i);
-        json_t *entry =
-            json_pack("{s:s, s:s, s:s, s:I, s:i, s:i, s:i, s:f, s:f, s:s}", "name", text_c(&name), "run_name",
-                      text_c(&name), "run_type", "iteration", "repetitions", (json_int_t)count,
-                      "repetition_index", (int)i, "threads", 1, "iterations", 1, "real_time", time,
-                      "cpu_time", of_processor ? json_number_value(of_processor) : time, "time_unit", "ms");
+        json_t *entry = json_pack(
+            "{s:s, s:s, s:s, s:I, s:i, s:i, s:i, s:f, s:f, s:s}", "name", text_c(&name), "run_name",
+            text_c(&name), "run_type", "iteration", "repetitions", (json_int_t)count, "repetition_index",
+            (int)i, "threads", 1, "iterations", 1, "real_time", 1e3 * time, "cpu_time",
+            1e3 * (of_processor ? json_number_value(of_processor) : time), "time_unit", "us");
         char *dumped = entry ? json_dumps(entry, JSON_COMPACT) : NULL;
         if (!dumped) fault("out of memory: JSON");
         text_appendf(&writing->body, "%s    %s", writing->row_count++ > 0 ? ",\n" : "", dumped);
