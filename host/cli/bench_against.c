@@ -45,7 +45,7 @@ typedef struct {
     const char *program;
     pid_t process;
     FILE *requests, *replies, *errors;
-} Worker;
+} MeasuredProgram;
 
 typedef struct {
     const AgainstOptions *options;
@@ -60,7 +60,7 @@ static const char not_available[] = "not available on this device";
 
 // Ends the worker. Returns its exit status. If that is not 0, prints the worker's messages, unless the user
 // interrupted, since every process received the interrupt.
-static int worker_close(Worker *worker)
+static int worker_close(MeasuredProgram *worker)
 {
     if (worker->requests) fclose(worker->requests);
     if (worker->replies) fclose(worker->replies);
@@ -79,11 +79,12 @@ static int worker_close(Worker *worker)
             fputs(line, stderr);
         fclose(worker->errors);
     }
-    *worker = (Worker){0};
+    *worker = (MeasuredProgram){0};
     return status;
 }
 
-static bool worker_spawn(Worker *worker, const AgainstOptions *options, const int *to, const int *from)
+static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options, const int *to,
+                         const int *from)
 {
     // --worker comes first, since an argument "--" ends the options
     char **arguments = memory_allocate_zeroed((size_t)options->argument_count + 3, sizeof *arguments);
@@ -113,7 +114,7 @@ static bool worker_spawn(Worker *worker, const AgainstOptions *options, const in
 
 // Returns whether the user interrupted. Every process receives the signal: the worker may have ended by it
 // before this one has noticed.
-static bool is_interrupted(const Worker *worker)
+static bool is_interrupted(const MeasuredProgram *worker)
 {
     siginfo_t ended = {0};
     if (progress_interrupted()) return true;
@@ -122,7 +123,7 @@ static bool is_interrupted(const Worker *worker)
     return ended.si_code == CLD_EXITED ? ended.si_status == EXIT_INTERRUPTED : ended.si_status == SIGINT;
 }
 
-static bool worker_greets(Worker *worker, size_t row_count)
+static bool worker_greets(MeasuredProgram *worker, size_t row_count)
 {
     char line[80], expected[80];
     snprintf(expected, sizeof expected, greeting, row_count);
@@ -134,9 +135,9 @@ static bool worker_greets(Worker *worker, size_t row_count)
 }
 
 // Starts a worker and waits until it is warm.
-static bool worker_open(Worker *worker, const char *program, const Against *against)
+static bool worker_open(MeasuredProgram *worker, const char *program, const Against *against)
 {
-    *worker = (Worker){.program = program, .errors = tmpfile()};
+    *worker = (MeasuredProgram){.program = program, .errors = tmpfile()};
     int to[2] = {-1, -1}, from[2] = {-1, -1};
     bool ready = worker->errors && pipe2(to, O_CLOEXEC) == 0 && pipe2(from, O_CLOEXEC) == 0;
     if (!ready) fprintf(stderr, "glint bench: cannot run '%s': %s\n", program, strerror(errno));
@@ -166,7 +167,7 @@ static bool reply_read(FILE *replies, double *seconds, size_t row_count)
 }
 
 // Runs every row once; `seconds` receives the frames' times.
-static bool worker_run(Worker *worker, double *seconds, size_t row_count)
+static bool worker_run(MeasuredProgram *worker, double *seconds, size_t row_count)
 {
     fputc('\n', worker->requests);
     fflush(worker->requests);
@@ -187,7 +188,7 @@ enum { PAIR_ROUNDS_MIN = 5 };
 static const double pair_seconds = 0.25; // the time per row
 
 // Alternates rounds of the two warm workers and adds each row's ratio.
-static bool pair_measure(Against *against, Worker *workers, size_t pair)
+static bool pair_measure(Against *against, MeasuredProgram *workers, size_t pair)
 {
     const size_t row_count = against->set->count;
     double *seconds = memory_allocate(row_count, sizeof *seconds);
@@ -221,7 +222,7 @@ static bool pair_measure(Against *against, Worker *workers, size_t pair)
 // Measures with a new pair of processes. Returns the exit status.
 static int pair_run(Against *against, size_t pair)
 {
-    Worker workers[2] = {{0}};
+    MeasuredProgram workers[2] = {{0}};
     bool whole = true;
     for (size_t turn = 0; turn < 2 && whole; turn++) {
         size_t which = (turn + other_is_first(pair)) % 2;

@@ -90,7 +90,7 @@ static const struct {
 
 typedef struct {
     Text cells[COLUMN_COUNT];
-} Row;
+} DeviceRow;
 
 static void size_append(Text *text, uint64_t bytes)
 {
@@ -103,7 +103,7 @@ static void size_append(Text *text, uint64_t bytes)
         text_appendf(text, "%.1f GiB", mebi / 1024);
 }
 
-static void row_fill(Row *row, const Device *device, bool is_chosen)
+static void row_fill(DeviceRow *row, const Device *device, bool is_chosen)
 {
     Text *cell = row->cells;
     const char *why;
@@ -125,7 +125,7 @@ static void row_fill(Row *row, const Device *device, bool is_chosen)
     if (!device_usable(device, &why)) text_appendf(cell, "; unusable: %s", why);
 }
 
-static void rows_print(const Row *rows, size_t row_count)
+static void rows_print(const DeviceRow *rows, size_t row_count)
 {
     for (size_t i = 0; i < row_count; i++) {
         for (size_t j = 0; j < COLUMN_COUNT; j++) {
@@ -145,7 +145,7 @@ static void rows_print(const Row *rows, size_t row_count)
 static void devices_print_table(const DeviceList *list, const Device *chosen)
 {
     size_t row_count = list->count + 1;
-    Row *rows = memory_allocate_zeroed(row_count, sizeof *rows);
+    DeviceRow *rows = memory_allocate_zeroed(row_count, sizeof *rows);
     for (size_t j = 0; j < COLUMN_COUNT; j++)
         text_appendf(&rows[0].cells[j], "%s", columns[j].head);
     for (size_t i = 0; i < list->count; i++)

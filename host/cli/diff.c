@@ -62,17 +62,17 @@ typedef struct {
 typedef struct {
     Image reference, test;
     ImageMetrics metrics;
-} Comparison;
+} ComparedImages;
 
 // Returns a channel's value at the worst pixel.
-static double worst_value(const Comparison *comparison, const Image *image, uint32_t channel)
+static double worst_value(const ComparedImages *comparison, const Image *image, uint32_t channel)
 {
     const ImageMetrics *metrics = &comparison->metrics;
     size_t pixel = (size_t)metrics->worst_y * image->width + metrics->worst_x;
     return image_value(image, pixel * image->channels + channel);
 }
 
-static void worst_json(Json *json, const char *key, const Comparison *comparison, const Image *image)
+static void worst_json(Json *json, const char *key, const ComparedImages *comparison, const Image *image)
 {
     json_begin_array(json, key);
     for (uint32_t i = 0; i < image->channels; i++)
@@ -167,7 +167,7 @@ static const ResultTable diff_table = {
     .failed = "false",
 };
 
-static Json *diff_json(const DiffOptions *options, const Comparison *comparison)
+static Json *diff_json(const DiffOptions *options, const ComparedImages *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
     const Image *reference = &comparison->reference;
@@ -225,13 +225,13 @@ static Json *diff_json(const DiffOptions *options, const Comparison *comparison)
 }
 
 // Prints the worst pixel with the digits that distinguish any two values of the file.
-static void worst_print(const Comparison *comparison, const Image *image)
+static void worst_print(const ComparedImages *comparison, const Image *image)
 {
     for (uint32_t i = 0; i < image->channels; i++)
         printf(" %.*g", image->doubles ? 17 : 9, worst_value(comparison, image, i));
 }
 
-static void differences_print(const DiffOptions *options, const Comparison *comparison)
+static void differences_print(const DiffOptions *options, const ComparedImages *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
     const ErrorSummary *linear = &metrics->linear;
@@ -257,7 +257,7 @@ static void differences_print(const DiffOptions *options, const Comparison *comp
                options->heatmap_path, linear->largest, linear->largest * pow(10, -HEATMAP_DECADES));
 }
 
-static void text_print(const DiffOptions *options, const Comparison *comparison)
+static void text_print(const DiffOptions *options, const ComparedImages *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
     const Image *reference = &comparison->reference;
@@ -276,7 +276,7 @@ static void text_print(const DiffOptions *options, const Comparison *comparison)
     limits_print(options, metrics);
 }
 
-static bool heatmap_make(const DiffOptions *options, const Comparison *comparison, MessageList *messages)
+static bool heatmap_make(const DiffOptions *options, const ComparedImages *comparison, MessageList *messages)
 {
     const Image *reference = &comparison->reference;
     float *errors = memory_allocate((size_t)reference->width * reference->height, sizeof *errors);
@@ -294,7 +294,7 @@ static bool side_read(Image *image, const DiffOptions *options, const char *path
     return image_read_layer(image, path, has_layers ? options->layer : NULL, messages);
 }
 
-static bool images_compare(const DiffOptions *options, Comparison *comparison, MessageList *messages)
+static bool images_compare(const DiffOptions *options, ComparedImages *comparison, MessageList *messages)
 {
     if (!side_read(&comparison->reference, options, options->reference_path, messages) ||
         !side_read(&comparison->test, options, options->test_path, messages) ||
@@ -361,7 +361,7 @@ int command_diff(int argument_count, char **arguments)
     if (options.heatmap_path && image_format_of(options.heatmap_path) == IMAGE_UNKNOWN)
         return option_usage_fault("diff", "the heat map must end in .png, .ppm, .exr or .npy");
 
-    Comparison comparison = {0};
+    ComparedImages comparison = {0};
     MessageList messages = {0};
     bool compared = images_compare(&options, &comparison, &messages);
     messages_print(&messages, NULL);

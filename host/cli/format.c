@@ -68,7 +68,7 @@ bool report_options_check(ReportOptions *options, const ResultTable *table)
 // A row with the objects that its columns may come from.
 typedef struct {
     const json_t *sources[3]; // the row, the object around it, the document
-} Row;
+} ReportRow;
 
 static const json_t *member_at(const json_t *object, const char *path)
 {
@@ -80,7 +80,7 @@ static const json_t *member_at(const json_t *object, const char *path)
     return json_object_get(object, path);
 }
 
-static const json_t *value_at(const Row *row, const char *path)
+static const json_t *value_at(const ReportRow *row, const char *path)
 {
     const json_t *value = NULL;
     for (size_t i = 0; i < 3 && !value; i++)
@@ -120,7 +120,7 @@ static void value_append(Text *text, const json_t *value)
     }
 }
 
-static Text column_text(const Row *row, const ResultColumn *column)
+static Text column_text(const ReportRow *row, const ResultColumn *column)
 {
     Text text = {0};
     value_append(&text, value_at(row, column->path));
@@ -137,7 +137,7 @@ static size_t column_count(const ResultTable *table)
 
 // Appends the row's name, which is its first columns, of those that have a value, with `between` between
 // them.
-static void name_append(Text *text, const Row *row, const ResultTable *table, const char *between)
+static void name_append(Text *text, const ReportRow *row, const ResultTable *table, const char *between)
 {
     for (size_t i = 0; i < table->name_count; i++) {
         Text value = column_text(row, &table->columns[i]);
@@ -148,7 +148,7 @@ static void name_append(Text *text, const Row *row, const ResultTable *table, co
 
 typedef enum { ROW_PASSED, ROW_FAILED, ROW_UNAVAILABLE } RowOutcome;
 
-static RowOutcome row_outcome(const Row *row, const ResultTable *table)
+static RowOutcome row_outcome(const ReportRow *row, const ResultTable *table)
 {
     const json_t *status = json_object_get(row->sources[0], "status");
     if (json_is_string(status) && strcmp(json_string_value(status), "unavailable") == 0)
@@ -213,9 +213,9 @@ typedef struct {
     size_t row_count;
 } Writing;
 
-typedef void RowWriter(Writing *writing, const Row *row);
+typedef void RowWriter(Writing *writing, const ReportRow *row);
 
-static void csv_row(Writing *writing, const Row *row)
+static void csv_row(Writing *writing, const ReportRow *row)
 {
     for (size_t i = 0; i < column_count(writing->table); i++) {
         Text value = column_text(row, &writing->table->columns[i]);
@@ -229,7 +229,7 @@ static void csv_row(Writing *writing, const Row *row)
     text_appendf(&writing->body, "\n");
 }
 
-static void markdown_row(Writing *writing, const Row *row)
+static void markdown_row(Writing *writing, const ReportRow *row)
 {
     for (size_t i = 0; i < column_count(writing->table); i++) {
         const json_t *member = value_at(row, writing->table->columns[i].path);
@@ -247,7 +247,7 @@ static void markdown_row(Writing *writing, const Row *row)
 }
 
 // Appends the values that are not in the row's name, for readers of a failure.
-static void details_append(Text *text, const Row *row, const ResultTable *table)
+static void details_append(Text *text, const ReportRow *row, const ResultTable *table)
 {
     const size_t start = text->count;
     for (size_t i = table->name_count; i < column_count(table); i++) {
@@ -259,7 +259,7 @@ static void details_append(Text *text, const Row *row, const ResultTable *table)
     }
 }
 
-static void junit_row(Writing *writing, const Row *row)
+static void junit_row(Writing *writing, const ReportRow *row)
 {
     Text name = {0}, details = {0}, *body = &writing->body;
     name_append(&name, row, writing->table, " ");
@@ -283,7 +283,7 @@ static void junit_row(Writing *writing, const Row *row)
 
 // Writes one entry per run, as google/benchmark does with repetitions, so that its tools compare
 // distributions. The times are milliseconds; its compare.py prints no decimals, hence microseconds.
-static void benchmark_row(Writing *writing, const Row *row)
+static void benchmark_row(Writing *writing, const ReportRow *row)
 {
     Text name = {0};
     name_append(&name, row, writing->table, "/");
@@ -313,7 +313,7 @@ static void rows_write(Writing *writing, RowWriter *write)
     const char *path = writing->table->rows, *dot = strchr(path, '.');
     const json_t *document = writing->document;
     if (*path == '\0') {
-        write(writing, &(Row){{document, NULL, NULL}});
+        write(writing, &(ReportRow){{document, NULL, NULL}});
         return;
     }
     char name[64];
@@ -321,9 +321,9 @@ static void rows_write(Writing *writing, RowWriter *write)
     const json_t *outer = json_object_get(document, name);
     for (size_t i = 0; i < json_array_size(outer); i++) {
         const json_t *item = json_array_get(outer, i), *inner = dot ? json_object_get(item, dot + 1) : NULL;
-        if (!dot) write(writing, &(Row){{item, NULL, document}});
+        if (!dot) write(writing, &(ReportRow){{item, NULL, document}});
         for (size_t k = 0; k < json_array_size(inner); k++)
-            write(writing, &(Row){{json_array_get(inner, k), item, document}});
+            write(writing, &(ReportRow){{json_array_get(inner, k), item, document}});
     }
 }
 

@@ -37,11 +37,11 @@ typedef struct {
 typedef struct {
     size_t begin, end;
     RangeBounds bounds;
-} Range;
+} PrimitiveRange;
 
-static BvhChild range_build(Builder *builder, const Range *range, unsigned depth);
+static BvhChild range_build(Builder *builder, const PrimitiveRange *range, unsigned depth);
 
-static void range_sort_by_kind(const Builder *builder, const Range *range)
+static void range_sort_by_kind(const Builder *builder, const PrimitiveRange *range)
 {
     PrimitiveReference *references = builder->references;
     for (size_t i = range->begin + 1; i < range->end; i++) {
@@ -55,7 +55,7 @@ static void range_sort_by_kind(const Builder *builder, const Range *range)
 }
 
 // The first primitive of another kind than the first; `end` where there is but one kind.
-static size_t range_kind_boundary(const Builder *builder, const Range *range)
+static size_t range_kind_boundary(const Builder *builder, const PrimitiveRange *range)
 {
     const PrimitiveReference *references = builder->references;
     const uint8_t kind = reference_kind(&references[range->begin]);
@@ -66,7 +66,8 @@ static size_t range_kind_boundary(const Builder *builder, const Range *range)
 }
 
 // Sets both sides. False where the range is to be a leaf.
-static bool range_divide(const Builder *builder, const Range *range, unsigned depth, Range sides[2])
+static bool range_divide(const Builder *builder, const PrimitiveRange *range, unsigned depth,
+                         PrimitiveRange sides[2])
 {
     PrimitiveReference *references = builder->references + range->begin;
     const size_t count = range->end - range->begin;
@@ -84,14 +85,14 @@ static bool range_divide(const Builder *builder, const Range *range, unsigned de
         bounds[0] = range_bounds_of(references, left);
         bounds[1] = range_bounds_of(references + left, count - left);
     }
-    sides[0] = (Range){range->begin, range->begin + left, bounds[0]};
-    sides[1] = (Range){range->begin + left, range->end, bounds[1]};
+    sides[0] = (PrimitiveRange){range->begin, range->begin + left, bounds[0]};
+    sides[1] = (PrimitiveRange){range->begin + left, range->end, bounds[1]};
     return true;
 }
 
 typedef struct {
     Builder *builder;
-    const Range *range;
+    const PrimitiveRange *range;
     unsigned depth;
     BvhChild *child;
 } RangeTask;
@@ -105,7 +106,7 @@ static void *range_task_run(void *context)
 }
 
 // Builds both sides of a node, in two threads where one is idle and the range is worth it.
-static void sides_build(Builder *builder, const Range sides[2], unsigned depth, BvhBinaryNode *node)
+static void sides_build(Builder *builder, const PrimitiveRange sides[2], unsigned depth, BvhBinaryNode *node)
 {
     const bool large = sides[1].end - sides[0].begin >= THREAD_RANGE_MIN;
     if (large && atomic_fetch_sub(&builder->idle_threads, 1) > 0) {
@@ -129,7 +130,7 @@ static void depth_note(Builder *builder, unsigned depth)
     }
 }
 
-static BvhChild leaf_make(const Builder *builder, const Range *range)
+static BvhChild leaf_make(const Builder *builder, const PrimitiveRange *range)
 {
     BvhChild leaf = {bounds_empty(), (uint32_t)range->begin, (uint32_t)(range->end - range->begin)};
     for (size_t i = range->begin; i < range->end; i++)
@@ -139,7 +140,7 @@ static BvhChild leaf_make(const Builder *builder, const Range *range)
 }
 
 // Prefetches the boxes of a range whose leaves come soon: they may be anywhere.
-static void boxes_prefetch(const Builder *builder, const Range *range)
+static void boxes_prefetch(const Builder *builder, const PrimitiveRange *range)
 {
     if (range->end - range->begin > builder->leaves.size_max) return;
     for (size_t i = range->begin; i < range->end; i++)
@@ -147,10 +148,10 @@ static void boxes_prefetch(const Builder *builder, const Range *range)
 }
 
 // Boxes from the primitives up, in double.
-static BvhChild range_build(Builder *builder, const Range *range, unsigned depth)
+static BvhChild range_build(Builder *builder, const PrimitiveRange *range, unsigned depth)
 {
     boxes_prefetch(builder, range);
-    Range sides[2];
+    PrimitiveRange sides[2];
     if (!range_divide(builder, range, depth, sides)) return leaf_make(builder, range);
     const size_t index = atomic_fetch_add(&builder->node_count, 1);
     depth_note(builder, depth + 1);
@@ -183,7 +184,7 @@ static void references_make(void *context, size_t begin, size_t end)
 // The root is node 0; a single leaf is its only child.
 static void root_build(Builder *builder)
 {
-    const Range all = {0, builder->count, builder->bounds};
+    const PrimitiveRange all = {0, builder->count, builder->bounds};
     const BvhChild none = {bounds_empty(), 0, 0};
     const BvhChild root = builder->count > 0 ? range_build(builder, &all, 0) : none;
     if (builder->node_count > 0) return;

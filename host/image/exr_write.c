@@ -17,7 +17,7 @@ typedef struct {
     size_t channel_count;
     bool is_integer;
     void *block; // rows of the incomplete block
-} ExrLayer;
+} WrittenLayer;
 
 // A channel of the file and the place of its values: the number of the layer and of the value in each pixel.
 typedef struct {
@@ -32,7 +32,7 @@ typedef struct {
     exr_encode_pipeline_t pipeline;
     bool has_pipeline;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
-    ExrLayer layers[1 + IMAGE_LAYERS_MAX];
+    WrittenLayer layers[1 + IMAGE_LAYERS_MAX];
     size_t layer_count;
     ExrChannel *channels; // of all layers, by name, as in the file
     size_t channel_count;
@@ -71,10 +71,10 @@ static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList
 
 static void layer_add(ExrWriter *state, const ImageLayer *layer)
 {
-    ExrLayer *added = &state->layers[state->layer_count++];
-    *added = (ExrLayer){.channels = memory_copy_text(layer->channels),
-                        .channel_count = layer->channel_count,
-                        .is_integer = layer->type == 'u'};
+    WrittenLayer *added = &state->layers[state->layer_count++];
+    *added = (WrittenLayer){.channels = memory_copy_text(layer->channels),
+                            .channel_count = layer->channel_count,
+                            .is_integer = layer->type == 'u'};
     for (char *at = added->channels; (at = strchr(at, ','));)
         *at++ = '\0';
 }
@@ -184,7 +184,7 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
 static void channel_place(const ExrWriter *state, int index, uint32_t width)
 {
     const ExrChannel *from = &state->channels[index];
-    const ExrLayer *layer = &state->layers[from->layer];
+    const WrittenLayer *layer = &state->layers[from->layer];
     exr_coding_channel_info_t *channel = &state->pipeline.channels[index];
     const size_t pixel_bytes = layer->channel_count * VALUE_BYTES;
     channel->encode_from_ptr = (const uint8_t *)layer->block + from->value * VALUE_BYTES;

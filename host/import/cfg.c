@@ -24,9 +24,9 @@ typedef struct {
     size_t offset; // in BlockValues
     bool is_vector;
     const Range *range;
-} Key;
+} BlockKey;
 
-static const Key keys[] = {
+static const BlockKey keys[] = {
     {"position", offsetof(BlockValues, position), true, NULL},
     {"look_at", offsetof(BlockValues, look_at), true, NULL},
     {"center", offsetof(BlockValues, center), true, NULL},
@@ -124,7 +124,7 @@ static const Block blocks[] = {
     {"cone", BLOCK_OBJECT, {"angle", "center", "normal", OBJECT_KEYS}, cone_finish},
 };
 
-static const Key *key_find(const Block *block, Word word)
+static const BlockKey *key_find(const Block *block, Word word)
 {
     bool belongs = false;
     for (size_t i = 0; i < BLOCK_KEYS_MAX && block->keys[i]; i++)
@@ -143,7 +143,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
         report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
         return true;
     }
-    const Key *key = key_find(block, word);
+    const BlockKey *key = key_find(block, word);
     if (!key)
         return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
                             word_shown(word), word.text);

@@ -24,7 +24,7 @@ enum { REPORT_BLOCKS = 20 };
 
 typedef struct {
     double low, high;
-} Interval;
+} RatioInterval;
 
 // Returns the probability that `heads` of `count` fair coins show heads. Uses logarithms, since 2^-count may
 // underflow.
@@ -35,7 +35,7 @@ static double heads_probability(size_t count, size_t heads)
 }
 
 // Returns an interval that misses the median with a probability of at most `error`.
-static Interval median_interval(const Series *values, double error)
+static RatioInterval median_interval(const Series *values, double error)
 {
     const size_t count = values->count;
     size_t end = 0; // the number of values at either end of the sorted ones beyond which the median may lie
@@ -43,14 +43,14 @@ static Interval median_interval(const Series *values, double error)
         missed += 2 * heads_probability(count, end);
         if (missed > error) break;
     }
-    if (end == 0) return (Interval){-INFINITY, INFINITY};
+    if (end == 0) return (RatioInterval){-INFINITY, INFINITY};
     Series sorted = series_sorted(values);
-    Interval interval = {sorted.items[end - 1], sorted.items[count - end]};
+    RatioInterval interval = {sorted.items[end - 1], sorted.items[count - end]};
     series_free(&sorted);
     return interval;
 }
 
-static Comparison comparison_judge(double log_ratio, Interval interval, double tolerance)
+static Comparison comparison_judge(double log_ratio, RatioInterval interval, double tolerance)
 {
     Comparison comparison = {.ratio = exp(log_ratio), .low = exp(interval.low), .high = exp(interval.high)};
     if (comparison.low >= 1 / tolerance && comparison.high <= tolerance)
@@ -113,9 +113,9 @@ static Series ratio_blocks(const Series *seconds, const Series *divisors, double
     return blocks;
 }
 
-static Interval interval_widen(Interval interval)
+static RatioInterval interval_widen(RatioInterval interval)
 {
-    return (Interval){interval.low - log(process_allowance), interval.high + log(process_allowance)};
+    return (RatioInterval){interval.low - log(process_allowance), interval.high + log(process_allowance)};
 }
 
 Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_seconds, size_t comparison_count,
@@ -124,7 +124,7 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
     const size_t blocks_max = REPORT_BLOCKS;
     Series blocks = ratio_blocks(new_seconds, old_seconds, 1,
                                  new_seconds->count < blocks_max ? new_seconds->count : blocks_max);
-    const Interval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
+    const RatioInterval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
     const double log_ratio = series_summarize(&blocks).median;
     series_free(&blocks);
     return comparison_judge(log_ratio, interval, tolerance);
@@ -133,15 +133,15 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance)
 {
-    Interval covering = {INFINITY, -INFINITY};
+    RatioInterval covering = {INFINITY, -INFINITY};
     double log_ratio = 0;
     for (int i = 0; i < 2; i++) {
         const double exponent = i * exponent_max;
         Series new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent, REPORT_BLOCKS),
                old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent, REPORT_BLOCKS);
         // one of the exponents between is right, and the error is shared by two medians
-        Interval new_median = median_interval(&new_blocks, row_error(row_count) / 2),
-                 old_median = median_interval(&old_blocks, row_error(row_count) / 2);
+        RatioInterval new_median = median_interval(&new_blocks, row_error(row_count) / 2),
+                      old_median = median_interval(&old_blocks, row_error(row_count) / 2);
         covering.low = fmin(covering.low, new_median.low - old_median.high);
         covering.high = fmax(covering.high, new_median.high - old_median.low);
         log_ratio += (series_summarize(&new_blocks).median - series_summarize(&old_blocks).median) / 2;

@@ -52,9 +52,9 @@ typedef struct {
     Renderer *renderer; // NULL: it cannot render, see `messages` or the device's failure
     MessageList messages;
     Rank own;
-} Worker;
+} RankRenderer;
 
-static void device_close_quietly(Worker *worker)
+static void device_close_quietly(RankRenderer *worker)
 {
     renderer_close(worker->renderer);
     worker->renderer = NULL;
@@ -63,7 +63,7 @@ static void device_close_quietly(Worker *worker)
 }
 
 // Prepares for another image; a device that failed is reopened.
-static void worker_begin(Worker *worker, const Job *job, const char *selector)
+static void worker_begin(RankRenderer *worker, const Job *job, const char *selector)
 {
     Rank *own = &worker->own;
     *own = (Rank){0};
@@ -83,7 +83,7 @@ static void worker_begin(Worker *worker, const Job *job, const char *selector)
 }
 
 // All ranks of a variant receive its scene, also those that can render no longer.
-static void scene_receive(Worker *worker, SceneVariant variant)
+static void scene_receive(RankRenderer *worker, SceneVariant variant)
 {
     CompiledScene compiled;
     const bool takes = worker->own.lanes[variant.pass] == variant.lanes;
@@ -99,7 +99,7 @@ static void scene_receive(Worker *worker, SceneVariant variant)
 
 // Renders until the first rank has no more rows, and says why the device could not. It also waits for the
 // message that ends this job, which would end the next one if it came late.
-static void worker_render(Worker *worker, unsigned aovs)
+static void worker_render(RankRenderer *worker, unsigned aovs)
 {
     char failure[sizeof worker->own.failure] = "";
     bool end_received = false;
@@ -118,7 +118,7 @@ static void worker_render(Worker *worker, unsigned aovs)
     if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
 }
 
-static void job_run(Worker *worker, const Job *job)
+static void job_run(RankRenderer *worker, const Job *job)
 {
     Order order;
     char *selector = memory_allocate_zeroed(job->selector_size + 1, 1);
@@ -144,7 +144,7 @@ static void signals_ignore(void)
 void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments)
 {
     signals_ignore();
-    Worker worker = {.rank = rank, .local_rank = local_rank};
+    RankRenderer worker = {.rank = rank, .local_rank = local_rank};
     Job job;
     while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.kind != JOB_END) {
         if (job.kind == JOB_FRAMES)

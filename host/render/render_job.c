@@ -12,29 +12,29 @@ typedef struct {
     size_t number;
     pthread_t thread;
     bool has_thread;
-} Worker;
+} DeviceWorker;
 
 static BandRows worker_take(void *context, uint32_t rows_max, uint32_t step)
 {
-    const Worker *worker = context;
+    const DeviceWorker *worker = context;
     return scheduler_take(worker->scheduler, worker->number, rows_max, step);
 }
 
 static bool worker_give(void *context, const Film *band)
 {
-    const Worker *worker = context;
+    const DeviceWorker *worker = context;
     return scheduler_give(worker->scheduler, worker->number, band);
 }
 
 static bool worker_has_ended(void *context)
 {
-    return scheduler_has_ended(((const Worker *)context)->scheduler);
+    return scheduler_has_ended(((const DeviceWorker *)context)->scheduler);
 }
 
 // Renders the queue's rows on a device. Drops a device that failed.
 static void *worker_run(void *argument)
 {
-    Worker *worker = argument;
+    DeviceWorker *worker = argument;
     const BandQueue queue = {
         .take = worker_take, .give = worker_give, .has_ended = worker_has_ended, .context = worker};
     bool is_done = renderer_work(worker->renderer, worker->aovs, &queue);
@@ -46,7 +46,7 @@ static void *worker_run(void *argument)
 }
 
 // Starts the worker's thread. If that fails, the device counts as failed.
-static void thread_start(Worker *worker)
+static void thread_start(DeviceWorker *worker)
 {
     int error = pthread_create(&worker->thread, NULL, worker_run, worker);
     worker->has_thread = error == 0;
@@ -75,11 +75,11 @@ bool render_job_run(const RenderJob *job)
                                         .context = job->context,
                                         .checkpoint = job->checkpoint};
     Scheduler *scheduler = scheduler_open(&settings);
-    Worker *workers = memory_allocate_zeroed(count, sizeof *workers);
+    DeviceWorker *workers = memory_allocate_zeroed(count, sizeof *workers);
     const size_t first_thread = remote ? 0 : 1; // one works in the caller's thread
     for (size_t i = 0; i < count; i++)
-        workers[i] =
-            (Worker){.renderer = job->renderers[i], .aovs = job->aovs, .scheduler = scheduler, .number = i};
+        workers[i] = (DeviceWorker){
+            .renderer = job->renderers[i], .aovs = job->aovs, .scheduler = scheduler, .number = i};
     for (size_t i = first_thread; i < count; i++)
         thread_start(&workers[i]);
     if (remote)

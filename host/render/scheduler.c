@@ -23,7 +23,7 @@ typedef struct {
     double rows_per_second; // in the last band; 0 if unknown
     bool is_dropped;
     WorkerShare share;
-} Worker;
+} WorkerState;
 
 struct Scheduler {
     SchedulerSettings settings;
@@ -32,7 +32,7 @@ struct Scheduler {
     double start_seconds;
     uint32_t delivered_rows; // to the sink
     bool is_delivering, has_ended;
-    Worker *workers;
+    WorkerState *workers;
     struct {
         BandRows *items; // neither taken nor rendered, from the top
         size_t count, capacity;
@@ -70,7 +70,7 @@ static double share_of(const Scheduler *scheduler, size_t worker)
     double sum = 0;
     size_t known = 0, active = 0;
     for (size_t i = 0; i < scheduler->settings.worker_count; i++) {
-        const Worker *other = &scheduler->workers[i];
+        const WorkerState *other = &scheduler->workers[i];
         if (other->is_dropped) continue;
         active++;
         known += other->rows_per_second > 0;
@@ -111,7 +111,7 @@ static double others_seconds(const Scheduler *scheduler, size_t worker)
 {
     double least = INFINITY;
     for (size_t i = 0; i < scheduler->settings.worker_count; i++) {
-        const Worker *other = &scheduler->workers[i];
+        const WorkerState *other = &scheduler->workers[i];
         if (i == worker || other->is_dropped || other->rows_per_second <= 0) continue;
         const uint32_t rows = other->rows.row_count + rows_free(scheduler);
         least = fmin(least, rows / other->rows_per_second);
@@ -304,7 +304,7 @@ static void band_keep(Scheduler *scheduler, const Film *band)
     array_push(scheduler->waiting, copy);
 }
 
-static void rows_done(Worker *worker)
+static void rows_done(WorkerState *worker)
 {
     double seconds = clock_seconds() - worker->taken_seconds;
     worker->share.rows += worker->rows.row_count;
@@ -335,7 +335,7 @@ bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band)
 void scheduler_drop(Scheduler *scheduler, size_t worker)
 {
     pthread_mutex_lock(&scheduler->mutex);
-    Worker *dropped = &scheduler->workers[worker];
+    WorkerState *dropped = &scheduler->workers[worker];
     dropped->is_dropped = true;
     if (dropped->rows.row_count > 0) rows_insert(scheduler, dropped->rows);
     dropped->rows = (BandRows){0};

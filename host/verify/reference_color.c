@@ -43,7 +43,7 @@ typedef struct {
     const Object *object;
     const Material *material;
     Color base;
-} Surface;
+} ShadedPoint;
 
 static Quad square_of(Quad coordinate, double size, Quad *margin)
 {
@@ -91,7 +91,7 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
 
 // Sets the start of rays to lights above a smooth triangle whose normals are all on one side: it is moved, by
 // each vertex's weight, along its normal up to its tangent plane (kernels/shapes/triangle.h).
-static void surface_lift(Surface *surface)
+static void surface_lift(ShadedPoint *surface)
 {
     const Object *object = surface->object;
     if (object->kind != SHAPE_TRIANGLE || !object->as.triangle.smooth) return;
@@ -120,7 +120,7 @@ static void surface_lift(Surface *surface)
 }
 
 // Returns whether the light reaches the surface.
-static bool add_light(const ReferenceScene *world, const Light *light, const Surface *surface,
+static bool add_light(const ReferenceScene *world, const Light *light, const ShadedPoint *surface,
                       ReferenceColor *sum)
 {
     const Scene *scene = &world->scene;
@@ -190,23 +190,23 @@ static Quad hit_magnitude(const ReferenceScene *world, const ReferenceHit *hit, 
 }
 
 // What a ray met; moved along the surface and turned by up to `blur`.
-static Surface surface_at(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit,
-                          double blur, Random *random)
+static ShadedPoint surface_at(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit,
+                              double blur, Random *random)
 {
     const Scene *scene = &world->scene;
     const Object *object = &scene->objects.items[hit->object];
     const Material *material = &scene->materials.items[object->material];
     Quad length = quad3_length(ray->direction);
-    Surface surface = {.point = reference_point(ray, hit->t),
-                       .normal = hit->shading_normal,
-                       .geometric = hit->normal,
-                       .to_eye = quad3_scale(ray->direction, -1 / length),
-                       .scale = hit->t * length,
-                       .entering = hit->entering,
-                       .index = hit->object,
-                       .object = object,
-                       .material = material,
-                       .base = material->color};
+    ShadedPoint surface = {.point = reference_point(ray, hit->t),
+                           .normal = hit->shading_normal,
+                           .geometric = hit->normal,
+                           .to_eye = quad3_scale(ray->direction, -1 / length),
+                           .scale = hit->t * length,
+                           .entering = hit->entering,
+                           .index = hit->object,
+                           .object = object,
+                           .material = material,
+                           .base = material->color};
     surface.start = START_PART * hit_magnitude(world, hit, surface.point, surface.scale);
     if (blur > 0) {
         Quad size =
@@ -223,7 +223,7 @@ static Surface surface_at(const ReferenceScene *world, const ReferenceRay *ray, 
 }
 
 // `shadows`: see reference_pixel; or NULL.
-static ReferenceColor surface_color(const ReferenceScene *world, const Surface *surface, double margin,
+static ReferenceColor surface_color(const ReferenceScene *world, const ShadedPoint *surface, double margin,
                                     bool *shadows)
 {
     const Scene *scene = &world->scene;
@@ -254,7 +254,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     ReferenceHit hit = reference_hit(scene, ray);
     if (!hit.found) return (ReferenceColor){background_color(scene, ray->direction), (double)hit.margin};
     const ReferenceScene world = {*scene, NULL};
-    Surface surface = surface_at(&world, ray, &hit, 0, NULL);
+    ShadedPoint surface = surface_at(&world, ray, &hit, 0, NULL);
     return surface_color(&world, &surface, (double)hit.margin, NULL);
 }
 
@@ -320,9 +320,9 @@ typedef struct {
     double margin;
     bool has_texture;
     bool *shadows; // of the first surface; or NULL
-} Tree;
+} PathTree;
 
-static void signature_add(Tree *tree, uint32_t object, uint32_t events)
+static void signature_add(PathTree *tree, uint32_t object, uint32_t events)
 {
     tree->signature = (tree->signature ^ ((object + 1) * PATH_EVENTS + events)) * PATH_FACTOR;
 }
@@ -385,7 +385,7 @@ static Color weight_left(Color weight, Color density, double length)
 }
 
 // Returns whether a ray of this weight counts.
-static bool contributes(Tree *tree, Color weight)
+static bool contributes(PathTree *tree, Color weight)
 {
     const double largest = vector_largest(weight), least = tree->min_contribution;
     if (largest <= 0 || least <= 0) return largest > 0;
@@ -394,7 +394,7 @@ static bool contributes(Tree *tree, Color weight)
     return largest >= least;
 }
 
-static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color weight, Medium medium,
+static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Color weight, Medium medium,
                      unsigned bounces_left)
 {
     const Scene *scene = &tree->world->scene;
@@ -415,7 +415,7 @@ static void add_path(Tree *tree, const ReferenceRay *ray, uint32_t left, Color w
         tree->distance = (double)(hit.t * quad3_length(ray->direction));
     }
     tree->has_first = true;
-    Surface surface = surface_at(tree->world, ray, &hit, tree->blur, &tree->random);
+    ShadedPoint surface = surface_at(tree->world, ray, &hit, tree->blur, &tree->random);
     const Material *material = surface.material;
     // a surface that is reached from within tells the medium
     if (material->transmission > 0 && !surface.entering) medium.density = material->absorption;
@@ -489,13 +489,13 @@ bool reference_is_undecided(const ReferencePixel *pixel)
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
                                const ReferencePath *path, bool *shadows)
 {
-    Tree tree = {.world = scene,
-                 .min_contribution = path->min_contribution,
-                 .blur = path->blur,
-                 .random = {path->seed},
-                 .object = UINT32_MAX,
-                 .signature = PATH_START,
-                 .margin = INFINITY};
+    PathTree tree = {.world = scene,
+                     .min_contribution = path->min_contribution,
+                     .blur = path->blur,
+                     .random = {path->seed},
+                     .object = UINT32_MAX,
+                     .signature = PATH_START,
+                     .margin = INFINITY};
     tree.shadows = shadows;
     ReferenceRay first = *ray;
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));

@@ -10,7 +10,7 @@ typedef struct {
     const PixelView *view;
     Text text;
     unsigned line_count;
-} Tree;
+} PathText;
 
 // A ray with a name and its share of the pixel's color.
 typedef struct {
@@ -32,12 +32,13 @@ static TraceRay ray_from(const double origin[3], const double direction[3])
                       .tmax = INFINITY};
 }
 
-static void branch_write(Tree *tree, const Branch *branch);
+static void branch_write(PathText *tree, const Branch *branch);
 
 // The secondary rays of a hit (kernels/shading/bounce.h). The reflected one carries what is not transmitted,
 // at total internal reflection or by Fresnel's equations. Without transmission the latter leave its part
 // unknown.
-static void branches_write(Tree *tree, const Branch *branch, const Material *material, const TraceHit *hit)
+static void branches_write(PathText *tree, const Branch *branch, const Material *material,
+                           const TraceHit *hit)
 {
     const bool is_total = material->transmission > 0 && hit->transmission == 0;
     const double kept = is_total || material->fresnel ? material->transmission - hit->transmission : 0;
@@ -50,7 +51,7 @@ static void branches_write(Tree *tree, const Branch *branch, const Material *mat
     branch_write(tree, &refracted);
 }
 
-static void branch_write(Tree *tree, const Branch *branch)
+static void branch_write(PathText *tree, const Branch *branch)
 {
     const PixelView *view = tree->view;
     TraceHit hit;
@@ -83,7 +84,7 @@ static void branch_write(Tree *tree, const Branch *branch)
 
 char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y)
 {
-    Tree tree = {.view = view};
+    PathText tree = {.view = view};
     const CameraRay ray = camera_ray(&view->scene->camera, view->size, x, y);
     const Vector3 origin = vector_subtract(ray.origin, view->scene->camera.position); // as seen from the eye
     const double eye[3] = {origin.x, origin.y, origin.z},

@@ -14,7 +14,7 @@ typedef struct {
     double attenuation[3], attenuation_distance; // the color left after the distance; DBL_MAX: clear
     GltfItem base_texture, emissive_texture;
     bool is_unlit;
-} Surface;
+} GltfSurface;
 
 // A writer's float may round 1 up.
 static const Range range_factor = {-1e-6, 1 + 1e-6, false, "from 0 to 1"};
@@ -35,16 +35,16 @@ static void factors_read(Gltf *gltf, const GltfItem *item, const char *key, size
     memcpy(values, read, count * sizeof *read);
 }
 
-static void surface_read(Gltf *gltf, const GltfItem *item, Surface *surface)
+static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
 {
-    *surface = (Surface){.base = {1, 1, 1, 1},
-                         .emissive_strength = 1,
-                         .metal = 1,
-                         .roughness = 1,
-                         .ior = 1.5,
-                         .cutoff = 0.5,
-                         .attenuation = {1, 1, 1},
-                         .attenuation_distance = DBL_MAX};
+    *surface = (GltfSurface){.base = {1, 1, 1, 1},
+                             .emissive_strength = 1,
+                             .metal = 1,
+                             .roughness = 1,
+                             .ior = 1.5,
+                             .cutoff = 0.5,
+                             .attenuation = {1, 1, 1},
+                             .attenuation_distance = DBL_MAX};
     const GltfItem pbr = gltf_member(item, "pbrMetallicRoughness"),
                    strength = gltf_extension(item, "KHR_materials_emissive_strength"),
                    glass = gltf_extension(item, "KHR_materials_transmission"),
@@ -178,7 +178,7 @@ static double clamped(double value)
 // Phong's highlight with the peak and about the width of a GGX one whose light falls along the normal (Walter
 // et al., Microfacet models for refraction through rough surfaces, EGSR 2007). What a rough surface reflects
 // beyond a highlight looks diffuse, that of a smooth metal mirrors.
-static void gloss_set(Gltf *gltf, const GltfItem *item, const Surface *surface, Material *look)
+static void gloss_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surface, Material *look)
 {
     enum { SHININESS_MAX = 1 << 20 };
     const double metal = clamped(surface->metal), roughness = clamped(surface->roughness),
@@ -210,7 +210,7 @@ static bool texture_can_emit(Gltf *gltf, const GltfItem *item, GltfMaterial *mat
     return material->texture_emits;
 }
 
-static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surface, GltfMaterial *material)
+static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surface, GltfMaterial *material)
 {
     Material *look = &material->look;
     const double strength = surface->emissive_strength, *base = surface->base;
@@ -246,7 +246,8 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const Surface *surfac
     }
 }
 
-static void transparency_set(Gltf *gltf, const GltfItem *item, const Surface *surface, GltfMaterial *material)
+static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surface,
+                             GltfMaterial *material)
 {
     Material *look = &material->look;
     const GltfItem mode = gltf_member(item, "alphaMode");
@@ -325,7 +326,7 @@ static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material
 
 static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
 {
-    Surface surface;
+    GltfSurface surface;
     gltf->is_optional = true;
     surface_read(gltf, item, &surface);
     *material = (GltfMaterial){.look = material_default(),
