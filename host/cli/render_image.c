@@ -1,0 +1,324 @@
+// One image of glint render: its times, its bands and its files.
+#include "host/cli/render_image.h"
+#include "host/base/clock.h"
+#include "host/cli/checkpoint_key.h"
+#include "host/cli/progress.h"
+#include "host/cli/shutter.h"
+#include "host/import/load.h"
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct {
+    RenderOptions *options;
+    Scene *scene; // at the shutter's time
+    RenderDevices *open;
+    Ranks *ranks; // NULL without MPI
+    Shutter shutter;
+    HostTimes *times;
+    RenderSettings settings;
+    Checkpoint *checkpoint; // NULL without --checkpoint
+    ImageOutput *output;    // NULL unless this is the shutter's last time
+    MessageList messages;
+} ImageRender;
+
+// Prints one estimate of the time and the size of a long render.
+static void estimate_print(ImageRender *render, double fraction_done)
+{
+    enum { SECONDS_MIN = 60 };
+    if (render->options->quiet || render->shutter.is_estimated) return;
+    double left = progress_seconds_left(&render->shutter.progress, fraction_done);
+    render->shutter.is_estimated = left >= 0;
+    if (left < SECONDS_MIN) return;
+    const double bytes = render->output ? image_output_bytes(render->output) : 0;
+    fprintf(stderr, "glint: %u x %u pixels: about %s%s%s\n", render->settings.region_width,
+            render->settings.region_height, text_duration(left).text, bytes > 0 ? " and at most " : "",
+            bytes > 0 ? text_size(bytes).text : "");
+}
+
+static bool band_take(void *context, const Film *band, double fraction_done)
+{
+    ImageRender *render = context;
+    Shutter *shutter = &render->shutter;
+    bool is_taken = true;
+    if (progress_interrupted()) return false;
+    if (shutter->time_count == 1) {
+        is_taken = image_output_write(render->output, band, &render->messages);
+    } else if (render->output) {
+        Film mean = shutter_mean(shutter, band);
+        is_taken = image_output_write(render->output, &mean, &render->messages);
+        free(mean.layers[LAYER_COLOR]);
+    } else {
+        shutter_add(shutter, band);
+    }
+    fraction_done = shutter_fraction(shutter, fraction_done);
+    if (is_taken) estimate_print(render, fraction_done);
+    progress_show(&shutter->progress, fraction_done);
+    return is_taken;
+}
+
+static void device_drop(void *context, size_t index)
+{
+    OpenDevices *devices = &((ImageRender *)context)->open->devices;
+    if (index < devices->count) devices_drop(devices, index); // otherwise a rank, which printed the reason
+}
+
+// Opens the checkpoint. Returns true if none is requested, and false with messages if it cannot be opened.
+static bool checkpoint_start(ImageRender *render)
+{
+    const RenderOptions *options = render->options;
+    Renderer *const *renderers = render->open->renderers;
+    if (!options->checkpoint) return true;
+    Text key = {0};
+    checkpoint_key(&key, &render->settings, options->output.aovs, renderers, render->open->devices.count,
+                   render->ranks);
+    const FilmHeader film = renderer_film_header(renderers[0], options->output.aovs);
+    render->checkpoint = checkpoint_open(options->checkpoint, text_c(&key), &film, &render->messages);
+    text_free(&key);
+    return render->checkpoint != NULL;
+}
+
+// Prints what is left of a render that ended early.
+static void rest_print(const RenderOptions *options)
+{
+    if (progress_interrupted() && options->has_format)
+        fprintf(stderr, "glint: interrupted: the image on standard output is incomplete\n");
+    else if (progress_interrupted())
+        fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is as it was\n",
+                options->output.path);
+    if (options->checkpoint)
+        fprintf(stderr, "glint: run the same command again to continue; finished bands are in '%s'\n",
+                options->checkpoint);
+}
+
+static void warnings_add(ImageRender *render)
+{
+    const OpenDevices *devices = &render->open->devices;
+    const uint64_t undecided = render->times->repeats.undecided;
+    if (undecided > 0)
+        message_warning(&render->messages, "%" PRIu64 " sample%s undecided, as at precision double",
+                        undecided, undecided == 1 ? " is" : "s are");
+    for (size_t i = 0; i < devices->count && shutter_is_last(&render->shutter); i++) {
+        const RenderReport *report = renderer_report(render->open->renderers[i]);
+        if (report->is_out_of_line)
+            message_warning(
+                &render->messages,
+                "the compiler of the device \"%s\" failed on a kernel with inlined functions; the kernel is "
+                "built with functions out of line, which is slower",
+                report->device->name);
+    }
+}
+
+// Writes the files of an image that is whole, or abandons them.
+static bool files_write(ImageRender *render, bool is_whole)
+{
+    HostTimes *times = render->times;
+    stage_begin(times->stage, "writing", NULL, 0);
+    if (is_whole && render->output)
+        is_whole = image_output_commit(render->output, &render->messages, &times->encode_seconds);
+    else if (render->output)
+        image_output_abandon(render->output);
+    if (render->checkpoint) checkpoint_close(render->checkpoint, is_whole, &render->messages);
+    stage_end(times->stage);
+    return is_whole;
+}
+
+// Renders one image, or one of the shutter's times. With the last, writes the files and reports how long it
+// took.
+static int image_render(ImageRender *render)
+{
+    RenderOptions *options = render->options;
+    OpenDevices *devices = &render->open->devices;
+    Renderer *const *renderers = render->open->renderers;
+    Ranks *ranks = render->ranks;
+    Shutter *shutter = &render->shutter;
+    HostTimes *times = render->times;
+    const bool is_last = shutter_is_last(shutter);
+    if (shutter->time == 0) progress_open(&shutter->progress, options->quiet);
+    if (is_last)
+        render->output = image_output_open(&options->output, options->scene, render->scene, &render->settings,
+                                           renderers, devices->count, ranks);
+    const unsigned aovs = is_last ? options->output.aovs : 0;
+    if (ranks) ranks->film = renderer_film_header(renderers[0], aovs);
+    const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,
+                                  .serve = ranks ? ranks->serve : NULL,
+                                  .shares = ranks ? ranks->shares : NULL,
+                                  .context = ranks};
+    const RenderJob job = {.renderers = renderers,
+                           .count = devices->count,
+                           .aovs = aovs,
+                           .sink = band_take,
+                           .dropped = device_drop,
+                           .context = render,
+                           .checkpoint = render->checkpoint,
+                           .remote = ranks ? &remote : NULL};
+    stage_begin(times->stage, "rendering", NULL, 0);
+    double start = clock_seconds();
+    bool whole = render_job_run(&job);
+    times->render_seconds += clock_seconds() - start;
+    if (is_last) times->repeats = image_output_repeats(render->output);
+    progress_close(&shutter->progress);
+    whole = files_write(render, whole);
+    if (whole) warnings_add(render);
+    bool faulty = message_count(&render->messages, MESSAGE_ERROR) > 0;
+    messages_print(&render->messages, NULL);
+    int status = whole                    ? EXIT_DONE
+                 : faulty                 ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
+                 : progress_interrupted() ? EXIT_INTERRUPTED
+                                          : EXIT_MACHINE;
+    if (!whole) rest_print(options);
+    if (ranks && is_last && options->timing == TIMING_TRACE)
+        fprintf(stderr, "glint: --timing=trace has the first rank's devices only\n");
+    if (whole && is_last && options->timing != TIMING_NONE)
+        timing_print(options->timing, renderers, devices->count, ranks, &render->settings, times);
+    return status;
+}
+
+// Stores the precision that --max-error chooses in the settings.
+static int precision_choose(ImageRender *render, Pilot *pilot)
+{
+    const RenderOptions *options = render->options;
+    Progress progress;
+    progress_open(&progress, true); // so that signals only set the flag
+    const bool chosen = pilot_run(pilot, &options->budget, render->open->devices.items[0].compute,
+                                  render->scene, &render->settings, &render->messages);
+    progress_close(&progress);
+    const bool is_unfit = render->messages.count > 0;
+    messages_print(&render->messages, NULL);
+    if (!chosen) return is_unfit ? EXIT_USER : progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
+    render->settings.precision = pilot->chosen;
+    if (options->quiet) return EXIT_DONE;
+    Text line = {0};
+    pilot_describe(&line, pilot);
+    fprintf(stderr, "glint: --max-error: %s, %.0f ms\n", text_c(&line), 1e3 * pilot->seconds);
+    text_free(&line);
+    return EXIT_DONE;
+}
+
+// Renders the scene at the shutter's time.
+static int time_render(ImageRender *render)
+{
+    RenderOptions *options = render->options;
+    const Scene *scene = render->scene;
+    RenderSettings *settings = &render->settings;
+    Ranks *ranks = render->ranks;
+    Pilot pilot;
+    if (!render_settings_make(settings, options, scene)) return EXIT_USER;
+    shutter_choose_samples(&render->shutter, settings);
+    if (options->budget.limit > 0) {
+        const int status = precision_choose(render, &pilot);
+        if (status != EXIT_DONE) return status;
+        render->times->pilot = options->output.pilot = &pilot;
+    }
+    if (!options->has_transfer)
+        options->output.transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    options->output.prints_names = !options->quiet && !options->has_format;
+    options->output.synchronous = options->timing != TIMING_NONE;
+    int status = EXIT_USER;
+    const unsigned aovs = shutter_is_last(&render->shutter) ? options->output.aovs : 0;
+    if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
+        const bool has_started =
+            render_devices_start(render->open, scene, settings, ranks, &render->messages);
+        if (has_started && render->shutter.time > 0)
+            message_list_free(&render->messages); // the first time's warnings
+        const bool can_start = has_started && checkpoint_start(render);
+        if (ranks) ranks->start(can_start);
+        if (can_start) status = image_render(render);
+    }
+    messages_print(&render->messages, NULL);
+    render->times->pilot = options->output.pilot = NULL;
+    return status;
+}
+
+// Rejects options that need one time. Returns false with a message.
+static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
+{
+    const char *const obstacle = shutter->time_count == 1           ? NULL
+                                 : options->checkpoint              ? "--checkpoint keeps bands of one time"
+                                 : options->budget.limit > 0        ? "--max-error measures one time"
+                                 : strcmp(options->scene, "-") == 0 ? "standard input is read once"
+                                                                    : NULL;
+    if (obstacle)
+        fprintf(stderr, "glint: '%s': %s, but 'shutter' needs several; --set shutter=0 closes it\n",
+                options->scene, obstacle);
+    if (shutter->is_open && options->sample_count == 1)
+        fprintf(
+            stderr,
+            "glint: warning: '%s': 'shutter' has an effect from --samples 2 on: each sample shows one time\n",
+            options->scene);
+    return !obstacle;
+}
+
+// Replaces the scene by that of the shutter's time. Warnings were printed when the frame's scene was read.
+static bool scene_advance(ImageRender *render)
+{
+    MessageList messages = {0};
+    const double start = clock_seconds();
+    scene_free(render->scene);
+    render->options->common.frame = shutter_frame(&render->shutter);
+    const SceneOptions scene_options = scene_options_of(&render->options->common);
+    const bool is_read = scene_load(render->scene, render->options->scene, &scene_options, &messages);
+    if (is_read)
+        message_list_free(&messages);
+    else
+        messages_print(&messages, render->options->scene);
+    render->scene->frame = render->shutter.frame;
+    render->times->parse_seconds += clock_seconds() - start;
+    return is_read;
+}
+
+// Renders a scene at each of the shutter's times.
+static int shutter_render(ImageRender *render)
+{
+    Shutter *shutter = &render->shutter;
+    *shutter = shutter_open(render->scene, render->options->sample_count);
+    int status = shutter_fits(shutter, render->options) ? EXIT_DONE : EXIT_USER;
+    while (status == EXIT_DONE && shutter->time < shutter->time_count) {
+        if (shutter->time > 0) {
+            progress_end_at_once(); // nothing checks the flag while a scene is read
+            if (progress_interrupted()) {
+                status = EXIT_INTERRUPTED;
+                break;
+            }
+            render_devices_rest(render->open);
+        }
+        const bool is_moved = shutter->time_count == 1 || scene_advance(render);
+        status = is_moved ? time_render(render) : EXIT_USER;
+        shutter->time++;
+    }
+    shutter_close(shutter);
+    return status;
+}
+
+int image_file_render(RenderOptions options, const char *path, RenderDevices *open, Ranks *ranks)
+{
+    Scene scene = {0};
+    options.output.path = path;
+    double start = clock_seconds();
+    int status = EXIT_USER;
+    if (ranks && (options.common.work_group[0] > 0 || options.common.build_options))
+        return option_usage_fault("render",
+                                  "--work-group and --build-options need glint render, a single process");
+    if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
+    if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
+        !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
+        HostTimes times = {.scene = options.scene,
+                           .frame = options.frame_count > 0 ? options.common.frame : NAN,
+                           .is_several = options.has_several,
+                           .parse_seconds = clock_seconds() - start,
+                           .stage = options.common.stage};
+        if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)
+            fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options.scene);
+        open->has_warned_of_frames = true;
+        open->reference_selector = options.common.reference_device;
+        stage_begin(times.stage, "opening the devices", NULL, 0);
+        ImageRender render = {
+            .options = &options, .scene = &scene, .open = open, .ranks = ranks, .times = &times};
+        if (render_devices_open(open, &options.common)) status = shutter_render(&render);
+    }
+    scene_free(&scene);
+    stage_close(options.common.stage);
+    return status;
+}
