@@ -6,13 +6,11 @@
 #include "host/base/memory.h"
 #include "host/base/numbers.h"
 #include "host/base/text.h"
-#include "host/cli/options.h"
 #include <errno.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 
 enum { NOTE_COUNT_MAX = 24 };
 
@@ -54,29 +52,6 @@ struct ImageOutput {
         size_t count, capacity;
     } kept;
 };
-
-char *image_output_default_path(const char *scene_path)
-{
-    const char *slash = strrchr(scene_path, '/');
-    const char *name = strcmp(scene_path, "-") == 0 ? "image" : slash ? slash + 1 : scene_path;
-    const char *dot = strrchr(name, '.');
-    Text path = {0};
-    text_append(&path, name, dot && dot > name ? (size_t)(dot - name) : strlen(name));
-    text_appendf(&path, ".png");
-    return path.items;
-}
-
-bool image_output_is_stdout(const char *path)
-{
-    return strcmp(path, "-") == 0;
-}
-
-bool image_output_path_known(const char *path)
-{
-    if (image_output_is_stdout(path) || image_format_of(path) != IMAGE_UNKNOWN) return true;
-    fprintf(stderr, "glint: %s: the name must end in .png, .ppm, .exr or .npy\n", path);
-    return false;
-}
 
 ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
                                const RenderSettings *settings, Renderer *const *renderers,
@@ -235,58 +210,6 @@ static ImageHeader layer_header(const Film *film, Layer layer)
     };
 }
 
-// Returns the name of an AOV's file: image.png becomes image.NAME.npy.
-static char *aov_path(const ImageOutputOptions *options, const char *name)
-{
-    const char *dot = strrchr(options->path, '.');
-    return text_format("%.*s.%s.npy", (int)(dot - options->path), options->path, name);
-}
-
-// Calls `is_so` for each file of the image until it returns false. Returns whether it never did.
-static bool files_all(const ImageOutputOptions *options, bool (*is_so)(const char *path, void *context),
-                      void *context)
-{
-    bool all = is_so(options->path, context);
-    const bool is_one_file = image_format_of(options->path) == IMAGE_EXR;
-    for (Layer layer = 0; layer < LAYER_COUNT && all && !is_one_file; layer++) {
-        if (!(options->aovs >> layer & 1)) continue;
-        char *path = aov_path(options, layer_names[layer]);
-        all = is_so(path, context);
-        free(path);
-    }
-    return all;
-}
-
-typedef struct {
-    const Scene *scene;
-    const char *path;
-} SceneFile;
-
-static bool file_spares_scene(const char *path, void *context)
-{
-    const SceneFile *file = context;
-    return !output_overwrites_scene(path, file->scene, file->path);
-}
-
-bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
-                                   const char *scene_path)
-{
-    return !image_output_is_stdout(options->path) &&
-           !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
-}
-
-static bool file_exists(const char *path, void *unused)
-{
-    (void)unused;
-    struct stat status;
-    return stat(path, &status) == 0 && S_ISREG(status.st_mode);
-}
-
-bool image_output_exists(const ImageOutputOptions *options)
-{
-    return files_all(options, file_exists, NULL);
-}
-
 // Returns whether the AOV is written. The shadow masks of a scene without lights are not.
 static bool is_written(const ImageOutput *output, const Film *film, Layer layer)
 {
@@ -373,7 +296,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
         if (!is_written(output, &film, layer) || is_exr(output)) continue;
         ImageHeader header = layer_header(&film, layer);
         if (layer == LAYER_POSITION) header.npy_type = 'd';
-        char *path = aov_path(output->options, layer_names[layer]);
+        char *path = image_output_aov_path(output->options, layer_names[layer]);
         output->aovs[layer] = image_writer_open(path, &header, messages);
         opened = output->aovs[layer] != NULL;
         output->bytes += (double)image_bytes(&header);
@@ -553,7 +476,7 @@ static void names_print(const ImageOutput *output)
     fprintf(stderr, "glint: wrote %s", output->options->path);
     for (Layer i = 0; i < LAYER_COUNT; i++) {
         if (!output->aovs[i]) continue;
-        char *path = aov_path(output->options, layer_names[i]);
+        char *path = image_output_aov_path(output->options, layer_names[i]);
         fprintf(stderr, ", %s", path);
         free(path);
     }

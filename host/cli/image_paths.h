@@ -1,0 +1,35 @@
+// The files of one image, by their names.
+#pragma once
+
+#include "host/image/image.h"
+#include "host/measure/pilot.h"
+#include "host/scene/scene.h"
+
+typedef struct {
+    const char *path; // "-": standard output
+    ImageFormat stdout_format;
+    unsigned aovs; // AOV_COLOR means the linear values
+    Transfer transfer;
+    unsigned bits;
+    double exposure; // in stops
+    Tone tone;
+    bool dither;
+    const Pilot *pilot; // chose the precision, or NULL
+    bool prints_names;  // prints the files' names once they are written
+    bool synchronous;   // encodes a band before the next one is rendered, so that times do not overlap
+} ImageOutputOptions;
+
+// Returns the scene's name with .png, or image.png for standard input, in the current folder. The caller
+// frees it.
+char *image_output_default_path(const char *scene_path);
+// Returns whether the path is "-", standard output.
+bool image_output_is_stdout(const char *path);
+// Returns whether the path is "-" or its ending is known; if not, prints the known endings.
+bool image_output_path_known(const char *path);
+// Returns the name of an AOV's file: image.png becomes image.NAME.npy. The caller frees it.
+char *image_output_aov_path(const ImageOutputOptions *options, const char *name);
+// Returns true with a message if one of the files is a file that the scene was read from.
+bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scene *scene,
+                                   const char *scene_path);
+// Returns whether all of its files exist.
+bool image_output_exists(const ImageOutputOptions *options);
