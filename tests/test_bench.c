@@ -123,6 +123,34 @@ static void test_event_without_times(void **state)
     bench_times_free(&times);
 }
 
+// Returns the verdict on runs whose launches and processor time grow by these factors after half of them.
+static Verdict drift_verdict(bool is_cpu, double launch_growth, double processor_growth)
+{
+    enum { RUNS = 40 };
+    BenchTimes times = {0};
+    for (int i = 0; i < RUNS; i++) {
+        const double noise = 1 + 0.002 * (i % 5), is_late = i >= RUNS / 2;
+        const LaunchTime launch = launch_at(5 + 0.1 * i, 0.03 * noise * (is_late ? launch_growth : 1), 1);
+        bench_add_launch(&times, &launch);
+        bench_end_run(&times, 0.045, 0.06 * noise * (is_late ? processor_growth : 1));
+    }
+    const Comparison drift = bench_drift(&times, is_cpu, 3);
+    assert_near(drift.ratio, is_cpu ? processor_growth : launch_growth, 1e-9);
+    bench_times_free(&times);
+    return drift.verdict;
+}
+
+static void test_drift(void **state)
+{
+    (void)state;
+    assert_int_equal(drift_verdict(false, 1, 2), VERDICT_SAME);
+    assert_int_equal(drift_verdict(false, 1.2, 1), VERDICT_SLOWER);
+    assert_int_equal(drift_verdict(false, 0.8, 1), VERDICT_FASTER);
+    assert_int_equal(drift_verdict(true, 2, 1), VERDICT_SAME);
+    assert_int_equal(drift_verdict(true, 1, 1.2), VERDICT_SLOWER);
+    assert_int_equal(bench_drift(&(BenchTimes){0}, true, 1).verdict, VERDICT_UNDECIDED);
+}
+
 static void test_runs_that_scatter(void **state)
 {
     (void)state;
@@ -331,6 +359,7 @@ int main(void)
         cmocka_unit_test(test_clock_that_drifts),
         cmocka_unit_test(test_stalled_launches),
         cmocka_unit_test(test_event_without_times),
+        cmocka_unit_test(test_drift),
         cmocka_unit_test(test_runs_that_scatter),
         cmocka_unit_test(test_figures),
         cmocka_unit_test(test_baseline),

@@ -10,7 +10,7 @@ import re
 import statistics
 import unittest
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, main, need_device, read, run, shim_build, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, main, need_device, read, run, shim_build, write
 
 LANES = "" if IS_LONG else "--lanes 1"  # kernels of few lanes build faster, and each process builds some without a cache
 QUICK = f"--size 32x24 --seconds 0.1 {LANES}"
@@ -26,6 +26,23 @@ int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void 
     static int count;
     if (count++ >= atoi(getenv("FAILING"))) return -5;
     return ((int (*)())dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
+}
+"""
+# NVIDIA's library, with one board, whose counter grows alike.
+NVML = """
+#include <string.h>
+static unsigned long long millijoules;
+int nvmlInit_v2(void) { return 0; }
+int nvmlShutdown(void) { return 0; }
+int nvmlDeviceGetHandleByPciBusId_v2(const char *pci, void **board)
+{
+    *board = &millijoules;
+    return strcmp(pci, "0000:65:05.1") != 0;
+}
+int nvmlDeviceGetTotalEnergyConsumption(void *board, unsigned long long *total)
+{
+    *total = *(unsigned long long *)board += 1000;
+    return 0;
 }
 """
 
@@ -258,6 +275,25 @@ for line in worker.stdout:
         self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
+    def check_energy(self, source, env):
+        """A joule, over all frames of half a second or more."""
+        (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=env)["runs"]
+        self.assertEqual(row["energy"]["source"], source)
+        frames = 1000 / row["energy"]["frame_mj"]
+        self.assertTrue(frames > 0.5 and abs(frames - round(frames)) < 1e-6 * frames, frames)
+        self.assertTrue(0 < row["energy"]["watts"] <= 2, row["energy"])
+
+    @unittest.skipIf(IS_SANITIZED, "sanitizers must be loaded before a shim")
+    def test_energy(self):
+        self.check_energy("RAPL", {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c"))})
+        os.mkdir("nvml")
+        shim_build("nvml/libnvidia-ml.so.1", NVML)
+        limits = shim_build("limits.so", read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
+        board = {"OCL_ICD_VENDORS": find_icd("pocl"), "LD_PRELOAD": limits, "GLINT_LIMITS": "nv"}
+        self.check_energy("NVML", board | {"LD_LIBRARY_PATH": os.path.abspath("nvml")})
+        (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=board)["runs"]
+        self.assertEqual(row["energy"], {"status": "unavailable", "reason": "NVML does not read this board's energy"})
+
     def test_failing_variant(self):
         """The call of a variant with options for the driver is named, as it is opened and in its many runs."""
         failing = shim_build("failing.so", FAILING)

@@ -8,12 +8,13 @@ run_tests: sanitize-long-only"""
 import copy
 import importlib.util
 import json
+import os
 import re
 import sys
 import unittest
 
 import json_reference
-from glint import BALLS, PLANET, PROGRAM, ROOT, TestCase, main, need_device, read, write
+from glint import BALLS, PLANET, PROGRAM, ROOT, TestCase, main, need_device, read, shim_build, write
 
 WRITES = "--write" in sys.argv
 RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
@@ -161,8 +162,12 @@ class Json(TestCase):
         rest = f"{SMALL} {QUICK} --no-build-times --json"
         # at single a number of strong.yaml is beyond the range
         strong = [self.json(f"bench strong.yaml {rest} --lanes 1 --variant '' --variant '--precision double'")] if fp64 else []
+        # a sanitizer need not be the first that is loaded: the shim allocates nothing by itself
+        metered = {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c")),
+                   "ASAN_OPTIONS": f"{os.environ.get('ASAN_OPTIONS', '')}:verify_asan_link_order=0"}
         self.check_members("glint bench", self.json(
             f"bench plain.yaml {rest} --samples 2,3 --compare bench.json", status=4),
+            self.json(f"bench plain.yaml {rest} --samples 2", env=metered),
             json.loads(bench.stdout),
             self.json(f"bench plain.yaml {rest} --samples 2 --variant '' --variant '--work-group 4x4'"),
             self.json(f"bench plain.yaml {rest} --samples 2 --variant '--build-options -DUNUSED=1'"), *strong)

@@ -88,6 +88,8 @@ const ResultTable bench_table = {
                 {"runs", "frame_ms.runs"},
                 {"Mrays/s", "mrays_per_s"},
                 {"build ms", "build_ms.cold"},
+                {"mJ", "energy.frame_mj"},
+                {"drift", "drift.verdict"},
                 {"to first", "to_first.ratio"},
                 {"verdict", "comparison.verdict"},
                 {"new over old", "comparison.ratio"}},
@@ -174,6 +176,23 @@ static void variant_print(const BenchReport *report, size_t i, FILE *stream)
     fputc('\n', stream);
 }
 
+static Comparison row_drift(const BenchReport *report, const BenchRow *row)
+{
+    return bench_drift(&row->times, report->device->type & CL_DEVICE_TYPE_CPU, report->set->count);
+}
+
+// Warns of a device whose speed changed while it was measured.
+static void drift_print(const BenchReport *report, const BenchRow *row, FILE *stream)
+{
+    const Comparison drift = row_drift(report, row);
+    if (drift.verdict != VERDICT_SLOWER && drift.verdict != VERDICT_FASTER) return;
+    fprintf(
+        stream,
+        "    the last half of the runs took %.3f (%.3f to %.3f) times as long as the first: the device %s\n",
+        drift.ratio, drift.low, drift.high,
+        drift.verdict == VERDICT_SLOWER ? "was throttled or shared" : "was not warm or not alone at first");
+}
+
 static void row_print(const BenchReport *report, size_t i, FILE *stream)
 {
     const BenchRow *row = &report->set->rows[i];
@@ -192,6 +211,10 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     fprintf(stream, " %7.1f  %016" PRIx64 "\n", bench_rays_per_second(row) / 1e6, row->kernel_hash);
     variant_print(report, i, stream);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
+    if (row->energy.source)
+        fprintf(stream, "    %.4g mJ per frame, %.3g W, by %s\n", 1e3 * row->energy.joules,
+                row->energy.joules / row->energy.seconds, row->energy.source);
+    drift_print(report, row, stream);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);
     const RenderReport *last = run_report(report, i);
     if (last->device->passports != report->device->passports) passports_remark(last->device, stream);
@@ -347,6 +370,17 @@ static void first_json(Json *json, const BenchReport *report, size_t i)
     json_end(json);
 }
 
+static void energy_json(Json *json, const BenchEnergy *energy)
+{
+    if (!energy->source) {
+        unavailable_json(json, energy->why_not);
+        return;
+    }
+    json_text(json, "source", energy->source);
+    json_number(json, "frame_mj", 1e3 * energy->joules);
+    json_number(json, "watts", energy->joules / energy->seconds);
+}
+
 static void results_json(Json *json, const BenchReport *report, size_t i)
 {
     const BenchRow *row = &report->set->rows[i];
@@ -357,6 +391,13 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     samples_json(json, "frame_samples_ms", &row->times.frame);
     samples_json(json, "kernel_samples_ms", bench_doubt(&row->times) ? &row->times.host : &row->times.event);
     samples_json(json, "processor_samples_ms", &row->times.processor);
+    json_begin_object(json, "drift");
+    const Comparison drift = row_drift(report, row);
+    ratio_json(json, &drift, drift.verdict);
+    json_end(json);
+    json_begin_object(json, "energy");
+    energy_json(json, &row->energy);
+    json_end(json);
     json_begin_object(json, "build_ms");
     figure_json(json, "cold", 1e3, row->build_cold);
     figure_json(json, "cached", 1e3, row->build_cached);

@@ -3,6 +3,7 @@
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/opencl/passport.h"
+#include <math.h>
 #include <string.h>
 
 enum { BUILD_TEST_SIDE = 64 };
@@ -155,6 +156,24 @@ bool variant_run(Variant *variant, BenchTimes *times)
     if (times)
         bench_end_run(times, end_seconds - report->launches.items[0].time.host_start_seconds,
                       clock_processor_seconds() - processor_start_seconds);
+    return true;
+}
+
+bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
+{
+    static const double seconds_min = 0.5; // some counters change ten times a second
+    const double start_joules = energy_joules(meter), start_seconds = clock_seconds();
+    double seconds = 0;
+    size_t frame_count = 0;
+    for (; seconds < seconds_min; frame_count++) {
+        if (!variant_run(variant, NULL)) return false;
+        seconds = clock_seconds() - start_seconds;
+    }
+    const double joules = energy_joules(meter) - start_joules;
+    row->energy = (BenchEnergy){.source = isfinite(joules) ? energy_source(meter) : NULL,
+                                .why_not = "an energy counter could not be read",
+                                .joules = joules / (double)frame_count,
+                                .seconds = seconds / (double)frame_count};
     return true;
 }
 

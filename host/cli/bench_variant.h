@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/measure/bench.h"
+#include "host/measure/energy.h"
 #include "host/render/renderer.h"
 
 typedef struct {
@@ -28,4 +29,7 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
 // interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
 // Closes the variant and sets it to zeros. Accepts a variant of zeros.
+// Renders frames for half a second and stores the mean energy of one in the row. Returns false as variant_run
+// does.
+bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row);
 void variant_close(Variant *variant);

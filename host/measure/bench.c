@@ -78,6 +78,17 @@ bool bench_converged(const BenchTimes *times, size_t enough)
            frame.quartile_range <= converged_spread * frame.median;
 }
 
+static const double drift_tolerance = 1.05;
+
+Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count)
+{
+    const Series *all = is_cpu ? &times->processor : bench_doubt(times) ? &times->host : &times->event;
+    const size_t half = all->count / 2;
+    const Series first = {.items = all->items, .count = half},
+                 last = {.items = all->items + (all->count - half), .count = half};
+    return comparison_of_rounds(&last, &first, row_count, drift_tolerance);
+}
+
 void bench_row_free(BenchRow *row)
 {
     bench_times_free(&row->times);

@@ -2,6 +2,7 @@
 // from them.
 #pragma once
 
+#include "host/measure/comparison.h"
 #include "host/measure/series.h"
 #include "host/render/renderer.h"
 #include <stdbool.h>
@@ -39,6 +40,17 @@ Summary bench_kernel(const BenchTimes *times);
 // small.
 bool bench_converged(const BenchTimes *times, size_t enough);
 
+// Compares the runs of the last half with those of the first, by the processors' time of a CPU device, else
+// by the launches' time. A device that is throttled makes the last half slower.
+Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count);
+
+// The energy of a row's frames, rendered one after another.
+typedef struct {
+    const char *source;     // what measured it; NULL if it was not measured
+    const char *why_not;    // the reason for that
+    double joules, seconds; // of one frame
+} BenchEnergy;
+
 // Identifies a row. The scene is known by its path and by the hash of all files it was read from; rows of
 // different reports match by the hash.
 typedef struct {
@@ -56,6 +68,7 @@ typedef struct {
     BenchTimes times;
     uint64_t kernel_hash;
     Figure build_cold, build_cached; // seconds
+    BenchEnergy energy;
     uint64_t rays[RAYS_COUNT];
     bool traverses_bvh;
 } BenchRow;

@@ -1,0 +1,16 @@
+// Reads the energy that a device has used: of NVIDIA's boards by NVML, the driver's library, and of CPUs by
+// the counters of RAPL that Linux shows below /sys/class/powercap, on many systems to root alone.
+#pragma once
+
+#include "host/opencl/device.h"
+
+typedef struct EnergyMeter EnergyMeter;
+
+// Opens the meter of a device. Returns NULL if there is none and sets *why_not to the reason, a constant.
+EnergyMeter *energy_open(const Device *device, const char **why_not);
+void energy_close(EnergyMeter *meter); // accepts NULL
+// Returns what measures: "NVML" for a board, "RAPL" for all packages of the processors.
+const char *energy_source(const EnergyMeter *meter);
+// Returns the joules since the meter was opened. A counter that wraps must be read before it wraps again,
+// which takes minutes. Returns NAN if a counter cannot be read.
+double energy_joules(EnergyMeter *meter);
