@@ -489,6 +489,20 @@ class Errors(unittest.TestCase):
             library.glint_text_free(messages)
             library.glint_tracer_close(tracer)
 
+    def test_pocl_of_pip(self):
+        """PoCL's wheel is found where the system has no driver."""
+        with tempfile.TemporaryDirectory() as folder:
+            for name in "pocl_binary_distribution/__init__.py", "pyopencl/.libs/libpocl-12ab.so", "vendors/some.icd":
+                Path(folder, name).parent.mkdir(parents=True)
+                Path(folder, name).touch()
+            self.assertIsNone(glint._c.pocl_of_pip("/nowhere"))
+            sys.path.append(folder)
+            try:
+                self.assertEqual(glint._c.pocl_of_pip("/nowhere"), f"{folder}/pyopencl/.libs/libpocl-12ab.so")
+                self.assertIsNone(glint._c.pocl_of_pip(f"{folder}/vendors"))
+            finally:
+                sys.path.remove(folder)
+
     def test_devices(self):
         devices = glint.devices()
         self.assertTrue(devices and all(device.index == i and device.name for i, device in enumerate(devices)))

@@ -1,5 +1,6 @@
 """The C interface of libglint (glint.h) by ctypes."""
 import ctypes
+import importlib.util
 import os
 import pathlib
 from ctypes import POINTER, c_char, c_char_p, c_double, c_int, c_size_t, c_uint32, c_uint64, c_void_p
@@ -63,9 +64,21 @@ _FUNCTIONS = {
 }
 
 
+def pocl_of_pip(vendors="/etc/OpenCL/vendors"):
+    """The library of PoCL that pip installed as pocl-binary-distribution; None without it, or where the system has a driver."""
+    package = importlib.util.find_spec("pocl_binary_distribution")
+    if not package or not package.origin or any(pathlib.Path(vendors).glob("*.icd")):
+        return None
+    libraries = pathlib.Path(package.origin).parents[1].glob("pyopencl/.libs/libpocl*.so")
+    return next(map(str, libraries), None)
+
+
 def _open():
     """Loads the library that GLINT_LIBRARY names, else the wheel's, else the system's."""
     bundled = pathlib.Path(__file__).with_name(NAME)
+    driver = pocl_of_pip()
+    if driver:
+        os.environ.setdefault("OCL_ICD_VENDORS", driver)  # which may also name the library of one
     opened = ctypes.CDLL(os.environ.get("GLINT_LIBRARY") or (str(bundled) if bundled.exists() else NAME))
     for name, (result, *arguments) in _FUNCTIONS.items():
         function = getattr(opened, name)
