@@ -6,7 +6,7 @@ function imageElement({ size: [width, height] }, source, alt) {
   return html("img", { src: source, alt, width, height, decoding: "async" });
 }
 
-// "fast; equal to it as 32-bit floats: single, strict"
+// "double; equal to it as 32-bit floats: single, strict"
 function imageCaption(scene, name, others) {
   const caption = html("figcaption", {}, name);
   others.forEach((index, i) => caption.append(i ? ", " : "; equal to it as 32-bit floats: ", variantName(scene, index)));
