@@ -11,7 +11,7 @@ void summary_json(Json *json, const char *key, Summary seconds)
     json_number(json, "min", 1e3 * seconds.min);
     json_number(json, "median", 1e3 * seconds.median);
     json_number(json, "max", 1e3 * seconds.max);
-    json_number(json, "quartile_range", 1e3 * seconds.quartile_range);
+    json_number(json, "quartile_range", 1e3 * (seconds.upper_quartile - seconds.lower_quartile));
     json_int64(json, "runs", (int64_t)seconds.count);
     json_end(json);
 }

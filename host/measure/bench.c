@@ -70,12 +70,16 @@ Summary bench_kernel(const BenchTimes *times)
     return series_summarize(bench_doubt(times) ? &times->host : &times->event);
 }
 
+static bool is_narrow(const Summary *seconds)
+{
+    return seconds->upper_quartile - seconds->lower_quartile <= converged_spread * seconds->median;
+}
+
 bool bench_converged(const BenchTimes *times, size_t enough)
 {
     if (times->frame.count < enough) return false;
     Summary kernel = bench_kernel(times), frame = series_summarize(&times->frame);
-    return kernel.quartile_range <= converged_spread * kernel.median &&
-           frame.quartile_range <= converged_spread * frame.median;
+    return is_narrow(&kernel) && is_narrow(&frame);
 }
 
 static const double drift_tolerance = 1.05;

@@ -44,9 +44,10 @@ Summary series_summarize(const Series *series)
     const double *sorted = copy.items;
     Summary summary = {
         .min = sorted[0],
+        .lower_quartile = sorted_quantile(sorted, count, 0.25),
         .median = sorted_quantile(sorted, count, 0.5),
+        .upper_quartile = sorted_quantile(sorted, count, 0.75),
         .max = sorted[count - 1],
-        .quartile_range = sorted_quantile(sorted, count, 0.75) - sorted_quantile(sorted, count, 0.25),
         .count = count,
     };
     series_free(&copy);

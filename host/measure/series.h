@@ -9,9 +9,8 @@ typedef struct {
 } Series;
 
 typedef struct {
-    double min, median, max;
-    double quartile_range; // upper quartile - lower quartile
-    size_t count;          // if 0, the other members are 0
+    double min, lower_quartile, median, upper_quartile, max;
+    size_t count; // if 0, the other members are 0
 } Summary;
 
 void series_add(Series *series, double value);
