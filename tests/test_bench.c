@@ -202,7 +202,7 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
     assert_int_equal(write(descriptor, text, strlen(text)), strlen(text));
     snprintf(path, sizeof path, "/proc/self/fd/%d", descriptor);
     MessageList messages = {0};
-    Baseline *baseline = baseline_open(path, &messages);
+    Baseline *baseline = baseline_open(path, true, &messages);
     *error_count = message_count(&messages, MESSAGE_ERROR);
     if (*error_count) {
         char *expected;
@@ -235,8 +235,8 @@ static void test_baseline(void **state)
                         "0000000000000000", "[1, 1]") "," BASELINE_ROW(ROW_HASH, "[90, 91.5]") "]}",
                     &errors);
     assert_non_null(baseline);
-    assert_string_equal(baseline_device(baseline), "d");
-    assert_string_equal(baseline_host(baseline), "h");
+    assert_string_equal(baseline->device, "d");
+    assert_string_equal(baseline->host, "h");
     BenchRow row = row_make();
     ReportTimes wall, processor;
     assert_true(baseline_find(baseline, &row.key, &wall, &processor));
@@ -321,7 +321,7 @@ static void test_broken_baselines(void **state)
         ReportTimes wall, processor;
         Baseline *baseline = baseline_of(empty[i], &errors);
         assert_non_null(baseline);
-        assert_string_equal(baseline_device(baseline), "");
+        assert_string_equal(baseline->device, "");
         assert_false(baseline_find(baseline, &row.key, &wall, &processor));
         baseline_close(baseline);
     }

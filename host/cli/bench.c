@@ -220,7 +220,7 @@ static bool is_any_certified(const VariantSet *set)
     return false;
 }
 
-static const double against_tolerance = 1.02, baseline_tolerance = 1.1, against_seconds = 30;
+static const double against_tolerance = 1.02, against_seconds = 30;
 
 // Compares every row with the baseline's. The caller frees the result.
 static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
@@ -230,20 +230,13 @@ static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
     RowComparison *comparisons = memory_allocate_zeroed(set->count, sizeof *comparisons);
     for (size_t i = 0; i < set->count; i++) {
         const BenchRow *row = &set->rows[i];
-        ReportTimes old_wall, wall = {&row->times.frame, &set->calibration.wall};
-        ReportTimes old_processor, processor = {&row->times.processor, &set->calibration.processor};
-        RowComparison *comparison = &comparisons[i];
-        if (row->failure || !baseline_find(baseline, &row->key, &old_wall, &old_processor)) {
-            comparison->why_not = "the baseline has no such row";
-            continue;
-        }
-        comparison->has_processor = bench->open.compute.device->type & CL_DEVICE_TYPE_CPU;
-        const size_t count = set->count * (comparison->has_processor ? 2 : 1);
-        comparison->frame = comparison_of_reports(wall, old_wall, count, tolerance);
-        comparison->verdict = comparison->frame.verdict;
-        if (!comparison->has_processor) continue;
-        comparison->processor = comparison_of_reports(processor, old_processor, count, tolerance);
-        comparison->verdict = verdict_of_row(comparison->frame.verdict, comparison->processor.verdict);
+        RowTimes older, newer = {{&row->times.frame, &set->calibration.wall},
+                                 {&row->times.processor, &set->calibration.processor}};
+        if (!row->failure && baseline_find(baseline, &row->key, &older.wall, &older.processor))
+            comparisons[i] = row_compare(
+                &newer, &older, bench->open.compute.device->type & CL_DEVICE_TYPE_CPU, set->count, tolerance);
+        else
+            comparisons[i].why_not = "the baseline has no such row";
     }
     return comparisons;
 }
@@ -268,17 +261,17 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         fputs("glint bench: no row could be measured\n", stderr);
         status = EXIT_USER;
     } else if (baseline) {
-        const char *board = baseline_board(baseline);
-        if (strcmp(baseline_device(baseline), device->name) != 0)
+        const char *board = baseline->board;
+        if (strcmp(baseline->device, device->name) != 0)
             fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
-                    baseline_device(baseline));
+                    baseline->device);
         else if (board[0] != '\0' && strcmp(board, device->board) != 0)
             fprintf(stderr, "glint bench: the baseline was measured on another board, \"%s\"\n", board);
         struct utsname host = {0};
         uname(&host);
-        if (strcmp(baseline_host(baseline), host.nodename) != 0)
+        if (strcmp(baseline->host, host.nodename) != 0)
             fprintf(stderr, "glint bench: the baseline was measured on another host, \"%s\"\n",
-                    baseline_host(baseline));
+                    baseline->host);
         status = comparisons_status(comparisons, set->count, options->baseline);
     }
     free(comparisons);
@@ -327,7 +320,7 @@ static int scenes_bench(Bench *bench, int argument_count, char **arguments)
     const CommonOptions *common = &options->variants.common;
     if (options->against && !options->is_worker) return against_run(bench, argument_count, arguments);
     MessageList messages = {0};
-    Baseline *baseline = options->baseline ? baseline_open(options->baseline, &messages) : NULL;
+    Baseline *baseline = options->baseline ? baseline_open(options->baseline, true, &messages) : NULL;
     messages_print(&messages, NULL);
     int status = EXIT_USER;
     if ((!options->baseline || baseline) && device_open(&bench->open, common)) {

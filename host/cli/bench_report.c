@@ -13,6 +13,19 @@
 #include <time.h>
 #include <unistd.h>
 
+RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
+                          double tolerance)
+{
+    const size_t count = row_count * (is_cpu ? 2 : 1);
+    RowComparison row = {.has_processor = is_cpu,
+                         .frame = comparison_of_reports(newer->wall, older->wall, count, tolerance)};
+    row.verdict = row.frame.verdict;
+    if (!is_cpu) return row;
+    row.processor = comparison_of_reports(newer->processor, older->processor, count, tolerance);
+    row.verdict = verdict_of_row(row.frame.verdict, row.processor.verdict);
+    return row;
+}
+
 static void ratio_print(const char *of_what, const Comparison *result, FILE *stream)
 {
     fprintf(stream, "    new over old %s time: %.3f", of_what, result->ratio);

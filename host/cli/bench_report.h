@@ -16,6 +16,16 @@ typedef struct {
     const char *why_not;  // NULL if there are comparisons
 } RowComparison;
 
+// The times that a report has for a row.
+typedef struct {
+    ReportTimes wall, processor;
+} RowTimes;
+
+// Compares a row of two reports, one of `row_count` that are compared. `is_cpu` is whether the device is one,
+// so that the process's processor time counts.
+RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
+                          double tolerance);
+
 typedef struct {
     const Device *device;
     const VariantSet *set;

@@ -3,28 +3,15 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
-#include "host/measure/calibration.h"
-#include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct {
-    const char *scene_hash, *precision, *bvh;
-    const char *variant; // "" if the report has none
-    uint32_t lanes, width, height, samples, bounces;
-    Series frame, processor;
-} BaselineRow;
+const double baseline_tolerance = 1.1;
 
-enum { HASH_DIGITS = 16 };
-
-struct Baseline {
-    BaselineRow *items;
-    size_t count, capacity;
-    json_t *report; // owns the texts of the rows
-    Calibration calibration;
-};
+// What glint report writes instead of the name of a host.
+static const char scrubbed_host[] = "HOST";
 
 // Returns a text, or "" if the value is not a text.
 static const char *text_of(const json_t *value)
@@ -58,28 +45,92 @@ static Series times_of(const json_t *values)
     return times;
 }
 
-static void rows_read(Baseline *baseline, const json_t *runs)
+// Returns 16 hexadecimal digits as a number, or 0 if the value is not such a text.
+static uint64_t hash_of(const json_t *value)
 {
+    enum { HASH_DIGITS = 16 };
+    const char *text = text_of(value);
+    return strspn(text, "0123456789abcdef") == HASH_DIGITS && text[HASH_DIGITS] == '\0'
+               ? strtoull(text, NULL, 16)
+               : 0;
+}
+
+static double seconds_of(const json_t *summary, const char *member)
+{
+    return 1e-3 * json_number_value(json_object_get(summary, member));
+}
+
+// Returns the summary of the times if there are any, else that of the report.
+static Summary summary_of(const Series *times, const json_t *summary)
+{
+    if (times->count > 0) return series_summarize(times);
+    const double median = seconds_of(summary, "median");
+    if (!(median > 0 && median < HUGE_VAL)) return (Summary){0};
+    return (Summary){.min = seconds_of(summary, "min"),
+                     .median = median,
+                     .max = seconds_of(summary, "max"),
+                     .count = count_of(json_object_get(summary, "runs"))};
+}
+
+static BaselineRow row_of(const json_t *run)
+{
+    const json_t *size = json_object_get(run, "size");
+    BaselineRow row = {
+        .key =
+            {
+                .scene = text_of(json_object_get(run, "scene")),
+                .scene_hash = hash_of(json_object_get(run, "scene_hash")),
+                .precision = text_of(json_object_get(run, "precision")),
+                .bvh = text_of(json_object_get(run, "bvh")),
+                .variant = text_of(json_object_get(run, "variant")),
+                .lanes = count_of(json_object_get(run, "lanes")),
+                .width = count_of(json_array_get(size, 0)),
+                .height = count_of(json_array_get(size, 1)),
+                .samples = count_of(json_object_get(run, "samples")),
+                .bounces = count_of(json_object_get(run, "bounces")),
+            },
+        .failure = text_of(json_object_get(run, "reason")),
+        .rays_per_second = 1e6 * json_number_value(json_object_get(run, "mrays_per_s")),
+        .frame_times = times_of(json_object_get(run, "frame_samples_ms")),
+        .processor_times = times_of(json_object_get(run, "processor_samples_ms")),
+    };
+    row.frame = summary_of(&row.frame_times, json_object_get(run, "frame_ms"));
+    Series kernel_times = times_of(json_object_get(run, "kernel_samples_ms"));
+    row.kernel = summary_of(&kernel_times, json_object_get(run, "kernel_ms"));
+    series_free(&kernel_times);
+    return row;
+}
+
+static Baseline *baseline_of(json_t *report)
+{
+    const json_t *device = json_object_get(report, "device"),
+                 *calibration = json_object_get(report, "calibration"), *run;
+    Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);
+    *baseline = (Baseline){
+        .json = report,
+        .calibration =
+            {
+                .wall = times_of(json_object_get(calibration, "samples_ms")),
+                .processor = times_of(json_object_get(calibration, "processor_samples_ms")),
+            },
+        .is_calibrated = json_number_value(json_object_get(calibration, "rounds")) == CALIBRATION_ROUNDS,
+        .date = text_of(json_object_get(report, "date")),
+        .version = text_of(json_object_get(report, "glint")),
+        .commit = text_of(json_object_get(json_object_get(report, "build"), "commit")),
+        .host = text_of(json_object_get(json_object_get(report, "host"), "name")),
+        .device = text_of(json_object_get(device, "name")),
+        .device_type = text_of(json_object_get(device, "type")),
+        .board = text_of(json_object_get(device, "board")),
+        .platform = text_of(json_object_get(device, "platform")),
+        .driver = text_of(json_object_get(device, "driver")),
+    };
     size_t i;
-    json_t *run;
-    json_array_foreach(runs, i, run)
+    json_array_foreach(json_object_get(report, "runs"), i, run)
     {
-        const json_t *size = json_object_get(run, "size");
-        BaselineRow row = {
-            .scene_hash = text_of(json_object_get(run, "scene_hash")),
-            .precision = text_of(json_object_get(run, "precision")),
-            .bvh = text_of(json_object_get(run, "bvh")),
-            .variant = text_of(json_object_get(run, "variant")),
-            .lanes = count_of(json_object_get(run, "lanes")),
-            .width = count_of(json_array_get(size, 0)),
-            .height = count_of(json_array_get(size, 1)),
-            .samples = count_of(json_object_get(run, "samples")),
-            .bounces = count_of(json_object_get(run, "bounces")),
-            .frame = times_of(json_object_get(run, "frame_samples_ms")),
-            .processor = times_of(json_object_get(run, "processor_samples_ms")),
-        };
+        const BaselineRow row = row_of(run);
         array_push(*baseline, row);
     }
+    return baseline;
 }
 
 static void *json_allocate(size_t size)
@@ -87,7 +138,7 @@ static void *json_allocate(size_t size)
     return memory_allocate(size, 1);
 }
 
-Baseline *baseline_open(const char *path, MessageList *messages)
+Baseline *baseline_open(const char *path, bool needs_calibration, MessageList *messages)
 {
     Text text = {0};
     if (!text_read_file(&text, path, messages)) {
@@ -106,66 +157,47 @@ Baseline *baseline_open(const char *path, MessageList *messages)
         json_decref(report);
         return NULL;
     }
-    const json_t *calibration = json_object_get(report, "calibration");
-    const double rounds = json_number_value(json_object_get(calibration, "rounds"));
-    if (rounds != CALIBRATION_ROUNDS) {
-        message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d; re-measure it", path,
-                      rounds, CALIBRATION_ROUNDS);
-        json_decref(report);
-        return NULL;
-    }
-    Baseline *baseline = memory_allocate_zeroed(1, sizeof *baseline);
-    baseline->report = report;
-    baseline->calibration = (Calibration){
-        .wall = times_of(json_object_get(calibration, "samples_ms")),
-        .processor = times_of(json_object_get(calibration, "processor_samples_ms")),
-    };
-    rows_read(baseline, runs);
-    return baseline;
+    Baseline *baseline = baseline_of(report);
+    if (!needs_calibration || baseline->is_calibrated) return baseline;
+    message_error(messages, "'%s' was calibrated by %.0f rounds instead of %d; re-measure it", path,
+                  json_number_value(json_object_get(json_object_get(report, "calibration"), "rounds")),
+                  CALIBRATION_ROUNDS);
+    baseline_close(baseline);
+    return NULL;
 }
 
 void baseline_close(Baseline *baseline)
 {
     if (!baseline) return;
     for (size_t i = 0; i < baseline->count; i++) {
-        series_free(&baseline->items[i].frame);
-        series_free(&baseline->items[i].processor);
+        series_free(&baseline->items[i].frame_times);
+        series_free(&baseline->items[i].processor_times);
     }
     free(baseline->items);
     calibration_free(&baseline->calibration);
-    json_decref(baseline->report);
+    json_decref(baseline->json);
     free(baseline);
-}
-
-const char *baseline_device(const Baseline *baseline)
-{
-    return text_of(json_object_get(json_object_get(baseline->report, "device"), "name"));
-}
-
-const char *baseline_board(const Baseline *baseline)
-{
-    return text_of(json_object_get(json_object_get(baseline->report, "device"), "board"));
-}
-
-const char *baseline_host(const Baseline *baseline)
-{
-    return text_of(json_object_get(json_object_get(baseline->report, "host"), "name"));
 }
 
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor)
 {
-    char hash[HASH_DIGITS + 1];
-    snprintf(hash, sizeof hash, "%016" PRIx64, key->scene_hash);
     for (size_t i = 0; i < baseline->count; i++) {
         const BaselineRow *row = &baseline->items[i];
-        if (strcmp(row->scene_hash, hash) != 0 || strcmp(row->precision, key->precision) != 0 ||
-            strcmp(row->bvh, key->bvh) != 0 || strcmp(row->variant, key->variant ? key->variant : "") != 0 ||
-            row->lanes != key->lanes || row->width != key->width || row->height != key->height ||
-            row->samples != key->samples || row->bounces != key->bounces || row->frame.count == 0)
-            continue;
-        *wall = (ReportTimes){&row->frame, &baseline->calibration.wall};
-        *processor = (ReportTimes){&row->processor, &baseline->calibration.processor};
+        if (!bench_key_equal(&row->key, key) || row->frame_times.count == 0) continue;
+        *wall = (ReportTimes){&row->frame_times, &baseline->calibration.wall};
+        *processor = (ReportTimes){&row->processor_times, &baseline->calibration.processor};
         return true;
     }
     return false;
+}
+
+const char *baselines_why_not_compared(const Baseline *newer, const Baseline *older)
+{
+    if (strcmp(newer->device, older->device) != 0) return "it was measured on another device";
+    if (strcmp(newer->board, older->board) != 0) return "it was measured on another board";
+    if (strcmp(newer->host, older->host) != 0) return "it was measured on another host";
+    if (newer->host[0] == '\0' || strcmp(newer->host, scrubbed_host) == 0) return "the hosts are unknown";
+    if (!newer->is_calibrated || !older->is_calibrated)
+        return "it or the first report has another calibration or none";
+    return NULL;
 }

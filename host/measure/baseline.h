@@ -1,23 +1,44 @@
-// Reads an earlier report of glint bench, to compare a new one with it.
+// Reads earlier reports of glint bench, to compare others with them.
 #pragma once
 
 #include "host/base/message.h"
 #include "host/measure/bench.h"
+#include "host/measure/calibration.h"
 #include "host/measure/comparison.h"
-
-typedef struct Baseline Baseline;
 
 enum { BENCH_SCHEMA = 6 }; // the version of the reports' schema
 
-// Reads a file that glint bench --json wrote. Returns NULL with a message if it is not such a report, or was
-// calibrated by another workload.
-Baseline *baseline_open(const char *path, MessageList *messages);
+// The ratio of times up to which rows of two reports count as the same, unless the user chooses another.
+extern const double baseline_tolerance;
+
+// A row of a report, with times in seconds. What the report lacks is zeros, or "" for texts.
+typedef struct {
+    BenchKey key;
+    const char *failure;   // why the row has no times
+    Summary frame, kernel; // without quartiles if the report has only a summary
+    double rays_per_second;
+    Series frame_times, processor_times;
+} BaselineRow;
+
+typedef struct {
+    BaselineRow *items;
+    size_t count, capacity;
+    Calibration calibration;
+    // Where the report is from, each "" if it is unknown.
+    const char *date, *version, *commit, *host;
+    const char *device, *device_type, *board, *platform, *driver;
+    bool is_calibrated;  // by this program's workload
+    struct json_t *json; // owns the texts
+} Baseline;
+
+// Reads a file that glint bench --json wrote. Returns NULL with a message if it is not such a report, or if
+// it needs a calibration and was calibrated by another workload.
+Baseline *baseline_open(const char *path, bool needs_calibration, MessageList *messages);
 void baseline_close(Baseline *baseline);
-// Return the names of the device, its board and the host, or "" if the report has none.
-const char *baseline_device(const Baseline *baseline);
-const char *baseline_board(const Baseline *baseline);
-const char *baseline_host(const Baseline *baseline);
 
 // Finds the wall and processor times of the row with this key. The scene's path is ignored. Returns false if
 // the baseline lacks the row.
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor);
+
+// Returns why no claim can be made about which report's rows are faster, or NULL if it can.
+const char *baselines_why_not_compared(const Baseline *newer, const Baseline *older);

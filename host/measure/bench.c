@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 const char *const bench_ray_names[RAYS_COUNT] = {"camera", "camera_hits", "reflected", "refracted", "shadow"};
 
@@ -91,6 +92,15 @@ Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count)
     const Series first = {.items = all->items, .count = half},
                  last = {.items = all->items + (all->count - half), .count = half};
     return comparison_of_rounds(&last, &first, row_count, drift_tolerance);
+}
+
+bool bench_key_equal(const BenchKey *a, const BenchKey *b)
+{
+    return a->scene_hash == b->scene_hash && strcmp(a->precision, b->precision) == 0 &&
+           strcmp(a->bvh, b->bvh) == 0 &&
+           strcmp(a->variant ? a->variant : "", b->variant ? b->variant : "") == 0 && a->lanes == b->lanes &&
+           a->width == b->width && a->height == b->height && a->samples == b->samples &&
+           a->bounces == b->bounces;
 }
 
 void bench_row_free(BenchRow *row)

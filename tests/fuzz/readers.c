@@ -193,7 +193,7 @@ static void cache_fuzz(const char *path, const Source *source, MessageList *mess
 static void baseline_fuzz(const char *path, const Source *source, MessageList *messages)
 {
     (void)source;
-    Baseline *baseline = baseline_open(path, messages);
+    Baseline *baseline = baseline_open(path, false, messages);
     if (baseline) baseline_close(baseline);
 }
 
