@@ -335,7 +335,7 @@ static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)
 {
     if (!accuracy->options.page_path) return true;
     Text page = {0};
-    page_append(&page, accuracy_json(report), accuracy_page_extras(report));
+    page_append(&page, "page.html", accuracy_json(report), accuracy_page_extras(report));
     bool written = output_write(&accuracy->page, page.items, page.count, &accuracy->messages) &&
                    output_commit(&accuracy->page, &accuracy->messages);
     text_free(&page);

@@ -31,9 +31,9 @@ static void json_embed(Text *page, Json *json)
     text_free(&text);
 }
 
-void page_append(Text *page, Json *report, Json *extras)
+void page_append(Text *page, const char *template, Json *report, Json *extras)
 {
-    const char *from = page_file("page.html", strlen("page.html")), *open;
+    const char *from = page_file(template, strlen(template)), *open;
     while ((open = strstr(from, "{{"))) {
         const char *name = open + 2, *close = strstr(name, "}}");
         size_t length = (size_t)(close - name);

@@ -13,16 +13,6 @@ const kinds = [
   { name: "normal", title: "Normal", unit: "radians, 99.9 % within", error: (errors) => errors.normal.p99_9 },
 ];
 
-// Maps `low` to `from` and `high` to `to`.
-const logarithmic = (low, high, from, to) =>
-  (value) => from + ((to - from) * Math.log10(value / low)) / Math.log10(high / low);
-
-// 1, 2 and 5 times powers of ten, from the last not above `low` to the first above `high`.
-function timeTicks(low, high) {
-  const ticks = Array.from({ length: 36 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`));
-  return ticks.slice(ticks.findLastIndex((tick) => tick <= low), ticks.findIndex((tick) => tick > high) + 1);
-}
-
 // The measured variants that have this kind's error.
 function pointsOf(scene, kind) {
   return scene.variants.flatMap((variant, index) => {
@@ -37,7 +27,7 @@ function layOut(scene, points, width, height) {
   const errors = points.map((point) => point.error).filter((error) => error > 0);
   const left = 36, right = width - 12, top = 40, bottom = height - 32;
   const hasFloor = errors.length < points.length, end = hasFloor ? bottom - 20 : bottom;
-  const ticks = timeTicks(Math.min(...times.map((time) => time.min)), Math.max(...times.map((time) => time.max)));
+  const ticks = decadeTicks(Math.min(...times.map((time) => time.min)), Math.max(...times.map((time) => time.max)));
   const lowest = errors.length ? Math.floor(Math.log10(Math.min(...errors))) : 0;
   const highest = errors.length ? Math.max(lowest + 1, Math.ceil(Math.log10(Math.max(...errors)))) : lowest;
   const aboveFloor = logarithmic(10 ** lowest, 10 ** highest, end, top);
