@@ -30,7 +30,7 @@ static const struct {
     {"certify", command_certify, "compare an image with a reference of quadruple precision"},
     {"verify", command_verify, "run the hard cases on a device"},
     {"golden", command_golden, "write or check the hashes of images at strict"},
-    {"report", command_report, "write an archive for a bug report"},
+    {"report", command_report, "write an archive for a bug report, or compare reports of bench"},
     {"cache", command_cache, "list, check or empty the kernel cache"},
 };
 

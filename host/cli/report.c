@@ -1,4 +1,5 @@
 // glint report runs the commands that a bug report needs, each in a separate process, and writes one archive.
+// With reports of glint bench it compares these instead.
 #include "host/api/version.h"
 #include "host/base/archive.h"
 #include "host/base/array.h"
@@ -10,6 +11,7 @@
 #include "host/cli/progress.h"
 #include "host/cli/report_scrub.h"
 #include "host/cli/report_versions.h"
+#include "host/cli/side_by_side.h"
 #include "host/cli/variants.h"
 #include <dirent.h>
 #include <errno.h>
@@ -25,6 +27,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+enum { OPTION_HTML = OPTION_BEYOND_VARIANTS };
+
 static const struct option long_options[] = {
     {"output", required_argument, NULL, 'o'},
     {"device", required_argument, NULL, OPTION_DEVICE},
@@ -32,12 +36,14 @@ static const struct option long_options[] = {
     {"lanes", required_argument, NULL, OPTION_LANES},
     DRIVER_LONG_OPTIONS,
     {"seconds", required_argument, NULL, OPTION_SECONDS},
+    {"html", required_argument, NULL, OPTION_HTML},
     {"help", no_argument, NULL, 'h'},
     {0},
 };
 
 static const char help_text[] =
-    "usage: glint report [CASE...] [OPTIONS]\n\n"
+    "usage: glint report [CASE...] [OPTIONS]\n"
+    "       glint report REPORT.json... [--html FILE]\n\n"
     "Writes an archive for a bug report: what glint devices, its passports, glint verify --quick and a small "
     "glint bench\nprint, the text and build log of every kernel, and versions. All kernels are built, which "
     "takes minutes. A step that\nfails or crashes is named in index.txt. Names of the user, the host and "
@@ -45,7 +51,11 @@ static const char help_text[] =
     "  -o, --output FILE     the archive (default: glint-report.tar.gz)\n"
     "      --precision P     single, strict or double (default: all for verify, single for bench)\n"
     "      --seconds MAX     time limit of each step (default: 1800)\n" //
-    HELP_DEVICE HELP_LANES HELP_DRIVER HELP_HELP;
+    HELP_DEVICE HELP_LANES HELP_DRIVER "\nWith reports of glint bench --json instead, shows their rows side "
+    "by side: of several devices, versions or days. "
+    "A\nrow is faster or slower than in the first report only where both are of the same device and host.\n\n"
+    "      --html FILE       self-contained HTML page of this comparison\n" //
+    HELP_HELP;
 
 static const char scene_text[] = "# What glint bench times for glint report.\n"
                                  "camera: {position: [0, 2, -6], look_at: [0, 0.5, 0], fov: 50}\n"
@@ -59,12 +69,13 @@ enum { PASSED_MAX = 12, ARGUMENTS_MAX = 40 };
 static const double step_seconds_max = 1800;
 
 typedef struct {
-    const char *output;
-    char *passed[PASSED_MAX]; // options for verify and bench
+    const char *output, *page; // NULL if not given
+    char *passed[PASSED_MAX];  // options for verify and bench
     size_t passed_count;
     char *const *cases;
     size_t case_count;
     double seconds;
+    bool is_for_archive; // an option was given that only the archive has
 } ReportChoice;
 
 // A command that the report runs in its folder. It prints to the file `name`.`prints`.
@@ -118,6 +129,11 @@ static bool option_take(ReportChoice *choice, int option, int index, char *value
 {
     CommonOptions checked = {0};
     bool valid = true;
+    if (option == OPTION_HTML) {
+        choice->page = value;
+        return true;
+    }
+    choice->is_for_archive = true;
     if (option == 'o') {
         choice->output = value;
     } else if (option == OPTION_SECONDS) {
@@ -388,6 +404,26 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     return status;
 }
 
+// Compares reports of glint bench if the arguments name such. Returns the exit status, or OPTIONS_READ if
+// they ask for an archive.
+static int reports_compare(const ReportChoice *choice)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < choice->case_count; i++) {
+        const char *ending = strrchr(choice->cases[i], '.');
+        count += ending && strcmp(ending, ".json") == 0;
+    }
+    if (count == 0 && !choice->page) return OPTIONS_READ;
+    const char *what = count == 0 ? "--html needs reports of glint bench, whose names end in .json"
+                       : count < choice->case_count ? "reports (.json) and cases cannot be combined"
+                       : choice->is_for_archive     ? "--html is the only option for reports (.json)"
+                       : count > SIDE_REPORTS_MAX   ? "at most 26 reports can be compared"
+                       : choice->page && strcmp(choice->page, "-") == 0 ? "--html needs the name of a file"
+                                                                        : NULL;
+    return what ? option_usage_fault("report", what)
+                : side_by_side_run(choice->cases, choice->case_count, choice->page);
+}
+
 int command_report(int argument_count, char **arguments)
 {
     ReportChoice choice = {.output = "glint-report.tar.gz", .seconds = step_seconds_max};
@@ -400,6 +436,7 @@ int command_report(int argument_count, char **arguments)
                                                                : EXIT_USER;
     choice.cases = arguments + optind;
     choice.case_count = (size_t)(argument_count - optind);
+    if (status == OPTIONS_READ) status = reports_compare(&choice);
     OutputFile output;
     MessageList messages = {0};
     if (status == OPTIONS_READ && !output_open(&output, choice.output, &messages)) status = EXIT_USER;

@@ -1,0 +1,54 @@
+// Compares reports of glint bench row by row: of several devices, versions or days.
+#pragma once
+
+#include "host/base/json.h"
+#include "host/cli/bench_report.h"
+#include "host/measure/baseline.h"
+
+enum { SIDE_REPORTS_MAX = 26, SIDE_COLUMNS = 8 }; // a report is named by a letter
+
+// A report and what its rows are in total next to those of the first one.
+typedef struct {
+    const char *path;
+    Baseline *baseline;
+    const char *why_not;                 // why none of its rows gets a verdict, or NULL
+    double mean_ratio;                   // geometric, of frame times
+    size_t ratio_count;                  // of rows that both have
+    size_t verdicts[VERDICT_FASTER + 1]; // rows by verdict
+} SideReport;
+
+// A report's times of a row next to those of the first report.
+typedef struct {
+    const BaselineRow *row;   // NULL if the report does not have the row
+    double ratio;             // to the first report's frame time; 0 if one of both has none
+    double kernel_ratio;      // of kernel times, or 0
+    RowComparison comparison; // if there is a ratio; `why_not` states why it has neither interval nor verdict
+} SideCell;
+
+typedef struct {
+    SideReport reports[SIDE_REPORTS_MAX];
+    size_t report_count;
+    SideCell *cells; // row by row, one of each report
+    size_t row_count;
+    bool is_shown[SIDE_COLUMNS]; // the columns of a row's name in which rows differ
+} SideBySide;
+
+// Reads reports, prints their comparison and writes it as a page unless `page` is NULL. Returns the exit
+// status.
+int side_by_side_run(char *const *paths, size_t count, const char *page);
+
+// Reads and compares reports. Returns false with messages if one cannot be read. side_by_side_close frees
+// what was read in either case.
+bool side_by_side_open(SideBySide *side, char *const *paths, size_t count, MessageList *messages);
+void side_by_side_close(SideBySide *side);
+// Returns the first cell of a row that has one.
+const SideCell *side_first(const SideBySide *side, size_t row);
+static inline SideCell *side_cell(const SideBySide *side, size_t row, size_t report)
+{
+    return &side->cells[row * side->report_count + report];
+}
+// Appends what a column of a row's name has, the columns being the first of bench_table.
+void side_column_append(Text *text, const BenchKey *key, size_t column);
+
+void side_by_side_print(const SideBySide *side, FILE *stream);
+Json *side_by_side_json(const SideBySide *side); // what the page draws; the caller closes it

@@ -1,0 +1,256 @@
+// The text of a comparison of reports, and the JSON that its page draws.
+#include "host/cli/report_json.h"
+#include "host/cli/side_by_side.h"
+#include <string.h>
+
+static char report_letter(size_t report)
+{
+    return (char)('A' + report);
+}
+
+// Appends the columns in which rows do not differ, such as "size 160x90, precision single".
+static void constants_append(Text *text, const SideBySide *side)
+{
+    for (size_t column = 0; column < SIDE_COLUMNS; column++) {
+        if (side->is_shown[column]) continue;
+        Text value = {0};
+        side_column_append(&value, &side_first(side, 0)->row->key, column);
+        if (value.count > 0)
+            text_appendf(text, "%s%s %s", text->count > 0 ? ", " : "", bench_table.columns[column].heading,
+                         text_c(&value));
+        text_free(&value);
+    }
+}
+
+// Returns milliseconds with about four digits.
+static ShortText milliseconds(double seconds)
+{
+    const double value = 1e3 * seconds;
+    ShortText text;
+    snprintf(text.text, sizeof text.text, "%.*f",
+             value < 10     ? 4
+             : value < 100  ? 3
+             : value < 1000 ? 2
+                            : 1,
+             value);
+    return text;
+}
+
+static void report_print(const SideBySide *side, size_t index, FILE *stream)
+{
+    const SideReport *report = &side->reports[index];
+    const Baseline *baseline = report->baseline;
+    fprintf(stream, "%c  %s: %s, glint %s", report_letter(index), report->path, baseline->date,
+            baseline->version);
+    if (baseline->commit[0] != '\0') fprintf(stream, ", commit %.12s", baseline->commit);
+    fprintf(stream, "\n   %s%s%s%s, %s %s", baseline->device, baseline->board[0] != '\0' ? " (" : "",
+            baseline->board, baseline->board[0] != '\0' ? ")" : "", baseline->platform, baseline->driver);
+    if (baseline->host[0] != '\0') fprintf(stream, ", host %s", baseline->host);
+    fprintf(stream, "\n   %zu row%s", baseline->count, text_plural(baseline->count));
+    if (index > 0) fprintf(stream, ", %zu with times in A and here", report->ratio_count);
+    if (report->ratio_count > 0)
+        fprintf(stream, ": %.3g times A's frame time (geometric mean)", report->mean_ratio);
+    for (size_t verdict = VERDICT_FASTER + 1; verdict-- > 0;)
+        if (report->verdicts[verdict] > 0)
+            fprintf(stream, ", %zu %s", report->verdicts[verdict], verdict_names[verdict]);
+    fputc('\n', stream);
+    if (report->why_not) fprintf(stream, "   no verdicts, since %s\n", report->why_not);
+}
+
+// Returns the widths of the columns of a row's name, 0 for those that are not shown.
+static void widths_find(const SideBySide *side, int widths[SIDE_COLUMNS])
+{
+    for (size_t column = 0; column < SIDE_COLUMNS; column++) {
+        widths[column] = side->is_shown[column] ? (int)strlen(bench_table.columns[column].heading) : 0;
+        for (size_t i = 0; side->is_shown[column] && i < side->row_count * side->report_count; i++) {
+            Text text = {0};
+            if (side->cells[i].row) side_column_append(&text, &side->cells[i].row->key, column);
+            if ((int)text.count > widths[column]) widths[column] = (int)text.count;
+            text_free(&text);
+        }
+    }
+}
+
+static void ratio_print(const SideCell *cell, const SideReport *report, FILE *stream)
+{
+    const RowComparison *comparison = &cell->comparison;
+    fprintf(stream, "  %.*f", cell->ratio < 0.01 ? 5 : cell->ratio < 0.1 ? 4 : 3, cell->ratio);
+    if (comparison->why_not && !report->why_not)
+        fprintf(stream, ", no verdict since %s", comparison->why_not);
+    if (!comparison->why_not)
+        fprintf(stream, " (%.3f to %.3f) %s", comparison->frame.low, comparison->frame.high,
+                verdict_names[comparison->verdict]);
+}
+
+static void cell_print(const SideCell *cell, const SideReport *report, FILE *stream)
+{
+    if (!cell->row || cell->row->frame.count == 0) {
+        fprintf(stream, "%10s", "-");
+        if (cell->row)
+            fprintf(stream, "  %s", cell->row->failure[0] != '\0' ? cell->row->failure : "no times");
+        return;
+    }
+    const Summary *frame = &cell->row->frame, *kernel = &cell->row->kernel;
+    Text quartiles = {0};
+    if (frame->lower_quartile > 0)
+        text_appendf(&quartiles, "%s to %s", milliseconds(frame->lower_quartile).text,
+                     milliseconds(frame->upper_quartile).text);
+    fprintf(stream, "%10s  %-20s %10s", milliseconds(frame->median).text,
+            quartiles.count > 0 ? text_c(&quartiles) : "-",
+            kernel->count > 0 ? milliseconds(kernel->median).text : "-");
+    text_free(&quartiles);
+    if (cell->ratio > 0) ratio_print(cell, report, stream);
+}
+
+// Prints the name of a row before its first report. Before the others, only columns that differ from it are
+// printed, which are lanes.
+static void name_print(const SideBySide *side, const int widths[SIDE_COLUMNS], const BenchKey *key,
+                       const BenchKey *above, FILE *stream)
+{
+    for (size_t column = 0; column < SIDE_COLUMNS; column++) {
+        if (!side->is_shown[column]) continue;
+        Text text = {0}, text_above = {0};
+        side_column_append(&text, key, column);
+        if (above) side_column_append(&text_above, above, column);
+        const bool is_repeated = above && (column == 0 || strcmp(text_c(&text), text_c(&text_above)) == 0);
+        fprintf(stream, "%-*s  ", widths[column], is_repeated ? "" : text_c(&text));
+        text_free(&text);
+        text_free(&text_above);
+    }
+}
+
+static void row_print(const SideBySide *side, const int widths[SIDE_COLUMNS], size_t row, FILE *stream)
+{
+    const BenchKey *first = &side_first(side, row)->row->key;
+    for (size_t i = 0; i < side->report_count; i++) {
+        const SideCell *cell = side_cell(side, row, i);
+        name_print(side, widths, cell->row ? &cell->row->key : first, i > 0 ? first : NULL, stream);
+        fprintf(stream, "%c ", report_letter(i));
+        cell_print(cell, &side->reports[i], stream);
+        fputc('\n', stream);
+    }
+}
+
+void side_by_side_print(const SideBySide *side, FILE *stream)
+{
+    int widths[SIDE_COLUMNS];
+    Text constants = {0};
+    for (size_t i = 0; i < side->report_count; i++)
+        report_print(side, i, stream);
+    constants_append(&constants, side);
+    if (constants.count > 0) fprintf(stream, "\n%s\n", text_c(&constants));
+    text_free(&constants);
+    fputc('\n', stream);
+    widths_find(side, widths);
+    for (size_t column = 0; column < SIDE_COLUMNS; column++)
+        if (side->is_shown[column])
+            fprintf(stream, "%-*s  ", widths[column], bench_table.columns[column].heading);
+    fprintf(stream, "  %10s  %-20s %10s%s\n", "frame ms", "quartiles", "kernel ms",
+            side->report_count > 1 ? "  times A's frame time" : "");
+    for (size_t row = 0; row < side->row_count; row++)
+        row_print(side, widths, row, stream);
+}
+
+static void report_json(Json *json, const SideReport *report)
+{
+    const Baseline *baseline = report->baseline;
+    json_begin_object(json, NULL);
+    json_text(json, "file", report->path);
+    json_text(json, "date", baseline->date);
+    json_text(json, "glint", baseline->version);
+    json_text(json, "commit", baseline->commit);
+    json_text(json, "device", baseline->device);
+    json_text(json, "board", baseline->board);
+    json_text(json, "platform", baseline->platform);
+    json_text(json, "driver", baseline->driver);
+    json_text(json, "host", baseline->host);
+    json_int64(json, "rows", (int64_t)baseline->count);
+    json_int64(json, "common", (int64_t)report->ratio_count);
+    if (report->ratio_count > 0) json_number(json, "mean_ratio", report->mean_ratio);
+    if (report->why_not) json_text(json, "why_not", report->why_not);
+    for (size_t verdict = 0; verdict <= VERDICT_FASTER; verdict++)
+        json_int64(json, verdict_names[verdict], (int64_t)report->verdicts[verdict]);
+    json_end(json);
+}
+
+static void times_summary_json(Json *json, const char *key, const Summary *seconds)
+{
+    if (seconds->count == 0) return;
+    json_begin_object(json, key);
+    json_number(json, "min", 1e3 * seconds->min);
+    json_number(json, "median", 1e3 * seconds->median);
+    json_number(json, "max", 1e3 * seconds->max);
+    if (seconds->lower_quartile > 0) {
+        json_number(json, "lower_quartile", 1e3 * seconds->lower_quartile);
+        json_number(json, "upper_quartile", 1e3 * seconds->upper_quartile);
+    }
+    json_int64(json, "runs", (int64_t)seconds->count);
+    json_end(json);
+}
+
+static void cell_json(Json *json, const SideCell *cell)
+{
+    if (!cell->row) {
+        json_none(json, NULL);
+        return;
+    }
+    const RowComparison *comparison = &cell->comparison;
+    json_begin_object(json, NULL);
+    json_int64(json, "lanes", cell->row->key.lanes);
+    if (cell->row->failure[0] != '\0') json_text(json, "failure", cell->row->failure);
+    times_summary_json(json, "frame_ms", &cell->row->frame);
+    times_summary_json(json, "kernel_ms", &cell->row->kernel);
+    if (cell->row->rays_per_second > 0) json_number(json, "mrays_per_s", 1e-6 * cell->row->rays_per_second);
+    if (cell->ratio > 0) json_number(json, "ratio", cell->ratio);
+    if (cell->kernel_ratio > 0) json_number(json, "kernel_ratio", cell->kernel_ratio);
+    if (cell->ratio > 0 && comparison->why_not) json_text(json, "why_not", comparison->why_not);
+    if (cell->ratio > 0 && !comparison->why_not) {
+        json_number(json, "low", comparison->frame.low);
+        json_number(json, "high", comparison->frame.high);
+        json_text(json, "verdict", verdict_names[comparison->verdict]);
+    }
+    json_end(json);
+}
+
+static void row_json(Json *json, const SideBySide *side, size_t row)
+{
+    json_begin_object(json, NULL);
+    json_begin_array(json, "name");
+    for (size_t column = 0; column < SIDE_COLUMNS; column++) {
+        Text text = {0};
+        if (!side->is_shown[column]) continue;
+        side_column_append(&text, &side_first(side, row)->row->key, column);
+        json_text(json, NULL, text_c(&text));
+        text_free(&text);
+    }
+    json_end(json);
+    json_begin_array(json, "cells");
+    for (size_t i = 0; i < side->report_count; i++)
+        cell_json(json, side_cell(side, row, i));
+    json_end(json);
+    json_end(json);
+}
+
+Json *side_by_side_json(const SideBySide *side)
+{
+    Json *json = json_open();
+    Text constants = {0};
+    json_number(json, "confidence", comparison_confidence);
+    json_number(json, "tolerance", baseline_tolerance);
+    json_begin_array(json, "reports");
+    for (size_t i = 0; i < side->report_count; i++)
+        report_json(json, &side->reports[i]);
+    json_end(json);
+    json_begin_array(json, "columns");
+    for (size_t column = 0; column < SIDE_COLUMNS; column++)
+        if (side->is_shown[column]) json_text(json, NULL, bench_table.columns[column].heading);
+    json_end(json);
+    constants_append(&constants, side);
+    json_text(json, "constants", text_c(&constants));
+    text_free(&constants);
+    json_begin_array(json, "rows");
+    for (size_t row = 0; row < side->row_count; row++)
+        row_json(json, side, row);
+    json_end(json);
+    return json;
+}
