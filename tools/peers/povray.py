@@ -3,6 +3,8 @@ import re
 
 from scene import cross, unit
 
+SETTINGS = "#version 3.7;\nglobal_settings { assumed_gamma 1 ambient_light rgb 1 max_trace_level 6 adc_bailout 0 }\n"
+
 
 def vector(values):
     return "<" + ",".join(f"{value:.9g}" for value in values) + ">"
@@ -58,18 +60,20 @@ def write_shapes(write, scene, end):
             write_shape(f"object {{ Shared matrix {vector(sum(columns, []))}", mesh.material)
 
 
-def write_scene(scene, path, size):
+def camera_text(scene, size, lens=""):
     view = unit(scene.view())
     right = unit(cross(view, scene.up()))
     up = cross(right, view)
     tall = 2 * scene.half_tangent()
+    return (f"camera {{ location {vector(scene.camera['position'])} direction {vector(view)} "
+            f"right {vector([tall * size[0] / size[1] * part for part in right])} "
+            f"up {vector([tall * part for part in up])} {lens}}}\n")
+
+
+def write_scene(scene, path, size):
     with open(path, "w") as file:
         write = file.write
-        write("#version 3.7;\nglobal_settings { assumed_gamma 1 ambient_light rgb 1 max_trace_level 6 adc_bailout 0 }\n"
-              f"background {{ rgb {vector(scene.background)} }}\n"
-              f"camera {{ location {vector(scene.camera['position'])} direction {vector(view)} "
-              f"right {vector([tall * size[0] / size[1] * part for part in right])} "
-              f"up {vector([tall * part for part in up])} }}\n")
+        write(f"{SETTINGS}background {{ rgb {vector(scene.background)} }}\n{camera_text(scene, size)}")
         for position, color in scene.lights:
             write(f"light_source {{ {vector(position)} rgb {vector(color)} }}\n")
         for direction, color in scene.suns:

@@ -1,8 +1,11 @@
-"""Runs programs, and compares the images that they leave."""
+"""Runs programs, compares the images that they leave, and describes the machine."""
 import collections
 import concurrent.futures
 import operator
 import os
+import pathlib
+import platform
+import re
 import subprocess
 import tempfile
 import time
@@ -54,3 +57,20 @@ def image_difference(path, other_path):
     return {"mean": sum(value * count for value, count in channels.items()) / len(off), "max": max(channels),
             "far": sum(count for value, count in channels.items() if value > 16) / len(off),
             "pixels_off": sum(count for value, count in pixels.items() if value > 2) / len(worst)}
+
+
+def output_lines(*command):
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=False).stdout.splitlines()
+    except OSError:
+        return []
+
+
+def machine():
+    info = dict(re.findall(r"^([^\t:]+?)\s*: (.*)$", pathlib.Path("/proc/cpuinfo").read_text().split("\n\n")[0], re.M))
+    memory = re.search(r"MemTotal:\s+(\d+) kB", pathlib.Path("/proc/meminfo").read_text())
+    return {"processor": info.get("model name"), "family": info.get("cpu family"), "model": info.get("model"),
+            "mhz": info.get("cpu MHz"), "avx512": "avx512f" in info.get("flags", ""), "cores": os.cpu_count(),
+            "memory_gib": round(int(memory.group(1)) / 2**20, 1), "system": platform.platform(),
+            "compiler": (output_lines(os.environ.get("CC", "cc"), "--version") or [None])[0],
+            "packages": output_lines("dpkg-query", "-W", "pocl-opencl-icd", "libembree3-3", "tachyon", "povray")}
