@@ -22,7 +22,9 @@ for row in report["rows"]:
     assert 1e-5 < row["median"] < row["rmse"] < 0.2 and row["seconds"] > 0 and row["processor_seconds"] > 0, row
 for program in "glint", "POV-Ray":
     assert -1.5 < report["slopes"][program]["rmse"] < -0.3, report["slopes"]
-assert 1e-4 < report["models_apart"]["rmse"] and abs(report["models_apart"]["bias"]) < 0.001, report["models_apart"]
+# Images without highlights, with shadows of glass, or with another lens, absorption or light are beyond these limits.
+apart = report["models_apart"]
+assert 1e-4 < apart["rmse"] < 0.006 and -0.0003 < apart["bias"] < 0.0002, apart
 assert (folder / "still-life.svg").read_text().count("<polyline points=\"") == 9
 assert struct.unpack(">II", (folder / "still-life.png").read_bytes()[16:24]) == (128, 72)
 PYTHON
