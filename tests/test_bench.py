@@ -274,14 +274,12 @@ for line in worker.stdout:
         self.assertFalse(report["device"]["passports"])
         self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
 
-    @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def check_energy(self, source, env):
-        """A joule, over all frames of half a second or more."""
+        """Each frame takes a joule, over half a second or more."""
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=env)["runs"]
         self.assertEqual(row["energy"]["source"], source)
-        frames = 1000 / row["energy"]["frame_mj"]
-        self.assertTrue(frames > 0.5 and abs(frames - round(frames)) < 1e-6 * frames, frames)
-        self.assertTrue(0 < row["energy"]["watts"] <= 2, row["energy"])
+        self.assertAlmostEqual(row["energy"]["frame_mj"], 1000)
+        self.assertGreater(row["energy"]["watts"], 1e-3)
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers must be loaded before a shim")
     def test_energy(self):
@@ -292,8 +290,9 @@ for line in worker.stdout:
         board = {"OCL_ICD_VENDORS": find_icd("pocl"), "LD_PRELOAD": limits, "GLINT_LIMITS": "nv"}
         self.check_energy("NVML", board | {"LD_LIBRARY_PATH": os.path.abspath("nvml")})
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=board)["runs"]
-        self.assertEqual(row["energy"], {"status": "unavailable", "reason": "NVML does not read this board's energy"})
+        self.assertEqual(row["energy"], {"status": "unavailable", "reason": "NVML, NVIDIA's library, is not available"})
 
+    @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_variant(self):
         """The call of a variant with options for the driver is named, as it is opened and in its many runs."""
         failing = shim_build("failing.so", FAILING)

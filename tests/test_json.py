@@ -162,7 +162,7 @@ class Json(TestCase):
         rest = f"{SMALL} {QUICK} --no-build-times --json"
         # at single a number of strong.yaml is beyond the range
         strong = [self.json(f"bench strong.yaml {rest} --lanes 1 --variant '' --variant '--precision double'")] if fp64 else []
-        # a sanitizer need not be the first that is loaded: the shim allocates nothing by itself
+        # the shim may come before the sanitizer, since it calls nothing before main
         metered = {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c")),
                    "ASAN_OPTIONS": f"{os.environ.get('ASAN_OPTIONS', '')}:verify_asan_link_order=0"}
         self.check_members("glint bench", self.json(

@@ -495,8 +495,7 @@ class Errors(unittest.TestCase):
             for name in "pocl_binary_distribution/__init__.py", "pyopencl/.libs/libpocl-12ab.so", "vendors/some.icd":
                 Path(folder, name).parent.mkdir(parents=True)
                 Path(folder, name).touch()
-            self.assertIsNone(glint._c.pocl_of_pip("/nowhere"))
-            sys.path.append(folder)
+            sys.path.insert(0, folder)
             try:
                 self.assertEqual(glint._c.pocl_of_pip("/nowhere"), f"{folder}/pyopencl/.libs/libpocl-12ab.so")
                 self.assertIsNone(glint._c.pocl_of_pip(f"{folder}/vendors"))

@@ -201,9 +201,10 @@ static void drift_print(const BenchReport *report, const BenchRow *row, FILE *st
     if (drift.verdict != VERDICT_SLOWER && drift.verdict != VERDICT_FASTER) return;
     fprintf(
         stream,
-        "    the last half of the runs took %.3f (%.3f to %.3f) times as long as the first: the device %s\n",
+        "    the last fifth of the runs took %.3f (%.3f to %.3f) times as long as the first: the device %s\n",
         drift.ratio, drift.low, drift.high,
-        drift.verdict == VERDICT_SLOWER ? "was throttled or shared" : "was not warm or not alone at first");
+        drift.verdict == VERDICT_SLOWER ? "may be throttled or shared"
+                                        : "may have been cold or shared at first");
 }
 
 static void row_print(const BenchReport *report, size_t i, FILE *stream)
@@ -225,7 +226,7 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
     variant_print(report, i, stream);
     if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
     if (row->energy.source)
-        fprintf(stream, "    %.4g mJ per frame, %.3g W, by %s\n", 1e3 * row->energy.joules,
+        fprintf(stream, "    %.3g mJ per frame, %.3g W, by %s\n", 1e3 * row->energy.joules,
                 row->energy.joules / row->energy.seconds, row->energy.source);
     drift_print(report, row, stream);
     if (report->comparisons) comparison_print(&report->comparisons[i], stream);

@@ -3,7 +3,6 @@
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/opencl/passport.h"
-#include <math.h>
 #include <string.h>
 
 enum { BUILD_TEST_SIDE = 64 };
@@ -159,22 +158,40 @@ bool variant_run(Variant *variant, BenchTimes *times)
     return true;
 }
 
+// Renders frames for at least `seconds_min` and until the counter has just changed, at first from `joules`,
+// or for some seconds if it does not. Returns the joules that it shows then, and sets *whole to false if a
+// render failed.
+static double frames_run(Variant *variant, EnergyMeter *meter, double joules, double seconds_min,
+                         size_t *count, bool *whole)
+{
+    static const double seconds_max = 5;
+    const double start_seconds = clock_seconds();
+    double before, seconds;
+    do {
+        before = joules;
+        *whole = *whole && variant_run(variant, NULL);
+        ++*count;
+        joules = energy_joules(meter);
+        seconds = clock_seconds() - start_seconds;
+    } while (*whole && (seconds < seconds_min || (joules == before && seconds < seconds_max)));
+    return joules;
+}
+
 bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
 {
-    static const double seconds_min = 0.5; // some counters change ten times a second
-    const double start_joules = energy_joules(meter), start_seconds = clock_seconds();
-    double seconds = 0;
-    size_t frame_count = 0;
-    for (; seconds < seconds_min; frame_count++) {
-        if (!variant_run(variant, NULL)) return false;
-        seconds = clock_seconds() - start_seconds;
-    }
-    const double joules = energy_joules(meter) - start_joules;
-    row->energy = (BenchEnergy){.source = isfinite(joules) ? energy_source(meter) : NULL,
-                                .why_not = "an energy counter could not be read",
-                                .joules = joules / (double)frame_count,
-                                .seconds = seconds / (double)frame_count};
-    return true;
+    static const double seconds_min = 0.5;
+    bool is_whole = true;
+    size_t count = 0;
+    const double start_joules = frames_run(variant, meter, energy_joules(meter), 0, &count, &is_whole),
+                 start_seconds = clock_seconds();
+    count = 0;
+    const double joules =
+        frames_run(variant, meter, start_joules, seconds_min, &count, &is_whole) - start_joules;
+    row->energy = (BenchEnergy){.source = joules > 0 ? energy_source(meter) : NULL,
+                                .why_not = "the energy counter did not change or could not be read",
+                                .joules = joules / (double)count,
+                                .seconds = (clock_seconds() - start_seconds) / (double)count};
+    return is_whole;
 }
 
 void variant_close(Variant *variant)

@@ -25,11 +25,11 @@ Device variant_device(const Device *device, const Variant *variant);
 // Prepares the runs: counts the rays and, if requested, times the builds. If the device does not support the
 // variant, sets the row's failure.
 void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_builds);
-// Runs the variant once and adds its times to `times`, which is NULL for a warm-up. Returns false if the user
-// interrupted.
+// Runs the variant once and adds its times to `times`, which is NULL for a warm-up. Returns false if the
+// render failed or the user interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
-// Closes the variant and sets it to zeros. Accepts a variant of zeros.
-// Renders frames for half a second and stores the mean energy of one in the row. Returns false as variant_run
-// does.
+// Renders frames for half a second or more, from one step of the counter to another, and stores the mean
+// energy of one in the row. Returns false if a render failed or the user interrupted.
 bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row);
+// Closes the variant and sets it to zeros. Accepts a variant of zeros.
 void variant_close(Variant *variant);

@@ -1,4 +1,4 @@
-// The files of one image, by their names.
+// What is written of one image, and the names of its files.
 #pragma once
 
 #include "host/image/image.h"

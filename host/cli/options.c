@@ -117,10 +117,14 @@ bool option_empty_folder(const char *option, const char *path)
 {
     if (!option_folder(option, path)) return false;
     DIR *folder = opendir(path);
+    if (!folder) {
+        fprintf(stderr, "glint: --%s: cannot read the folder '%s': %s\n", option, path, strerror(errno));
+        return false;
+    }
     bool is_empty = true;
-    for (const struct dirent *item; folder && (item = readdir(folder));)
+    for (const struct dirent *item; (item = readdir(folder));)
         is_empty &= strcmp(item->d_name, ".") == 0 || strcmp(item->d_name, "..") == 0;
-    if (folder) closedir(folder);
+    closedir(folder);
     if (!is_empty) fprintf(stderr, "glint: --%s: the folder '%s' is not empty\n", option, path);
     return is_empty;
 }

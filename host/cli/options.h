@@ -162,7 +162,8 @@ bool option_choice(const char *option, const char *value, const char *const *nam
 bool option_error_budget(const char *option, const char *value, ErrorBudget *budget);
 // Creates the folder unless it exists. Returns false with a message if it cannot be written to.
 bool option_folder(const char *option, const char *path);
-// The same, and refuses a folder that contains anything.
+// Creates the folder unless it exists. Returns false with a message if it cannot be written to or is not
+// empty.
 bool option_empty_folder(const char *option, const char *path);
 // Reads the limit of the pixels of an image that is read, and sets it.
 bool option_max_pixels(const char *value);

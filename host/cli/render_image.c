@@ -93,14 +93,16 @@ static void rest_print(const RenderOptions *options)
                 options->checkpoint);
 }
 
+// Adds what a whole image, or one of its times, warns of.
 static void warnings_add(ImageRender *render)
 {
     const OpenDevices *devices = &render->open->devices;
+    const size_t device_count = shutter_is_last(&render->shutter) ? devices->count : 0;
     const uint64_t undecided = render->times->repeats.undecided;
     if (undecided > 0)
         message_warning(&render->messages, "%" PRIu64 " sample%s undecided, as at precision double",
                         undecided, undecided == 1 ? " is" : "s are");
-    for (size_t i = 0; i < devices->count && shutter_is_last(&render->shutter); i++) {
+    for (size_t i = 0; i < device_count; i++) {
         const RenderReport *report = renderer_report(render->open->renderers[i]);
         if (report->is_out_of_line)
             message_warning(
@@ -121,6 +123,8 @@ static bool files_write(ImageRender *render, bool is_whole)
     else if (render->output)
         image_output_abandon(render->output);
     if (render->checkpoint) checkpoint_close(render->checkpoint, is_whole, &render->messages);
+    render->output = NULL;
+    render->checkpoint = NULL;
     stage_end(times->stage);
     return is_whole;
 }
@@ -298,9 +302,11 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     options.output.path = path;
     double start = clock_seconds();
     int status = EXIT_USER;
-    if (ranks && (options.common.work_group[0] > 0 || options.common.build_options))
+    if (ranks &&
+        (options.common.work_group[0] > 0 || options.common.build_options || options.common.capture_folder))
         return option_usage_fault("render",
-                                  "--work-group and --build-options need glint render, a single process");
+                                  "--work-group, --build-options and --capture need glint render, a "
+                                  "single process");
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
     if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
@@ -316,7 +322,11 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
         stage_begin(times.stage, "opening the devices", NULL, 0);
         ImageRender render = {
             .options = &options, .scene = &scene, .open = open, .ranks = ranks, .times = &times};
-        if (render_devices_open(open, &options.common)) status = shutter_render(&render);
+        const bool is_open = render_devices_open(open, &options.common);
+        if (is_open && options.common.capture_folder && open->devices.count > 1)
+            status = option_usage_fault("render", "--capture needs a single device");
+        else if (is_open)
+            status = shutter_render(&render);
     }
     scene_free(&scene);
     stage_close(options.common.stage);

@@ -90,7 +90,7 @@ static const char help_text[] =
                     "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
-                    "      --capture FOLDER  write each launch, for glint locate\n"
+                    "      --capture FOLDER  write each launch to an empty folder, for glint locate\n"
                     "      --format F        format of --output -: png, ppm or npy\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER

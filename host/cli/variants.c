@@ -251,16 +251,19 @@ static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progr
     return true;
 }
 
-// Measures the energy of each row's frames, where the device has a meter.
-static bool energy_measure(VariantSet *set, const Device *device)
+// Measures the energy of each row's frames, where the device has a meter. Returns false as variant_run_energy
+// does.
+static bool energy_measure(VariantSet *set, const Device *device, Progress *progress)
 {
     const char *why_not = NULL;
     EnergyMeter *meter = energy_open(device, &why_not);
     bool is_whole = true;
     for (size_t i = 0; i < set->count && is_whole; i++) {
         set->rows[i].energy.why_not = why_not;
-        if (meter && set->variants[i].renderer)
-            is_whole = variant_run_energy(&set->variants[i], meter, &set->rows[i]);
+        if (!meter || !set->variants[i].renderer) continue;
+        progress_step(progress, variant_set_fraction(set, variants_measured_fraction),
+                      "measuring the energy of row %zu of %zu", set->rows_before + i + 1, set->row_count);
+        is_whole = variant_run_energy(&set->variants[i], meter, &set->rows[i]);
     }
     energy_close(meter);
     return is_whole;
@@ -273,7 +276,7 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
     const double row_seconds = options->seconds > 0 ? options->seconds / (double)set->row_count : 5;
     const double seconds = row_seconds * (double)set->count;
     bool whole = rounds_run(set, seconds, is_benchmark, progress);
-    if (whole && is_benchmark) whole = energy_measure(set, compute->device);
+    if (whole && is_benchmark) whole = energy_measure(set, compute->device, progress);
     for (size_t i = 0; i < set->count && whole; i++)
         if (set->variants[i].renderer)
             set->rows[i].kernel_hash = renderer_report(set->variants[i].renderer)->kernel_hash;

@@ -88,10 +88,7 @@ static const double drift_tolerance = 1.05;
 Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count)
 {
     const Series *all = is_cpu ? &times->processor : bench_doubt(times) ? &times->host : &times->event;
-    const size_t half = all->count / 2;
-    const Series first = {.items = all->items, .count = half},
-                 last = {.items = all->items + (all->count - half), .count = half};
-    return comparison_of_rounds(&last, &first, row_count, drift_tolerance);
+    return comparison_of_ends(all, row_count, drift_tolerance);
 }
 
 bool bench_key_equal(const BenchKey *a, const BenchKey *b)

@@ -40,8 +40,8 @@ Summary bench_kernel(const BenchTimes *times);
 // small.
 bool bench_converged(const BenchTimes *times, size_t enough);
 
-// Compares the runs of the last half with those of the first, by the processors' time of a CPU device, else
-// by the launches' time. A device that is throttled makes the last half slower.
+// Compares the last runs with the first (comparison_of_ends), by the processor time of a CPU device, else by
+// the launches' time: a device that is throttled becomes slower.
 Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count);
 
 // The energy of a row's frames, rendered one after another.

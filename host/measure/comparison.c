@@ -130,6 +130,30 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
     return comparison_judge(log_ratio, interval, tolerance);
 }
 
+Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance)
+{
+    const size_t fifth = seconds->count / 5, blocks_max = REPORT_BLOCKS;
+    const double error = row_error(row_count) / 2; // shared by two medians
+    RatioInterval intervals[2];
+    double medians[2];
+    for (size_t i = 0; i < 2; i++) {
+        const Series end = {.items = seconds->items + i * (seconds->count - fifth), .count = fifth};
+        Series blocks = ratio_blocks(&end, &end, 0, fifth < blocks_max ? fifth : blocks_max);
+        intervals[i] = median_interval(&blocks, error);
+        medians[i] = series_summarize(&blocks).median;
+        series_free(&blocks);
+    }
+    const double low = intervals[1].low - intervals[0].high, high = intervals[1].high - intervals[0].low;
+    Comparison comparison = {.ratio = exp(medians[1] - medians[0]), .low = exp(low), .high = exp(high)};
+    if (comparison.low > tolerance)
+        comparison.verdict = VERDICT_SLOWER;
+    else if (comparison.high < 1 / tolerance)
+        comparison.verdict = VERDICT_FASTER;
+    else if (comparison.low >= 1 / tolerance && comparison.high <= tolerance)
+        comparison.verdict = VERDICT_SAME;
+    return comparison;
+}
+
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance)
 {

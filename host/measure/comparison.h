@@ -62,6 +62,10 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
 Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_seconds, size_t comparison_count,
                                 double tolerance);
 
+// Compares the last fifth of a row's runs with the first, each by its median. The verdict is slower or faster
+// if the ratio is certainly beyond the tolerance. A single change within either fifth may remain undecided.
+Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance);
+
 // Returns a row's verdict from comparisons of frame times and of processor times: slower if either is, else
 // faster if processor times are, else that of the frame times, since waiting does not show in processor
 // times. But frame times alone do not make a row faster: with two processes that worked and paused next to

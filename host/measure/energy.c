@@ -10,11 +10,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A package of RAPL's, or the board.
+// An energy counter: a RAPL package or an NVIDIA board.
 typedef struct {
     char *path;     // of the counter's file; NULL for the board
     uint64_t last;  // microjoules
-    uint64_t range; // after which the counter starts at 0
+    uint64_t range; // after which the counter starts at 0; 0 if it does not
 } EnergyCounter;
 
 // The functions of NVML that are used, by the names and types of nvml.h. They return 0 for success.
@@ -49,36 +49,41 @@ static bool counter_read(const EnergyMeter *meter, const EnergyCounter *counter,
     return true;
 }
 
-// Adds a counter if it can be read, and takes ownership of the path.
-static void counter_add(EnergyMeter *meter, char *path, uint64_t range)
+// Adds a counter. Returns false if it cannot be read.
+static bool counter_add(EnergyMeter *meter, const char *path, uint64_t range)
 {
-    EnergyCounter counter = {.path = path, .range = range};
-    if (counter_read(meter, &counter, &counter.last))
-        array_push(*meter, counter);
-    else
-        free(path);
+    EnergyCounter counter = {.path = path ? memory_copy_text(path) : NULL, .range = range};
+    const bool is_read = counter_read(meter, &counter, &counter.last);
+    array_push(*meter, counter);
+    return is_read;
 }
 
-// Adds the counters of packages, which include those of their cores and memory. That of the platform, "psys",
-// would count packages twice.
-static void packages_add(EnergyMeter *meter)
+// Adds the counters of all packages, which include their cores, but not the memory. Other zones are parts of
+// packages, or the whole platform. Returns NULL, or why they cannot be read.
+static const char *packages_add(EnergyMeter *meter)
 {
+    const char *why_not = "Linux shows no energy counter of the processors";
     glob_t zones;
-    if (glob("/sys/class/powercap/intel-rapl:*", 0, NULL, &zones) != 0) return;
+    if (glob("/sys/class/powercap/intel-rapl:*", 0, NULL, &zones) != 0) return why_not;
+    bool are_read = true;
     for (size_t i = 0; i < zones.gl_pathc; i++) {
         char *name_path = text_format("%s/name", zones.gl_pathv[i]),
-             *range_path = text_format("%s/max_energy_range_uj", zones.gl_pathv[i]);
+             *range_path = text_format("%s/max_energy_range_uj", zones.gl_pathv[i]),
+             *energy_path = text_format("%s/energy_uj", zones.gl_pathv[i]);
         char name[16];
         uint64_t range;
         FILE *file = fopen(name_path, "r");
         if (file && fgets(name, sizeof name, file) && strncmp(name, "package", strlen("package")) == 0 &&
             number_read(range_path, &range))
-            counter_add(meter, text_format("%s/energy_uj", zones.gl_pathv[i]), range);
+            are_read &= counter_add(meter, energy_path, range);
         if (file) fclose(file);
+        free(energy_path);
         free(range_path);
         free(name_path);
     }
     globfree(&zones);
+    if (!are_read) return "the energy counters of the processors are readable by root alone";
+    return meter->count > 0 ? NULL : why_not;
 }
 
 // Stores a function of the library. Returns whether there is one of this name.
@@ -89,7 +94,8 @@ static bool function_find(void *library, const char *name, void *function)
     return found != NULL;
 }
 
-static void board_add(EnergyMeter *meter, const char *pci)
+// Adds the counter of the board at a place on the PCI bus. Returns NULL, or why it cannot be read.
+static const char *board_add(EnergyMeter *meter, const char *pci)
 {
     Nvml *nvml = &meter->nvml;
     int (*init)(void), (*find)(const char *pci, void **board);
@@ -99,21 +105,22 @@ static void board_add(EnergyMeter *meter, const char *pci)
         !function_find(nvml->library, "nvmlDeviceGetTotalEnergyConsumption", &nvml->total_energy) ||
         !function_find(nvml->library, "nvmlShutdown", &nvml->shutdown) || init() != 0) {
         nvml->shutdown = NULL;
-        return;
+        return "NVML, NVIDIA's library, is not available";
     }
-    if (find(pci, &nvml->board) == 0) counter_add(meter, NULL, UINT64_MAX);
+    const bool is_read = find(pci, &nvml->board) == 0 && counter_add(meter, NULL, 0);
+    return is_read ? NULL : "NVML does not report this board's energy";
 }
 
 EnergyMeter *energy_open(const Device *device, const char **why_not)
 {
     EnergyMeter *meter = memory_allocate_zeroed(1, sizeof *meter);
     if (device->pci[0] != '\0')
-        board_add(meter, device->pci);
+        *why_not = board_add(meter, device->pci);
     else if (device->type & CL_DEVICE_TYPE_CPU)
-        packages_add(meter);
-    if (meter->count > 0) return meter;
-    *why_not = device->pci[0] != '\0' ? "NVML does not read this board's energy"
-                                      : "no energy counter of RAPL can be read";
+        *why_not = packages_add(meter);
+    else
+        *why_not = "no energy counter is known for such a device";
+    if (!*why_not) return meter;
     energy_close(meter);
     return NULL;
 }

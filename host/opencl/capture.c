@@ -48,7 +48,10 @@ static bool file_write(Compute *compute, Json *json, const char *key, const char
         else
             output_abandon(&output);
     }
-    if (!is_written) compute_fail(compute, "capture", CL_SUCCESS, "%s", messages.items[0].text);
+    if (!is_written && compute_ok(compute)) {
+        compute_fail(compute, "capture", CL_SUCCESS, "%s", messages.items[0].text);
+        compute->failure.is_of_host = true;
+    }
     message_list_free(&messages);
     if (json) json_text(json, key, name);
     free(path);
@@ -116,8 +119,9 @@ void capture_launch(Compute *compute, const Launch *launch)
     json_begin_array(json, "arguments");
     // a released kernel may have had this one's address, and more arguments
     cl_uint argument_count = 0;
-    compute_try(compute, clGetKernelInfo(launch->kernel, CL_KERNEL_NUM_ARGS, sizeof argument_count,
-                                         &argument_count, NULL));
+    is_written =
+        is_written && compute_try(compute, clGetKernelInfo(launch->kernel, CL_KERNEL_NUM_ARGS,
+                                                           sizeof argument_count, &argument_count, NULL));
     for (size_t i = 0; i < compute->captured.count && is_written; i++)
         if (compute->captured.items[i].kernel == launch->kernel &&
             compute->captured.items[i].index < argument_count)

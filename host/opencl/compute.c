@@ -104,7 +104,7 @@ static char *failure_text(const Compute *compute, const ComputeFailure *failure)
     text_appendf(&text, "%s", failure->call);
     if (failure->status != CL_SUCCESS)
         text_appendf(&text, ": %s (%d)", cl_status_name(failure->status), failure->status);
-    else if (!failure->detail)
+    else if (!failure->is_of_host)
         text_appendf(&text, ": NULL with CL_SUCCESS");
     const Device *device = compute->device;
     text_appendf(&text, " on %s%s%s%s", device->name, device->pci[0] ? " at " : "", device->pci,

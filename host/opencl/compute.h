@@ -11,9 +11,10 @@
 #include "host/opencl/device.h"
 
 typedef struct {
-    char call[40]; // the OpenCL function, or "capture"; empty: none failed
-    cl_int status; // CL_SUCCESS: the call returned NULL all the same, or a capture failed
-    char *detail;  // what else is known, such as a build log; NULL: nothing
+    char call[40];   // the OpenCL function, or the host's work; empty: none failed
+    cl_int status;   // CL_SUCCESS: the call returned NULL all the same, unless is_of_host
+    bool is_of_host; // no call failed: the detail says what did
+    char *detail;    // what else is known, such as a build log; NULL: nothing
 } ComputeFailure;
 
 // The value that an argument of a kernel was set to last.

@@ -1,5 +1,6 @@
-// Preloaded by tests: RAPL has a counter of one package of the processors, which grows by a joule between two
-// reads and wraps after one and a half, and one of the platform.
+// Preloaded by tests: RAPL has a counter of a package of the processors, which grows by a joule from one read
+// to the next and wraps after one and a half, and others of its cores and of the platform, which grow by
+// more.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <glob.h>
@@ -7,27 +8,46 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char zone[] = "/sys/class/powercap/intel-rapl:";
+static const char folder[] = "/sys/class/powercap/";
+static const struct {
+    const char *path, *name;
+    unsigned long step, range; // microjoules
+} zones[] = {
+    {"/sys/class/powercap/intel-rapl:0", "package-0", 1000000, 1500000},
+    {"/sys/class/powercap/intel-rapl:0:0", "core", 3000000, 1000000000},
+    {"/sys/class/powercap/intel-rapl:1", "psys", 7000000, 1000000000},
+};
+enum { ZONE_COUNT = sizeof zones / sizeof *zones };
 
 FILE *fopen(const char *path, const char *mode)
 {
-    static unsigned long microjoules;
-    static char text[32];
-    if (strncmp(path, zone, strlen(zone)) != 0)
+    static unsigned long counters[ZONE_COUNT];
+    if (strncmp(path, folder, strlen(folder)) != 0)
         return ((__typeof__(&fopen))dlsym(RTLD_NEXT, "fopen"))(path, mode);
-    if (strstr(path, "/name")) strcpy(text, path[strlen(zone)] == '0' ? "package-0" : "psys");
-    if (strstr(path, "/max_energy_range_uj")) strcpy(text, "1500000");
-    if (strstr(path, "/energy_uj")) sprintf(text, "%lu", (microjoules += 1000000) % 1500000);
-    return fmemopen(text, strlen(text), "r");
+    char text[32] = "";
+    const char *file = strrchr(path, '/');
+    for (int i = 0; i < ZONE_COUNT; i++) {
+        if (strlen(zones[i].path) != (size_t)(file - path) ||
+            strncmp(path, zones[i].path, strlen(zones[i].path)) != 0)
+            continue;
+        if (strcmp(file, "/name") == 0) strcpy(text, zones[i].name);
+        if (strcmp(file, "/max_energy_range_uj") == 0) sprintf(text, "%lu", zones[i].range);
+        if (strcmp(file, "/energy_uj") == 0)
+            sprintf(text, "%lu", counters[i] = (counters[i] + zones[i].step) % zones[i].range);
+    }
+    FILE *stream = tmpfile();
+    fprintf(stream, "%s\n", text);
+    rewind(stream);
+    return stream;
 }
 
 int glob(const char *pattern, int flags, int (*failed)(const char *, int), glob_t *found)
 {
-    if (strncmp(pattern, zone, strlen(zone)) != 0)
+    if (strncmp(pattern, folder, strlen(folder)) != 0)
         return ((__typeof__(&glob))dlsym(RTLD_NEXT, "glob"))(pattern, flags, failed, found);
-    *found = (glob_t){.gl_pathc = 2, .gl_pathv = calloc(3, sizeof(char *))};
-    for (int i = 0; i < 2; i++)
-        asprintf(&found->gl_pathv[i], "%s%d", zone, i);
+    *found = (glob_t){.gl_pathc = ZONE_COUNT, .gl_pathv = calloc(ZONE_COUNT + 1, sizeof(char *))};
+    for (int i = 0; i < ZONE_COUNT; i++)
+        found->gl_pathv[i] = strdup(zones[i].path);
     return 0;
 }
 
