@@ -17,8 +17,8 @@ SHIM = r"""
 #include <dlfcn.h>
 #include <stdlib.h>
 
-void *clEnqueueMapBuffer(void *queue, void *buffer, unsigned blocking, unsigned long flags, size_t offset, size_t size,
-                         unsigned count, const void *list, void *event, int *status)
+void *clEnqueueMapBuffer(void *queue, void *buffer, unsigned blocking, unsigned long long flags, size_t offset,
+                         size_t size, unsigned count, const void *list, void *event, int *status)
 {
     static long maps;
     unsigned *words = ((void *(*)())dlsym(RTLD_NEXT, "clEnqueueMapBuffer"))(queue, buffer, 1, flags, offset, size, count, list,

@@ -47,7 +47,7 @@ int clGetDeviceInfo(void *device, unsigned name, size_t size, void *value, size_
 {
     const int status = ((int (*)())dlsym(RTLD_NEXT, "clGetDeviceInfo"))(device, name, size, value, value_size);
     const int is_memory = name == 0x101F || name == 0x1010; // CL_DEVICE_GLOBAL_MEM_SIZE, CL_DEVICE_MAX_MEM_ALLOC_SIZE
-    if (getenv("FAULT_MEMORY") && value && is_memory) *(unsigned long *)value = atoi(getenv("FAULT_MEMORY"));
+    if (getenv("FAULT_MEMORY") && value && is_memory) *(unsigned long long *)value = atoi(getenv("FAULT_MEMORY"));
     return status;
 }
 FILE *fopen(const char *path, const char *mode)

@@ -24,7 +24,7 @@ SHIM = r"""
 #include <time.h>
 
 static unsigned numbers[4]; // the probe and its rounds are the first and the third argument
-static unsigned long nanoseconds = 1000000000, launched;
+static unsigned long long nanoseconds = 1000000000, launched;
 
 static void *next(const char *name) { return dlsym(RTLD_NEXT, name); }
 
@@ -55,9 +55,9 @@ void *clCreateProgramWithSource(void *context, unsigned count, const char **text
     return ((void *(*)())next("clCreateProgramWithSource"))(context, 1, &text, NULL, status);
 }
 
-int clGetEventProfilingInfo(void *event, unsigned what, size_t size, unsigned long *value, size_t *needed)
+int clGetEventProfilingInfo(void *event, unsigned what, size_t size, unsigned long long *value, size_t *needed)
 {
-    static unsigned long count;
+    static unsigned long long count;
     int status = ((int (*)())next("clGetEventProfilingInfo"))(event, what, size, value, needed);
     const char *timer = getenv("TIMER");
     if (value && getenv("FMA_COST")) *value = what == 0x1283 ? nanoseconds : launched; // CL_PROFILING_COMMAND_END
@@ -76,7 +76,7 @@ int clGetDeviceInfo(void *device, unsigned what, size_t size, char *value, size_
     if (!driver || what != 0x102D) { // CL_DRIVER_VERSION
         int status = ((int (*)())next("clGetDeviceInfo"))(device, what, size, value, needed);
         if (getenv("WITHOUT_FMA") && what == 0x101B && value) // CL_DEVICE_SINGLE_FP_CONFIG
-            *(unsigned long *)value &= ~32ul; // CL_FP_FMA
+            *(unsigned long long *)value &= ~32ull; // CL_FP_FMA
         return status;
     }
     if (needed) *needed = strlen(driver) + 1;
@@ -107,9 +107,9 @@ int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void 
     if (file) fclose(file);
     launched = nanoseconds;
     if (getenv("FMA_COST"))
-        nanoseconds += 10000 + 1000ul * numbers[2] * (numbers[0] == PROBE_TIME_FMA ? atoi(getenv("FMA_COST")) : 1);
+        nanoseconds += 10000 + 1000ull * numbers[2] * (numbers[0] == PROBE_TIME_FMA ? atoi(getenv("FMA_COST")) : 1);
     if (getenv("FMA_COST") && getenv("SWEEP_COST") && numbers[0] >= PROBE_SWEEP_RECIPROCAL && numbers[0] <= PROBE_SWEEP_SQRT)
-        nanoseconds += atoi(getenv("SWEEP_COST")) * *(size_t *)e;
+        nanoseconds += atoll(getenv("SWEEP_COST")) * *(size_t *)e;
     return ((int (*)())next("clEnqueueNDRangeKernel"))(a, b, c, d, e, f, g, h, i);
 }
 """

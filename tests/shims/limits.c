@@ -33,7 +33,7 @@
 #define NEXT(function) ((__typeof__(&function))dlsym(RTLD_NEXT, #function))
 
 // Whether the limit is set; *value, which may be NULL, receives its number.
-static bool limit_get(const char *name, size_t *value)
+static bool limit_get(const char *name, cl_ulong *value)
 {
     const char *list = getenv("GLINT_LIMITS");
     const size_t length = strlen(name);
@@ -111,7 +111,7 @@ static bool is_limited(cl_device_id device)
 
 cl_int clGetDeviceInfo(cl_device_id device, cl_device_info what, size_t size, void *to, size_t *needed)
 {
-    size_t value;
+    cl_ulong value;
     if (!is_limited(device)) return NEXT(clGetDeviceInfo)(device, what, size, to, needed);
     if (what == CL_DEVICE_PROFILE && limit_get("embedded", NULL))
         return answer("EMBEDDED_PROFILE", sizeof "EMBEDDED_PROFILE", size, to, needed);
@@ -150,7 +150,7 @@ cl_int clGetEventProfilingInfo(cl_event event, cl_profiling_info what, size_t si
 cl_int clGetKernelWorkGroupInfo(cl_kernel kernel, cl_device_id device, cl_kernel_work_group_info what,
                                 size_t size, void *to, size_t *needed)
 {
-    size_t value;
+    cl_ulong value;
     if (what == CL_KERNEL_WORK_GROUP_SIZE && limit_get("group", &value)) return ANSWER(size_t, value);
     return NEXT(clGetKernelWorkGroupInfo)(kernel, device, what, size, to, needed);
 }
@@ -171,7 +171,7 @@ cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const ch
 enum { BUFFERS_MAX = 4096, KERNELS_MAX = 64, ARGUMENTS_MAX = 256 };
 
 // Whether the program's compiler or linker is to fail.
-static bool is_too_large(cl_program program, const char *limit, size_t *status)
+static bool is_too_large(cl_program program, const char *limit, cl_ulong *status)
 {
     size_t size = 0;
     if (!limit_get(limit, status)) return false;
@@ -186,14 +186,14 @@ static bool is_too_large(cl_program program, const char *limit, size_t *status)
 cl_int clBuildProgram(cl_program program, cl_uint count, const cl_device_id *devices, const char *options,
                       void(CL_CALLBACK *notify)(cl_program, void *), void *data)
 {
-    size_t status;
+    cl_ulong status;
     if (is_too_large(program, "build", &status)) return -(cl_int)status;
     return NEXT(clBuildProgram)(program, count, devices, options, notify, data);
 }
 
 cl_kernel clCreateKernel(cl_program program, const char *name, cl_int *status)
 {
-    size_t failure;
+    cl_ulong failure;
     if (!is_too_large(program, "kernel", &failure)) return NEXT(clCreateKernel)(program, name, status);
     *status = -(cl_int)failure;
     return NULL;
@@ -233,7 +233,7 @@ static size_t kernel_find(cl_kernel kernel)
 
 cl_mem clCreateBuffer(cl_context context, cl_mem_flags flags, size_t size, void *bytes, cl_int *status)
 {
-    size_t most, sum = size;
+    cl_ulong most, sum = size;
     *status = CL_INVALID_BUFFER_SIZE;
     if (limit_get("buffer", &most) && size > most) return NULL;
     pthread_mutex_lock(&mutex);
@@ -288,7 +288,8 @@ cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint 
                               const size_t *first, const size_t *global, const size_t *local,
                               cl_uint wait_count, const cl_event *wait, cl_event *event)
 {
-    size_t items = 1, group = 1, buffer_count = 0, most;
+    size_t items = 1, group = 1, buffer_count = 0;
+    cl_ulong most;
     for (cl_uint i = 0; i < dimensions; i++) {
         items *= global[i];
         group *= local ? local[i] : 1;
