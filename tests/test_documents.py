@@ -225,6 +225,8 @@ CLAIMS = [  # N stands for a number
                                     "the median; the other N took N of it.", lambda: budget_long(0.35)),
     ("docs/measurements/README.md", r"2026-11-27 \| N \| all pass at `single`, `strict` and `double`, with PoCL's bits at `strict`",
      lambda: passed_elsewhere("verify-everywhere", "intel")[:1]),
+    ("docs/measurements/README.md", r"\| N, a sixteenth of the rays \| all pass at `single` and `strict`, with PoCL's bits at both",
+     lambda: passed_elsewhere("verify-rusticl-quick", "rusticl")[:1]),
     ("docs/measurements/README.md", r"2026-11-22 \| N of that day \| N pass, with PoCL's bits at `strict`; M6 takes N to N minutes",
      lambda: (*(passed_elsewhere("verify-rusticl", "rusticl")[0],) * 2, min(rusticl_m6_minutes()), max(rusticl_m6_minutes()))),
     ("docs/measurements/README.md", "except that R7 reaches N instead of 1e-5", lambda: (max(case["worst"] for case in perturbed("single", "R7")),)),
