@@ -113,6 +113,26 @@ static Verdict reports_simulate(Machine old_machine, Machine new_machine, double
     return comparison.verdict;
 }
 
+// The estimate of a report with few runs is that of their medians, and undecided.
+static void test_reports_of_few_runs(void **state)
+{
+    (void)state;
+    Series old_frame = {0}, new_frame = {0}, calibration = {0};
+    for (int i = 0; i < 5; i++) {
+        series_add(&old_frame, 0.010 + 0.001 * i);
+        series_add(&new_frame, 0.020 + 0.002 * i);
+        series_add(&calibration, 0.003);
+    }
+    const Comparison comparison = comparison_of_reports((ReportTimes){&new_frame, &calibration},
+                                                        (ReportTimes){&old_frame, &calibration}, 1, 1.1);
+    assert_true(fabs(comparison.ratio - 2) < 1e-9);
+    assert_int_equal(comparison.verdict, VERDICT_UNDECIDED);
+    assert_true(isinf(comparison.high));
+    series_free(&old_frame);
+    series_free(&new_frame);
+    series_free(&calibration);
+}
+
 // Simulates two rows of one process in turn, the second of which takes `slowdown` times as long.
 static Verdict rounds_simulate(Machine machine, double slowdown, int rounds)
 {
@@ -309,6 +329,7 @@ static void test_intervals(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_reports_of_few_runs),
         cmocka_unit_test(test_intervals),
         cmocka_unit_test(test_rows),
         cmocka_unit_test(test_same_build_against_itself),

@@ -98,12 +98,14 @@ double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds
     return median;
 }
 
-// Returns the logarithms of seconds / divisor^exponent, as medians of `block_count` consecutive blocks.
-static Series ratio_blocks(const Series *seconds, const Series *divisors, double exponent, size_t block_count)
+// Returns the logarithms of seconds / divisor^exponent, as medians of REPORT_BLOCKS consecutive blocks, or of
+// single runs if there are fewer.
+static Series ratio_blocks(const Series *seconds, const Series *divisors, double exponent)
 {
     const size_t count = seconds->count < divisors->count ? seconds->count : divisors->count;
+    const size_t block_count = count < REPORT_BLOCKS ? count : REPORT_BLOCKS;
     Series blocks = {0};
-    for (size_t block = 0; block < block_count && count >= block_count; block++) {
+    for (size_t block = 0; block < block_count; block++) {
         Series part = {0};
         for (size_t i = block * count / block_count; i < (block + 1) * count / block_count; i++)
             series_add(&part, log(seconds->items[i]) - exponent * log(divisors->items[i]));
@@ -121,9 +123,7 @@ static RatioInterval interval_widen(RatioInterval interval)
 Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_seconds, size_t comparison_count,
                                 double tolerance)
 {
-    const size_t blocks_max = REPORT_BLOCKS;
-    Series blocks = ratio_blocks(new_seconds, old_seconds, 1,
-                                 new_seconds->count < blocks_max ? new_seconds->count : blocks_max);
+    Series blocks = ratio_blocks(new_seconds, old_seconds, 1);
     const RatioInterval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
     const double log_ratio = series_summarize(&blocks).median;
     series_free(&blocks);
@@ -132,13 +132,13 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
 
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance)
 {
-    const size_t fifth = seconds->count / 5, blocks_max = REPORT_BLOCKS;
+    const size_t fifth = seconds->count / 5;
     const double error = row_error(row_count) / 2; // shared by two medians
     RatioInterval intervals[2];
     double medians[2];
     for (size_t i = 0; i < 2; i++) {
         const Series end = {.items = seconds->items + i * (seconds->count - fifth), .count = fifth};
-        Series blocks = ratio_blocks(&end, &end, 0, fifth < blocks_max ? fifth : blocks_max);
+        Series blocks = ratio_blocks(&end, &end, 0);
         intervals[i] = median_interval(&blocks, error);
         medians[i] = series_summarize(&blocks).median;
         series_free(&blocks);
@@ -154,6 +154,14 @@ Comparison comparison_of_ends(const Series *seconds, size_t row_count, double to
     return comparison;
 }
 
+// Returns an interval of the median, unbounded for fewer blocks than REPORT_BLOCKS, since runs of one report
+// are correlated.
+static RatioInterval blocks_interval(const Series *blocks, double error)
+{
+    return blocks->count < REPORT_BLOCKS ? (RatioInterval){-INFINITY, INFINITY}
+                                         : median_interval(blocks, error);
+}
+
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance)
 {
@@ -161,11 +169,11 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
     double log_ratio = 0;
     for (int i = 0; i < 2; i++) {
         const double exponent = i * exponent_max;
-        Series new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent, REPORT_BLOCKS),
-               old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent, REPORT_BLOCKS);
+        Series new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent),
+               old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent);
         // one of the exponents between is right, and the error is shared by two medians
-        RatioInterval new_median = median_interval(&new_blocks, row_error(row_count) / 2),
-                      old_median = median_interval(&old_blocks, row_error(row_count) / 2);
+        RatioInterval new_median = blocks_interval(&new_blocks, row_error(row_count) / 2),
+                      old_median = blocks_interval(&old_blocks, row_error(row_count) / 2);
         covering.low = fmin(covering.low, new_median.low - old_median.high);
         covering.high = fmax(covering.high, new_median.high - old_median.low);
         log_ratio += (series_summarize(&new_blocks).median - series_summarize(&old_blocks).median) / 2;
