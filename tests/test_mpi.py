@@ -219,9 +219,9 @@ class Mpi(TestCase):
             self.check_frames(all)
 
     def test_options_for_one_process(self):
-        for option in "--work-group 2x2", "--build-options=-DUNUSED":
+        for option in "--work-group 2x2", "--build-options=-DUNUSED", "--capture launches":
             process = self.mpirun(f"-n 2 {RANKS} {RENDER} {option}", status=1)
-            self.assertIn("--work-group and --build-options need glint render, a single process", process.stderr)
+            self.assertIn("--work-group, --build-options and --capture need glint render, a single process", process.stderr)
 
     def test_a_refused_checkpoint(self):
         """It ends all ranks."""
