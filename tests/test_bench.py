@@ -30,6 +30,7 @@ int clEnqueueNDRangeKernel(void *a, void *b, unsigned c, void *d, void *e, void 
 """
 # NVIDIA's library, with one board, whose counter grows alike.
 NVML = """
+#include <stdlib.h>
 #include <string.h>
 static unsigned long long millijoules;
 int nvmlInit_v2(void) { return 0; }
@@ -42,6 +43,7 @@ int nvmlDeviceGetHandleByPciBusId_v2(const char *pci, void **board)
 int nvmlDeviceGetTotalEnergyConsumption(void *board, unsigned long long *total)
 {
     *total = *(unsigned long long *)board += 1000;
+    if (getenv("SET_BACK") && *total == 5000) *total = 0;
     return 0;
 }
 """
@@ -289,6 +291,9 @@ for line in worker.stdout:
         limits = shim_build("limits.so", read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
         board = {"OCL_ICD_VENDORS": find_icd("pocl"), "LD_PRELOAD": limits, "GLINT_LIMITS": "nv"}
         self.check_energy("NVML", board | {"LD_LIBRARY_PATH": os.path.abspath("nvml")})
+        set_back = board | {"LD_LIBRARY_PATH": os.path.abspath("nvml"), "SET_BACK": "1"}
+        (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=set_back)["runs"]
+        self.assertEqual(row["energy"]["reason"], "the energy counter did not change or could not be read")
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=board)["runs"]
         self.assertEqual(row["energy"], {"status": "unavailable", "reason": "NVML, NVIDIA's library, is not available"})
 

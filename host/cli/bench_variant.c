@@ -158,22 +158,22 @@ bool variant_run(Variant *variant, BenchTimes *times)
     return true;
 }
 
-// Renders frames for at least `seconds_min` and until the counter has just changed, at first from `joules`,
-// or for some seconds if it does not. Returns the joules that it shows then, and sets *whole to false if a
-// render failed.
+// Renders frames until at least `seconds_min` have passed and the counter has changed since the previous
+// frame, for at most `seconds_max` if it does not change. `joules` is its last reading. Adds the frames to
+// *count, clears *is_whole if a render failed or the user interrupted, and returns the counter's reading.
 static double frames_run(Variant *variant, EnergyMeter *meter, double joules, double seconds_min,
-                         size_t *count, bool *whole)
+                         size_t *count, bool *is_whole)
 {
     static const double seconds_max = 5;
     const double start_seconds = clock_seconds();
     double before, seconds;
     do {
         before = joules;
-        *whole = *whole && variant_run(variant, NULL);
+        *is_whole = *is_whole && variant_run(variant, NULL);
         ++*count;
         joules = energy_joules(meter);
         seconds = clock_seconds() - start_seconds;
-    } while (*whole && (seconds < seconds_min || (joules == before && seconds < seconds_max)));
+    } while (*is_whole && (seconds < seconds_min || (joules == before && seconds < seconds_max)));
     return joules;
 }
 

@@ -1,4 +1,4 @@
-// What is written of one image, and the names of its files.
+// The outputs of one image and their file names.
 #pragma once
 
 #include "host/image/image.h"

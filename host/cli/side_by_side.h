@@ -7,7 +7,7 @@
 
 enum { SIDE_REPORTS_MAX = 26, SIDE_COLUMNS = 8 }; // a report is named by a letter
 
-// A report and what its rows are in total next to those of the first one.
+// A report, and the summary of its comparison with the first.
 typedef struct {
     const char *path;
     Baseline *baseline;
@@ -20,7 +20,7 @@ typedef struct {
 // A report's times of a row next to those of the first report.
 typedef struct {
     const BaselineRow *row;   // NULL if the report does not have the row
-    double ratio;             // to the first report's frame time; 0 if one of both has none
+    double ratio;             // to the first report's frame time; 0 if either has none
     double kernel_ratio;      // of kernel times, or 0
     RowComparison comparison; // if there is a ratio; `why_not` states why it has neither interval nor verdict
 } SideCell;

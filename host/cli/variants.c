@@ -251,8 +251,8 @@ static bool rounds_run(VariantSet *set, double seconds, bool is_benchmark, Progr
     return true;
 }
 
-// Measures the energy of each row's frames, where the device has a meter. Returns false as variant_run_energy
-// does.
+// Measures the energy of each row's frames, where the device has a meter. Returns false if a render failed or
+// the user interrupted.
 static bool energy_measure(VariantSet *set, const Device *device, Progress *progress)
 {
     const char *why_not = NULL;

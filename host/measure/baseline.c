@@ -191,12 +191,17 @@ bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *w
     return false;
 }
 
+static bool host_is_known(const Baseline *baseline)
+{
+    return baseline->host[0] != '\0' && strcmp(baseline->host, scrubbed_host) != 0;
+}
+
 const char *baselines_why_not_compared(const Baseline *newer, const Baseline *older)
 {
     if (strcmp(newer->device, older->device) != 0) return "it was measured on another device";
     if (strcmp(newer->board, older->board) != 0) return "it was measured on another board";
+    if (!host_is_known(newer) || !host_is_known(older)) return "the host of one of both is unknown";
     if (strcmp(newer->host, older->host) != 0) return "it was measured on another host";
-    if (newer->host[0] == '\0' || strcmp(newer->host, scrubbed_host) == 0) return "the hosts are unknown";
     if (!newer->is_calibrated || !older->is_calibrated)
         return "it or the first report has another calibration or none";
     return NULL;

@@ -133,6 +133,7 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance)
 {
     const size_t fifth = seconds->count / 5;
+    if (fifth == 0) return (Comparison){.ratio = 1, .high = INFINITY};
     const double error = row_error(row_count) / 2; // shared by two medians
     RatioInterval intervals[2];
     double medians[2];

@@ -63,7 +63,8 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
                                 double tolerance);
 
 // Compares the last fifth of a row's runs with the first, each by its median. The verdict is slower or faster
-// if the ratio is certainly beyond the tolerance. A single change within either fifth may remain undecided.
+// if the ratio's interval, for which runs are independent, is beyond the tolerance. A single change within
+// either fifth may remain undecided.
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance);
 
 // Returns a row's verdict from comparisons of frame times and of processor times: slower if either is, else

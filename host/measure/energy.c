@@ -73,16 +73,16 @@ static const char *packages_add(EnergyMeter *meter)
         char name[16];
         uint64_t range;
         FILE *file = fopen(name_path, "r");
-        if (file && fgets(name, sizeof name, file) && strncmp(name, "package", strlen("package")) == 0 &&
-            number_read(range_path, &range))
-            are_read &= counter_add(meter, energy_path, range);
+        if (file && fgets(name, sizeof name, file) && strncmp(name, "package", strlen("package")) == 0)
+            are_read = number_read(range_path, &range) && counter_add(meter, energy_path, range) && are_read;
         if (file) fclose(file);
         free(energy_path);
         free(range_path);
         free(name_path);
     }
     globfree(&zones);
-    if (!are_read) return "the energy counters of the processors are readable by root alone";
+    if (!are_read)
+        return "the processors' energy counters cannot be read, which most systems allow to root alone";
     return meter->count > 0 ? NULL : why_not;
 }
 
@@ -146,9 +146,9 @@ double energy_joules(EnergyMeter *meter)
     for (size_t i = 0; i < meter->count; i++) {
         EnergyCounter *counter = &meter->items[i];
         uint64_t now;
-        if (!counter_read(meter, counter, &now)) return NAN;
-        const uint64_t used =
-            now >= counter->last ? now - counter->last : now + counter->range - counter->last;
+        const bool is_read = counter_read(meter, counter, &now);
+        if (!is_read || (now < counter->last && counter->range == 0)) return meter->joules = NAN;
+        const uint64_t used = now - counter->last + (now < counter->last ? counter->range : 0);
         meter->joules += 1e-6 * (double)used;
         counter->last = now;
     }

@@ -12,6 +12,5 @@ void energy_close(EnergyMeter *meter); // accepts NULL
 // Returns what measures: "NVML" for a board, "RAPL" for all processors without their memory.
 const char *energy_source(const EnergyMeter *meter);
 // Returns the joules since the meter was opened. A counter that wraps must be read before it wraps again,
-// which takes minutes. Returns NAN if a counter cannot be read or
-// was set back.
+// which takes minutes. Returns NAN once a counter could not be read or was set back.
 double energy_joules(EnergyMeter *meter);

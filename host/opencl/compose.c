@@ -60,20 +60,19 @@ static void compose_file(Composer *composer, const char *name, size_t name_lengt
     }
 }
 
-// Returns what gives double4 the alignment of 32 bytes that OpenCL C 1.2 demands (section 6.1.5) and that the
-// host's structs have. For ARM clang aligns vectors to 16 bytes at most (github.com/pocl/pocl/issues/2174).
-// PoCL's devices have the host's processor, and on other devices the attribute changes nothing.
-static const char *alignment_text(const char *prelude)
-{
+// Aligns double4 to 32 bytes, as OpenCL C 1.2 (section 6.1.5) requires and the host's structs, which have no
+// longer vectors, expect. On ARM, clang aligns vectors to at most 16 bytes
+// (github.com/pocl/pocl/issues/2174). PoCL's devices have the host's architecture; elsewhere the attribute
+// changes nothing.
 #if defined __aarch64__ || defined __arm__
-    if (strstr(prelude, "#define IS_DOUBLE 1"))
-        return "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n"
-               "typedef double4 aligned_double4 __attribute__((aligned(32)));\n"
-               "#define double4 aligned_double4\n";
+static const char alignment_text[] = "#if IS_DOUBLE\n"
+                                     "#pragma OPENCL EXTENSION cl_khr_fp64 : enable\n"
+                                     "typedef double4 aligned_double4 __attribute__((aligned(32)));\n"
+                                     "#define double4 aligned_double4\n"
+                                     "#endif\n";
+#else
+static const char alignment_text[] = "";
 #endif
-    (void)prelude;
-    return "";
-}
 
 char *kernel_compose(const EmbeddedFile *files, const char *root, const char *prelude)
 {
@@ -81,7 +80,7 @@ char *kernel_compose(const EmbeddedFile *files, const char *root, const char *pr
     while (files[file_count].name)
         file_count++;
     Composer composer = {.files = files, .included = memory_allocate_zeroed(file_count + 1, sizeof(bool))};
-    text_appendf(&composer.text, "#line 1 \"prelude\"\n%s\n%s", prelude, alignment_text(prelude));
+    text_appendf(&composer.text, "#line 1 \"prelude\"\n%s\n%s", prelude, alignment_text);
     compose_file(&composer, root, strlen(root));
     free(composer.included);
     return composer.text.items;

@@ -11,9 +11,9 @@ function decadeTicks(low, high) {
   return ticks.slice(ticks.findLastIndex((tick) => tick <= low), ticks.findIndex((tick) => tick > high) + 1);
 }
 
-// Multiples of a round step for a range of less than a decade, where 1, 2 and 5 would be too few.
+// Multiples of a round step for a range of less than a factor of 3, where 1, 2 and 5 would be too few.
 function stepTicks(low, high) {
-  const step = [0.02, 0.05, 0.1, 0.2, 0.5, 1].find((size) => high - low <= 6 * size) ?? 2;
-  const first = Math.max(1, Math.floor(low / step)), last = Math.ceil(high / step);
+  const step = [0.02, 0.05, 0.1, 0.2, 0.5].find((size) => high - low <= 6 * size);
+  const first = Math.floor(low / step), last = Math.ceil(high / step);
   return Array.from({ length: last - first + 1 }, (_, i) => Number(((first + i) * step).toFixed(2)));
 }

@@ -58,7 +58,7 @@ function layOut(places) {
   const values = places.flat().flatMap((place) => (place ? [place.lower, place.upper] : []));
   if (hasRatios) values.push(0.9, 1.1);
   const low = Math.min(...values), high = Math.max(...values);
-  const ticks = high < 4 * low && hasRatios ? stepTicks(low, high) : decadeTicks(low, high);
+  const ticks = high < 3 * low && hasRatios ? stepTicks(low, high) : decadeTicks(low, high);
   return { ticks, x: logarithmic(ticks[0], ticks.at(-1), 2, 98) };
 }
 
@@ -179,9 +179,10 @@ find(".reports").append(...reports.map(drawReport));
 find(".facts").append(constants ? `All rows: ${constants}.` : "");
 find(".note").append(`The axis is logarithmic; to the left is faster${hasRatios ? " than A" : ""}. A dot is the median, a box ` +
                      "spans the quartiles of the runs.");
-find("#verdict").append(`“Same”: the interval lies within ${formatNumber(1 / tolerance)} to ${formatNumber(tolerance)}. Faster and ` +
-  `slower: it does not contain 1. On a CPU the time of its processors is compared in addition, and a row is faster ` +
-  `only if that is. All intervals of a report together hold with a probability of at least ${percent(confidence)}.`);
+find("#verdict").append(`“Same”: the interval lies within ${formatNumber(1 / tolerance)} to ${formatNumber(tolerance)}. Otherwise ` +
+  `“faster” or “slower”: it does not contain 1. On a CPU, processor times are compared in addition: a row is slower if ` +
+  `either time is, and faster only if the processor time is. All intervals of this page hold together with a ` +
+  `probability of at least ${percent(confidence)}.`);
 if (!hasRatios) document.querySelectorAll(".several").forEach((element) => element.remove());
 find(".controls").addEventListener("change", drawBars);
 drawBars();
