@@ -1,6 +1,7 @@
 #!/usr/bin/env -S python3 -B
 """The command line as a user meets it: every option, every message about a wrong one, the exit status, what is printed
 where, and that a failure leaves an earlier image as it was."""
+import contextlib
 import glob
 import itertools
 import json
@@ -178,9 +179,13 @@ class WrongInput(CliTestCase):
 
 
 def writes_here(process):
-    """Whether a process has a file of this folder open, with a name or without."""
-    opened = map(os.path.realpath, glob.glob(f"/proc/{process}/fd/*"))
-    return os.getcwd() in map(os.path.dirname, opened)
+    """Whether a process has a file of this folder open for writing, with a name or without."""
+    for link in Path(f"/proc/{process}/fd").glob("*"):
+        with contextlib.suppress(OSError):  # it may be closed meanwhile
+            flags = int(re.search(r"flags:\s*(\d+)", read(f"/proc/{process}/fdinfo/{link.name}"))[1], 8)
+            if os.path.dirname(os.path.realpath(link)) == os.getcwd() and flags & (os.O_WRONLY | os.O_RDWR):
+                return True
+    return False
 
 
 class Failures(CliTestCase):
