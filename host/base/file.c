@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 FileLock file_lock(int descriptor)
@@ -21,6 +20,13 @@ bool file_has_name(int descriptor, int folder, const char *name)
     struct stat opened, named;
     return fstat(descriptor, &opened) == 0 && fstatat(folder, name, &named, AT_SYMLINK_NOFOLLOW) == 0 &&
            named.st_dev == opened.st_dev && named.st_ino == opened.st_ino;
+}
+
+bool file_is_same(const char *path, const struct stat *other)
+{
+    struct stat status;
+    return path && stat(path, &status) == 0 && status.st_dev == other->st_dev &&
+           status.st_ino == other->st_ino;
 }
 
 int file_folder_open(const char *path)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <stdbool.h>
+#include <sys/stat.h>
 
 // FILE_REMOVED: the file is locked but had lost its last name before.
 typedef enum { FILE_LOCKED, FILE_BUSY, FILE_REMOVED } FileLock;
@@ -12,6 +13,8 @@ FileLock file_lock(int descriptor);
 // Returns whether the name in the open folder (or AT_FDCWD) is that of the open file, and not of another file
 // or a symbolic link.
 bool file_has_name(int descriptor, int folder, const char *name);
+// Returns whether a path, which may be NULL, leads to the file with this status.
+bool file_is_same(const char *path, const struct stat *other);
 // Opens the folder of a file. A folder that may be written but not listed is opened and cannot be synced.
 // Returns -1 and sets errno on failure.
 int file_folder_open(const char *path);

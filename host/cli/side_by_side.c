@@ -1,5 +1,6 @@
 #include "host/cli/side_by_side.h"
 
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/cli/page.h"
@@ -136,7 +137,7 @@ static void report_compare(SideBySide *side, size_t index)
     if (report->ratio_count > 0) report->mean_ratio = exp(logarithms / (double)report->ratio_count);
 }
 
-// Returns whether rows differ in a column. The path of a scene is only its name.
+// Returns whether rows differ in a column. Scenes are compared by hash, not by path.
 static bool column_differs(const SideBySide *side, size_t column)
 {
     const BenchKey *first = &side_first(side, 0)->row->key;
@@ -201,11 +202,10 @@ void side_by_side_close(SideBySide *side)
 // Returns whether the page would replace one of the reports, with a message.
 static bool page_overwrites(const char *page, char *const *paths, size_t count, MessageList *messages)
 {
-    struct stat target, report;
+    struct stat target;
     if (stat(page, &target) != 0) return false;
     for (size_t i = 0; i < count; i++) {
-        if (stat(paths[i], &report) != 0 || target.st_dev != report.st_dev || target.st_ino != report.st_ino)
-            continue;
+        if (!file_is_same(paths[i], &target)) continue;
         message_error(messages, "--html would overwrite the report '%s'", paths[i]);
         return true;
     }

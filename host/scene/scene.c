@@ -1,5 +1,6 @@
 #include "host/scene/scene.h"
 #include "host/base/array.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/portable.h"
@@ -223,24 +224,17 @@ void scene_add_override(Scene *scene, const char *name, const char *text)
     **end = (Source){.file = name, .bytes = memory_copy_text(text), .length = strlen(text)};
 }
 
-static bool is_same_file(const char *path, const struct stat *other)
-{
-    struct stat status;
-    return path && stat(path, &status) == 0 && status.st_dev == other->st_dev &&
-           status.st_ino == other->st_ino;
-}
-
 bool scene_was_read_from(const Scene *scene, const char *scene_path, const char *path)
 {
     struct stat status;
     if (stat(path, &status) != 0) return false;
-    bool is_read = is_same_file(scene_path, &status);
+    bool is_read = file_is_same(scene_path, &status);
     for (size_t i = 0; i < scene->included.count && !is_read; i++)
-        is_read = is_same_file(scene->included.items[i].path, &status);
+        is_read = file_is_same(scene->included.items[i].path, &status);
     for (size_t i = 0; i < scene->textures.count && !is_read; i++)
-        is_read = is_same_file(scene->textures.items[i].path, &status);
+        is_read = file_is_same(scene->textures.items[i].path, &status);
     for (size_t i = 0; i < scene->meshes.count && !is_read; i++)
-        is_read = is_same_file(scene->meshes.items[i].path, &status);
+        is_read = file_is_same(scene->meshes.items[i].path, &status);
     return is_read;
 }
 
