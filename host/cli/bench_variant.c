@@ -182,15 +182,18 @@ bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
     static const double seconds_min = 0.5;
     bool is_whole = true;
     size_t count = 0;
-    const double start_joules = frames_run(variant, meter, energy_joules(meter), 0, &count, &is_whole),
-                 start_seconds = clock_seconds();
+    row->energy.why_not = "the energy counter did not change or could not be read";
+    const double first_joules = energy_joules(meter),
+                 start_joules = frames_run(variant, meter, first_joules, 0, &count, &is_whole);
+    if (!(start_joules > first_joules)) return is_whole;
+    const double start_seconds = clock_seconds();
     count = 0;
     const double joules =
         frames_run(variant, meter, start_joules, seconds_min, &count, &is_whole) - start_joules;
-    row->energy = (BenchEnergy){.source = joules > 0 ? energy_source(meter) : NULL,
-                                .why_not = "the energy counter did not change or could not be read",
-                                .joules = joules / (double)count,
-                                .seconds = (clock_seconds() - start_seconds) / (double)count};
+    if (joules > 0)
+        row->energy = (BenchEnergy){.source = energy_source(meter),
+                                    .joules = joules / (double)count,
+                                    .seconds = (clock_seconds() - start_seconds) / (double)count};
     return is_whole;
 }
 
