@@ -77,8 +77,8 @@ def _open():
     """Loads the library that GLINT_LIBRARY names, else the wheel's, else the system's. Names PoCL of pip in the environment."""
     bundled = pathlib.Path(__file__).with_name(NAME)
     driver = pocl_of_pip()
-    if driver:
-        os.environ.setdefault("OCL_ICD_VENDORS", driver)  # ocl-icd accepts a library's path there,
+    if driver and "OCL_ICD_VENDORS" not in os.environ:
+        os.environ["OCL_ICD_VENDORS"] = driver  # ocl-icd accepts a library's path there,
         os.environ.setdefault("OCL_ICD_FILENAMES", driver)  # Khronos' loader here
     opened = ctypes.CDLL(os.environ.get("GLINT_LIBRARY") or (str(bundled) if bundled.exists() else NAME))
     for name, (result, *arguments) in _FUNCTIONS.items():
