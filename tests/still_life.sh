@@ -3,7 +3,7 @@
 # scene is reported. Needs POV-Ray, PyYAML and NumPy.
 . "$(dirname "$0")/support.bash"
 
-command -v povray >/dev/null || skip_all "there is no POV-Ray (povray)"
+command -v povray >/dev/null || skip_all "POV-Ray is not installed"
 python_with yaml=PyYAML==6.0.3 numpy=numpy==2.4.6
 
 still_life() { # GLINT

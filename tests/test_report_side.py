@@ -175,7 +175,7 @@ class SideBySide(TestCase):
         self.assertEqual((data["rows"][0]["name"][0], data["reports"][1]["device"]), (name, "<b>"))
         self.assertNotIn("<b>", Path("page.html").read_text(encoding="utf-8"))
 
-    @unittest.skipUnless(shutil.which("chromium"), "there is no chromium")
+    @unittest.skipUnless(shutil.which("chromium"), "chromium is not installed")
     def test_drawn(self):
         """What the page shows at both widths: each row's name and times, without an error or anything wider than the page."""
         long = f"scenes/{'long-' * 30}.yaml"

@@ -404,7 +404,7 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     return status;
 }
 
-// Compares reports of glint bench if the arguments name such. Returns the exit status, or OPTIONS_READ if
+// Compares reports of glint bench if the arguments name any. Returns the exit status, or OPTIONS_READ if
 // they ask for an archive.
 static int reports_compare(const ReportChoice *choice)
 {

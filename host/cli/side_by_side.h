@@ -19,8 +19,9 @@ typedef struct {
 
 // A report's times of a row next to those of the first report.
 typedef struct {
-    const BaselineRow *row;   // NULL if the report does not have the row
-    double ratio;             // to the first report's frame time; 0 if either has none
+    const BaselineRow *row; // NULL if the report does not have the row
+    double ratio; // of frame times to the first report's, by calibrations where `comparison` has an interval,
+                  // else of medians; 0 if either has none
     double kernel_ratio;      // of kernel times, or 0
     RowComparison comparison; // if there is a ratio; `why_not` states why it has neither interval nor verdict
 } SideCell;
