@@ -55,7 +55,7 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
 Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
                           MessageList *messages);
 
-enum { BATCH_RAYS = 1 << 18 }; // traced at once, which bounds the memory that rays take
+enum { BATCH_RAYS = 1 << 16 }; // traced at once, which bounds the memory that rays take
 
 // Copies a caller's rays as struct_read does. Returns false with a message if they are invalid.
 bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);

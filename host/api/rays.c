@@ -18,7 +18,7 @@ GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
         !precision_read(&precision, given.precision, &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     RenderSettings own = settings_of_image(1, 1, precision);
-    own.lanes = explicit_ray_lanes(device->compute.device, given.lanes);
+    own.lanes = given.lanes;
     pthread_mutex_lock(&device->mutex);
     Renderer *renderer = device_renderer(device, &scene->scene, &own, &list);
     const GlintStatus status =

@@ -192,7 +192,6 @@ static bool hits_write(const TraceOptions *options, const TraceHit *hits, size_t
 static int rays_trace(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
 {
     RenderSettings settings = settings_whole(&options->common, 1, 1);
-    settings.lanes = explicit_ray_lanes(compute->device, settings.lanes);
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, &settings, &messages);
     messages_print(&messages, NULL);

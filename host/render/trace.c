@@ -228,13 +228,6 @@ bool renderer_trace_closest(Renderer *renderer, const TraceRay *rays, size_t ray
     return rays_trace(renderer, KERNEL_CLOSEST, rays, ray_count, hits);
 }
 
-uint32_t explicit_ray_lanes(const Device *device, uint32_t requested)
-{
-    enum { DIVERGENT_LANES_MAX = 8 };
-    const bool is_limited = requested == 0 && device_lanes(device, false, 0) > DIVERGENT_LANES_MAX;
-    return is_limited ? DIVERGENT_LANES_MAX : requested;
-}
-
 // Returns value * 2^exponent, rounded once. ldexp takes several times as long as the product.
 static double scale_by_power(double value, int exponent, double power)
 {

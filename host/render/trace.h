@@ -36,12 +36,6 @@ typedef struct {
 
 enum { RAYS_OF_THREAD_MIN = 4096 }; // of work on the host, a few tenths of a millisecond
 
-// Returns how many lanes explicit rays take: `requested`, or if that is 0 at most 8, because such rays
-// diverge. With 8 lanes instead of 16 random rays take 0.96 to 1.32 times the rate, those of an image 0.93
-// to 1.06 (spheres, 20,000 and a million triangles, at single and certified). 0 stands for the device's
-// default.
-uint32_t explicit_ray_lanes(const Device *device, uint32_t requested);
-
 // Returns the ray with its direction divided by 2^*exponent, and its tmin and tmax multiplied by that, so
 // that the direction's largest component lies in 0.5 to 1 and its squared length neither underflows nor
 // overflows. The scaling is exact, except of a tmin or tmax that underflows. `farthest` limits tmax. A t of

@@ -193,13 +193,20 @@ static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdg
     return t;
 }
 
+// Whether the ray's line crosses a triangle, edges included, but not one that it runs in.
+static inline mask triangle_is_crossed(const TriangleEdges *edges)
+{
+    const real zero = (real)(0);
+    mask all_positive = (edges->u >= zero) & (edges->v >= zero) & (edges->w >= zero);
+    mask all_negative = (edges->u <= zero) & (edges->v <= zero) & (edges->w <= zero);
+    return all_positive ^ all_negative;
+}
+
 static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *t)
 {
     TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
     const real zero = (real)(0);
-    mask all_positive = (edges.u >= zero) & (edges.v >= zero) & (edges.w >= zero);
-    mask all_negative = (edges.u <= zero) & (edges.v <= zero) & (edges.w <= zero);
-    mask hit = RAY_ACTIVE(ray) & (all_positive ^ all_negative); // if all are 0, no hit
+    mask hit = RAY_ACTIVE(ray) & triangle_is_crossed(&edges);
     if (!lanes_any(hit)) return hit;
     mask remaining = hit;
     if (!IS_COMPENSATED) {

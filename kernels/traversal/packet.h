@@ -252,10 +252,7 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
             stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, met.entry.each[leaf]});
             continue;
         }
-        const bool is_hit = HAS_SPHERES && (kind & 0xff) == KIND_SPHERES
-                                ? intersect_sphere_block(traversal, scene, ray, first, kind >> 8, hit_by)
-                                : intersect_leaf(traversal, scene, ray, kind, first);
-        if (is_hit) group_shrink(group, traversal);
+        if (intersect_leaf(traversal, scene, ray, kind, first, hit_by)) group_shrink(group, traversal);
         if (group->active == 0) return;
     }
     for (uint left = met.children & ~leaves; left != 0; left &= left - 1) {

@@ -196,17 +196,71 @@ static inline bool intersect_sphere_block(Traversal *traversal, const Scene *sce
         near |= block_spheres_near(block, count, ray, lowest_bit(lanes));
     return intersect_block_spheres(traversal, scene, ray, block, near);
 }
+
+static inline Vector block_vertex(global const scalar *rows)
+{
+    return (Vector){real_load(rows), real_load(rows + LANES), real_load(rows + 2 * LANES)};
+}
+
+// Returns the triangles, as bits of the first `count` of a block, that one ray may hit. Rejects by what
+// begins the full test; at `certified` with errors of vertices that are not smaller.
+static inline uint block_triangles_near(global const TriangleBlock *block, uint count, const Ray *ray,
+                                        uint lane)
+{
+    global const scalar *rows = (global const scalar *)block->rows;
+    const Corners corners = {block_vertex(rows), block_vertex(rows + 3 * LANES),
+                             block_vertex(rows + 6 * LANES)};
+    Ray one;
+    one.origin = vector_of_lane(&ray->origin, lane);
+    one.across_u = vector_of_lane(&ray->across_u, lane);
+    one.across_v = vector_of_lane(&ray->across_v, lane);
+    const TriangleEdges edges = triangle_edges(corners, &one);
+#if IS_CERTIFIED
+    const real size = (real)(1 + 64 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners)),
+               error = real_fma(real_of_lane(&ray->across_error1, lane), size,
+                                real_of_lane(&ray->across_error0, lane));
+    const mask near = triangle_signs(&edges, error).perhaps;
+#else
+    const mask near = triangle_is_crossed(&edges);
+#endif
+    return lanes_bits(near) & ((1u << count) - 1);
+}
+
+// Intersects the first `count` triangles of a block with the rays of some lanes, given as bits.
+static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Scene *scene, const Ray *ray,
+                                                 uint index, uint count, uint lanes)
+{
+    const uint first = block_first(scene, index);
+    uint near = (1u << count) - 1;
+    if (popcount(lanes) < count) { // otherwise fewer full tests than rays
+        near = 0;
+        for (; lanes != 0; lanes &= lanes - 1)
+            near |= block_triangles_near(&scene->triangle_blocks[index], count, ray, lowest_bit(lanes));
+    }
+    bool found_any = false;
+    for (; near != 0; near &= near - 1) {
+        found_any |= intersect_triangle(traversal, scene, ray, scene->triangles[first + lowest_bit(near)]);
+        if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) break;
+    }
+    return found_any;
+}
 #endif
 
-// A leaf is count << 8 | kind (BvhNode.child_kind) and its index there. Instances are left out.
+// Intersects a leaf, count << 8 | kind (BvhNode.child_kind) and its index there, with the rays of some lanes,
+// given as bits. Instances are left out.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
-                                  uint index)
+                                  uint index, uint lanes)
 {
-    const uint kind = leaf & 0xff;
-    const uint first = LANES > 1 && kind == KIND_TRIANGLES ? block_first(scene, index) : index;
-    const uint last = first + (leaf >> 8);
+    const uint kind = leaf & 0xff, count = leaf >> 8;
+#if LANES > 1
+    if (HAS_SPHERES && kind == KIND_SPHERES)
+        return intersect_sphere_block(traversal, scene, ray, index, count, lanes);
+    if (HAS_TRIANGLES && kind == KIND_TRIANGLES)
+        return intersect_triangle_block(traversal, scene, ray, index, count, lanes);
+#endif
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && kind == KIND_##feature) return intersect_##names(traversal, scene, ray, first, last);
+    if (HAS_##feature && kind == KIND_##feature)                                                             \
+        return intersect_##names(traversal, scene, ray, index, index + count);
     SHAPE_LIST(INTERSECT_LEAF)
     return false;
 }
