@@ -40,7 +40,7 @@ PLANET = """\
 camera: {position: [0, 6371001.7, 0], look_at: [0, 6371000, 1], fov: 60}
 lights: [{point: {position: [2, 6371001, -1]}}]
 objects:
-  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 4371000, minor: 2000000, material: {reflection: 0.1}}
+  - sphere: {center: [0, 0, 0], radius: 6371000, material: {reflection: 0.1}}
   - sphere: {center: [0, 6371000.1, 0.8], radius: 0.1}
 """
 
