@@ -76,7 +76,10 @@ class Soft(TestCase):
         lights = [("sphere: {{center: [-2.2, 2.5, 0], radius: 0.4, color: [1, 0.75, 0.5]{}}}", (1, 0.75, 0.5)),
                   ("rectangle: {{center: [2.5, 3.5, -1], edges: [[1.5, 0, 0], [0, 1, 0.3]], intensity: 0.5{}}}", (0.5, 0.5, 0.5)),
                   ("disc: {{center: [0, 4, 1], normal: [0, -1, 0.4], radius: 0.6, color: [4, 0, 1]{}}}", (4, 0, 1))]
-        objects = ("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n  - sphere: {center: [-2, 0.7, 1], radius: 0.7}\n"
+        # behind the eye, so that the same kernels serve both scenes
+        objects = ("  - disc: {center: [0, 2, 99], normal: [0, 0, 1], radius: 1, intensity: 0.1, visible: true}\n"
+                   "  - rectangle: {center: [0, 2, 99], edges: [[1, 0, 0], [0, 1, 0]], intensity: 0.1, visible: true}\n"
+                   "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n  - sphere: {center: [-2, 0.7, 1], radius: 0.7}\n"
                    "  - box: {min: [0, 0, 0], max: [1, 2, 1]}\n")
         for precision in PRECISIONS:
             with self.subTest(precision=precision):
