@@ -129,6 +129,10 @@ class Shutter(TestCase):
         write("fine.yaml", MOVING + "  - sphere: {center: [0, 2, 0], radius: 1e-12}\n")
         process = self.glint(f"render fine.yaml {SIZE.replace('--quiet', '')} --lanes 1 -o a.npy", env=POCL)
         self.assertEqual((process.stderr.count("trillionth"), process.stderr.count("wrote")), (1, 1), process.stderr)
+        shine = "material: {transmission: 0.5, reflection: {keys: {0: 0.1, 1: 0.9}}}"  # together above 1 before it closes
+        write("late.yaml", MOVING + f"  - sphere: {{center: [0, 2, 0], radius: 0.1, {shine}}}\n")
+        process = self.glint(f"render late.yaml {SIZE} --lanes 1 -o a.npy", env=POCL)
+        self.assertEqual(process.stderr.count("warning"), 1, process.stderr)
 
     def test_refused(self):
         for options, reason in {"--checkpoint saved": "--checkpoint keeps bands", "--max-error 0.1": "--max-error measures"}.items():

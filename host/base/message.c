@@ -192,6 +192,31 @@ void message_list_free(MessageList *list)
     *list = (MessageList){0};
 }
 
+static bool message_is_known(const Message *message, const MessageList *known)
+{
+    for (size_t i = 0; i < known->count; i++) {
+        const Message *other = &known->items[i];
+        const bool has_file = message->file && other->file;
+        if (message->severity == other->severity && message->line == other->line &&
+            message->column == other->column &&
+            (has_file ? strcmp(message->file, other->file) == 0 : message->file == other->file) &&
+            (message->line > 0 || strcmp(message->text, other->text) == 0))
+            return true;
+    }
+    return false;
+}
+
+void message_list_remove(MessageList *list, const MessageList *known)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < list->count; i++)
+        if (message_is_known(&list->items[i], known))
+            message_free(&list->items[i]);
+        else
+            list->items[kept++] = list->items[i];
+    list->count = kept;
+}
+
 void message_list_move(MessageList *to, MessageList *from)
 {
     for (size_t i = 0; i < from->count; i++)

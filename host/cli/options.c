@@ -304,13 +304,21 @@ bool option_only_scene(const char *command, int argument_count, char **arguments
     return false;
 }
 
-void messages_print(MessageList *messages, const char *path)
+static void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
 {
     const char *ending = path ? strrchr(path, '.') : NULL;
     if (ending && strcasecmp(ending, ".rt") == 0 && message_count(messages, MESSAGE_ERROR) > 0)
         fputs("Error\n", stderr);
+    message_list_remove(messages, printed);
     message_list_print(messages, stderr);
-    message_list_free(messages);
+    message_list_move(printed, messages);
+}
+
+void messages_print(MessageList *messages, const char *path)
+{
+    MessageList printed = {0};
+    messages_print_once(messages, &printed, path);
+    message_list_free(&printed);
 }
 
 SceneOptions scene_options_of(const CommonOptions *common)
@@ -324,12 +332,20 @@ SceneOptions scene_options_of(const CommonOptions *common)
                           .stage = common->stage};
 }
 
-bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
+bool scene_open_once(Scene *scene, const char *path, const CommonOptions *common, MessageList *printed)
 {
     MessageList messages = {0};
     const SceneOptions options = scene_options_of(common);
     bool loaded = scene_load(scene, path, &options, &messages);
-    messages_print(&messages, path);
+    messages_print_once(&messages, printed, path);
+    return loaded;
+}
+
+bool scene_open(Scene *scene, const char *path, const CommonOptions *common)
+{
+    MessageList printed = {0};
+    const bool loaded = scene_open_once(scene, path, common, &printed);
+    message_list_free(&printed);
     return loaded;
 }
 

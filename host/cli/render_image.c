@@ -19,9 +19,9 @@ typedef struct {
     Shutter shutter;
     HostTimes *times;
     RenderSettings settings;
-    Checkpoint *checkpoint; // NULL without --checkpoint
-    ImageOutput *output;    // NULL unless this is the shutter's last time
-    MessageList messages;
+    Checkpoint *checkpoint;         // NULL without --checkpoint
+    ImageOutput *output;            // NULL unless this is the shutter's last time
+    MessageList messages, *printed; // `printed`: when the scene was read
 } ImageRender;
 
 // Prints one estimate of the time and the size of a long render.
@@ -226,7 +226,7 @@ static int time_render(ImageRender *render)
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
         if (has_started && render->shutter.time > 0)
-            message_list_free(&render->messages); // the first time's warnings
+            message_list_free(&render->messages); // the first time's, with other numbers
         const bool can_start = has_started && checkpoint_start(render);
         if (ranks) ranks->start(can_start);
         if (can_start) status = image_render(render);
@@ -255,19 +255,14 @@ static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
     return !obstacle;
 }
 
-// Replaces the scene by that of the shutter's time. Warnings were printed when the frame's scene was read.
+// Replaces the scene by that of the shutter's time.
 static bool scene_advance(ImageRender *render)
 {
-    MessageList messages = {0};
     const double start = clock_seconds();
     scene_free(render->scene);
     render->options->common.frame = shutter_frame(&render->shutter);
-    const SceneOptions scene_options = scene_options_of(&render->options->common);
-    const bool is_read = scene_load(render->scene, render->options->scene, &scene_options, &messages);
-    if (is_read)
-        message_list_free(&messages);
-    else
-        messages_print(&messages, render->options->scene);
+    const bool is_read =
+        scene_open_once(render->scene, render->options->scene, &render->options->common, render->printed);
     render->scene->frame = render->shutter.frame;
     render->times->parse_seconds += clock_seconds() - start;
     return is_read;
@@ -308,7 +303,8 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
                                   "--work-group, --build-options and --capture need glint render, a "
                                   "single process");
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
-    if (image_output_path_known(path) && scene_open(&scene, options.scene, &options.common) &&
+    MessageList printed = {0};
+    if (image_output_path_known(path) && scene_open_once(&scene, options.scene, &options.common, &printed) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.scene = options.scene,
                            .frame = options.frame_count > 0 ? options.common.frame : NAN,
@@ -320,14 +316,19 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
         open->has_warned_of_frames = true;
         open->reference_selector = options.common.reference_device;
         stage_begin(times.stage, "opening the devices", NULL, 0);
-        ImageRender render = {
-            .options = &options, .scene = &scene, .open = open, .ranks = ranks, .times = &times};
+        ImageRender render = {.options = &options,
+                              .scene = &scene,
+                              .open = open,
+                              .ranks = ranks,
+                              .times = &times,
+                              .printed = &printed};
         const bool is_open = render_devices_open(open, &options.common);
         if (is_open && options.common.capture_folder && open->devices.count > 1)
             status = option_usage_fault("render", "--capture needs a single device");
         else if (is_open)
             status = shutter_render(&render);
     }
+    message_list_free(&printed);
     scene_free(&scene);
     stage_close(options.common.stage);
     return status;
