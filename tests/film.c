@@ -1,6 +1,7 @@
 #include "tests/film.h"
 
 #include "host/base/memory.h"
+#include "host/render/arithmetic.h"
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -39,8 +40,25 @@ RenderSettings film_settings(uint32_t width, uint32_t height, Precision precisio
     return settings;
 }
 
+bool arithmetic_is_refused(Compute *compute, const RenderSettings *settings)
+{
+    const bool needs_double = settings->precision >= PRECISION_DOUBLE;
+    if (needs_double && !compute_in_double(compute)->device->fp64) return false; // has no passport
+    MessageList messages = {0};
+    const bool is_refused = !arithmetic_suits(compute, settings, &messages) && messages.count > 0;
+    message_list_print(&messages, stderr);
+    message_list_free(&messages);
+    return is_refused;
+}
+
+void skip_if_refused(Compute *compute, const RenderSettings *settings)
+{
+    if (arithmetic_is_refused(compute, settings)) skip();
+}
+
 Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs)
 {
+    skip_if_refused(compute, settings);
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, scene, settings, &messages);
     message_list_print(&messages, stderr);

@@ -25,7 +25,15 @@ const uint32_t *tested_lanes(const Device *device);
 // of a run share one program per precision.
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
 
-// Renders with the settings. Fails the test if they do not fit the device.
+// Returns true, after printing the reason, if a passport of the device's arithmetic refuses the precision of
+// the settings.
+bool arithmetic_is_refused(Compute *compute, const RenderSettings *settings);
+
+// Skips the test if arithmetic_is_refused returns true.
+void skip_if_refused(Compute *compute, const RenderSettings *settings);
+
+// Renders with the settings. Skips the test if the device's arithmetic is refused, and fails it if they do
+// not fit the device otherwise.
 Film film_render(Compute *compute, const Scene *scene, const RenderSettings *settings, unsigned aovs);
 
 // Returns the color of the part of a film that starts at x, y.

@@ -6,6 +6,7 @@
 #include "host/opencl/compose.h"
 #include "host/render/arithmetic.h"
 #include "host/render/renderer.h"
+#include "tests/film.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,24 +41,46 @@ static inline int probe_close(void **state)
     return ok ? 0 : -1;
 }
 
-// Returns the least precision at which every build of a kernel must give the same bits: `single`, unless the
-// device's quotients or roots are inexact. Then a compiler may choose another approximation in another build:
-// at `single` an NVIDIA H100 gives other bits at one lane than at four.
+static inline const Passport *probe_passport(void)
+{
+    return arithmetic_passport(&probe_compute, PRECISION_SINGLE, device_lanes(probe_compute.device, false, 0),
+                               false);
+}
+
+// Returns the least precision at which one build of a kernel must give the same bits for the same operations:
+// `single`, unless the device's arithmetic is broken. PoCL on 32-bit x86 rounds a number once or twice,
+// depending on whether its compiler keeps it in an x87 register or in memory.
+static inline Precision probe_repeats_from(void)
+{
+    Text broken = {0};
+    const Passport *passport = probe_passport();
+    const bool is_sound = passport && !passport_broken(passport, &broken);
+    text_free(&broken);
+    return is_sound ? PRECISION_SINGLE : PRECISION_STRICT;
+}
+
+// Returns the least precision at which every build of a kernel must give the same bits: that of one build,
+// unless the device's quotients or roots are inexact. Then a compiler may choose another approximation in
+// another build: at `single` an NVIDIA H100 gives other bits at one lane than at four.
 static inline Precision probe_same_bits_from(void)
 {
-    const Passport *passport = arithmetic_passport(&probe_compute, PRECISION_SINGLE,
-                                                   device_lanes(probe_compute.device, false, 0), false);
+    const Passport *passport = probe_passport();
     const bool is_exact = passport && passport->quotients.wrong_count + passport->roots.wrong_count == 0;
-    return is_exact ? PRECISION_SINGLE : PRECISION_STRICT;
+    return is_exact ? probe_repeats_from() : PRECISION_STRICT;
 }
 
+// Returns whether the device has the precision. If a passport refuses it, prints the reason.
 static inline bool probe_has(Precision precision)
 {
-    return precision != PRECISION_DOUBLE || probe_compute.device->fp64;
+    const RenderSettings settings = settings_of_image(1, 1, precision);
+    return (precision < PRECISION_DOUBLE || probe_compute.device->fp64) &&
+           !arithmetic_is_refused(&probe_compute, &settings);
 }
 
+// Skips the test if the device's arithmetic is refused.
 static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings *settings)
 {
+    skip_if_refused(&probe_compute, settings);
     MessageList messages = {0};
     Renderer *renderer = renderer_open(&probe_compute, scene, settings, &messages);
     message_list_print(&messages, stderr);

@@ -60,7 +60,7 @@ static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
 static void every_shape_is_certain(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { RAYS = 3000 };
     TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
     Counts sum = {0};
@@ -92,7 +92,7 @@ static void every_shape_is_certain(void **state)
 static void mesh_edges_are_certain(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { SIDE = 12, RAYS = 4000 };
     Random random = {3};
     Vector3 vertices[SIDE][SIDE];
@@ -131,7 +131,7 @@ static void mesh_edges_are_certain(void **state)
 static void least_and_largest_numbers(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {.normal = {0, 1, 0}}},
                         {.kind = SHAPE_PLANE, .as.plane = {.normal = {1, 0, 0}}},
                         {.kind = SHAPE_PLANE, .as.plane = {.point = {0, 0, 1}, .normal = {0, 0, 1}}}};
@@ -173,7 +173,7 @@ static void least_and_largest_numbers(void **state)
 static void open_questions_are_uncertain(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     Object objects[] = {
         {.kind = SHAPE_SPHERE, .as.sphere = {.center = {0, 0, 5}, .radius = 1}},
         {.kind = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},

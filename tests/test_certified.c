@@ -310,7 +310,7 @@ static const double repeated_max[FAMILY_COUNT] = {0.7, 0.25, 0.25, 0.65, 0.24},
 
 static void check_family(Family family)
 {
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     const unsigned scene_count = tests_are_long() ? 70 : 3;
     size_t single_wrong = 0, compared = 0;
     uint64_t repeated = 0, undecided = 0;
@@ -381,7 +381,7 @@ static void planets_are_decided(void **state)
 static void horizons_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int count = tests_are_long() ? 1000 : 100;
     RenderSettings settings = small_settings(0);
     settings.extra_features = family_features[PLANETS];
@@ -444,7 +444,7 @@ static Object oval_before_eye(Scene *scene, unsigned seed)
 static void terminators_of_ovals_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { LIGHTS = 16, TRIES = 1000 };
     size_t single_wrong = 0;
     uint64_t repeated = 0;
@@ -527,7 +527,7 @@ static bool case_print(void *context, const VerifyResult *result)
 static void hard_cases_are_decided(void **state)
 {
     (void)state;
-    if (!tests_are_long() || !probe_compute.device->fp64) skip();
+    if (!tests_are_long() || !probe_has(PRECISION_CERTIFIED)) skip();
     Pictures pictures = {0};
     const VerifySettings settings = {
         .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
@@ -544,7 +544,7 @@ static void hard_cases_are_decided(void **state)
 static void smooth_meshes_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     size_t undecided = 0;
     const unsigned count = tests_are_long() ? 300 : 12;
     for (unsigned seed = 0; seed < count; seed++) {

@@ -15,7 +15,7 @@
 static void lights_on_surfaces_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     const Object wall = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 0, 1}}};
     const double heights[] = {1e-5, 1e-7, 1e-9, 1e-12, 1e-15, 1e-20, 1e-30};
     for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
@@ -44,7 +44,7 @@ static void lights_on_surfaces_are_decided(void **state)
 static void checkers_far_out_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     for (int digits = 3; digits < 13; digits += 2)
         for (unsigned form = 0; form < 3; form++) {
             const double far = pow(10, digits);
@@ -75,7 +75,7 @@ static void checkers_far_out_are_decided(void **state)
 static void faint_paths_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     const double parts[] = {0.5, 1e-3, 1e-20, 1e-50};
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
@@ -102,7 +102,7 @@ static void faint_paths_are_decided(void **state)
 static void skimming_rays_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     for (int digits = 7; digits < 13; digits++) {
         const Vector3 normal = {0.1, 0.7, 0};
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, pow(10, -digits));
@@ -117,7 +117,7 @@ static void skimming_rays_are_decided(void **state)
 static void thin_walls_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     const Vector3 center = {0.3, 0.2, -5};
     const double stated = 3 * 0x1p-24 * (16 * (1 + 5.5) + 4 * 6);
     for (int i = 0; i < 4; i++) {
@@ -151,7 +151,7 @@ static void thin_walls_are_decided(void **state)
 static void needles_have_an_area(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     for (int digits = 3; digits < 31; digits += 3) {
         const double far = pow(10, digits);
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
@@ -193,7 +193,7 @@ static void needles_have_an_area(void **state)
 static void fine_meshes_are_seldom_repeated(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { AROUND = 200, DOWN = 100 };
     Mesh mesh = {.vertices = memory_allocate(AROUND * (DOWN + 1), sizeof *mesh.vertices),
                  .triangles = memory_allocate(2 * AROUND * DOWN, sizeof *mesh.triangles)};
@@ -257,7 +257,7 @@ enum { FORMS = 8 };
 static void mixed_sizes_are_decided(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int steps = tests_are_long() ? 10 : 2; // on either side of 1
     size_t undecided = 0, count = 0;
     for (unsigned form = 0; form < FORMS; form++)

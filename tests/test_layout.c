@@ -250,7 +250,7 @@ static size_t member_offset(const Member *member, const FlatLayout *layout, bool
 static void layout_check(void **state)
 {
     const bool is_double = *(const bool *)*state;
-    if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
+    if (is_double && !probe_compute.device->fp64) skip();
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, is_double);
     cl_program program = program_make(is_double);
@@ -324,7 +324,7 @@ static void member_check(cl_program program, size_t index, void *bytes, size_t s
 static void values_check(void **state)
 {
     const bool is_double = *(const bool *)*state;
-    if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
+    if (is_double && !probe_compute.device->fp64) skip();
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, is_double);
     cl_program program = program_make(is_double);

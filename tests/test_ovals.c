@@ -195,7 +195,7 @@ static void hits_ovals(void **state)
 static void certain_hits_of_ovals_are_right(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
     static TraceRay rays[RAYS];
     static TraceHit hits[RAYS];
     const size_t form_count = shape_forms(forms);

@@ -31,7 +31,7 @@ static void sample_has_a_pixel_of_each_cell(void **state)
 {
     (void)state;
     Scene scene = scene_of_file("scenes/globe.yaml");
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_repeats_from());
     settings.sample_count = 2;
     Film whole = film_render(&probe_compute, &scene, &settings, 0);
     settings.cell = CELL;
@@ -191,7 +191,7 @@ static void scene_bounds_its_colors(void **state)
 static void pilot_chooses(void **state)
 {
     (void)state;
-    if (!probe_compute.device->fp64) skip();
+    if (!probe_has(PRECISION_DOUBLE)) skip();
     Scene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     MessageList messages = {0};

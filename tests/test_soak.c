@@ -110,8 +110,7 @@ static RenderSettings soak_settings(Random *random)
     // certified in long tests alone: its kernels with all features take half a minute to build
     const Precision precision =
         (Precision)random_index(random, tests_are_long() ? PRECISION_COUNT : PRECISION_CERTIFIED);
-    RenderSettings settings = film_settings(
-        16, 12, probe_compute.device->fp64 || precision < PRECISION_DOUBLE ? precision : PRECISION_SINGLE);
+    RenderSettings settings = film_settings(16, 12, probe_has(precision) ? precision : PRECISION_SINGLE);
     settings.extra_features = FEATURE_ALL; // one kernel for all
     settings.sample_count = 1 + random_index(random, 3);
     settings.bounce_count = random_index(random, 7);
