@@ -53,6 +53,13 @@ static void command_fail(void *result)
     exit(status);
 }
 
+// Drivers may print warnings before: PoCL 3.1 does on arm64.
+static void assert_prints(const ChildEnd *end, const char *expected)
+{
+    if (!strstr(end->errors, expected)) print_error("%s\n", end->errors);
+    assert_non_null(strstr(end->errors, expected));
+}
+
 static void test_commands(void **state)
 {
     (void)state;
@@ -71,8 +78,7 @@ static void test_commands(void **state)
             ChildEnd end = child_run(command_fail, &command, sizeof command);
             char expected[64];
             snprintf(expected, sizeof expected, "glint: %s: CL_OUT_OF_RESOURCES (-5) on ", calls[k]);
-            if (strncmp(end.errors, expected, strlen(expected)) != 0) print_error("%s\n", end.errors);
-            assert_memory_equal(end.errors, expected, strlen(expected));
+            assert_prints(&end, expected);
             assert_int_equal(end.status, EXIT_MACHINE);
         }
 }
@@ -126,8 +132,7 @@ static void test_several_devices(void **state)
         failing_index = runs[i].index;
         first_is_tiny = runs[i].first_is_tiny;
         ChildEnd end = child_run(command_fail, &command, sizeof command);
-        if (!strstr(end.errors, expected)) print_error("%s\n", end.errors);
-        assert_non_null(strstr(end.errors, expected));
+        assert_prints(&end, expected);
         assert_int_equal(end.status, runs[i].status);
         if (runs[i].file == other) assert_same_bytes(one, other);
     }
@@ -148,8 +153,7 @@ static void test_release_after_the_output(void **state)
                        {"render", "scenes/spheres16.yaml", "--size", "8x8", "--quiet", "-o", path}};
     failing_call = "clEnqueueUnmapMemObject";
     ChildEnd end = child_run(command_fail, &command, sizeof command);
-    static const char expected[] = "glint: warning: clEnqueueUnmapMemObject: CL_OUT_OF_RESOURCES (-5) on ";
-    assert_memory_equal(end.errors, expected, strlen(expected));
+    assert_prints(&end, "glint: warning: clEnqueueUnmapMemObject: CL_OUT_OF_RESOURCES (-5) on ");
     assert_int_equal(end.status, EXIT_DONE);
     struct stat status;
     assert_int_equal(stat(path, &status), 0);
@@ -182,8 +186,7 @@ static void test_crashes(void **state)
             ChildEnd end = child_run(command_fail, &command, sizeof command);
             snprintf(expected, sizeof expected, "glint: %s%s: the OpenCL driver %s",
                      is_complete ? "warning: " : "", calls[i], k ? "aborted" : "crashed");
-            if (!strstr(end.errors, expected)) print_error("%s\n", end.errors);
-            assert_non_null(strstr(end.errors, expected));
+            assert_prints(&end, expected);
             assert_int_equal(end.status, is_complete ? EXIT_DONE : EXIT_MACHINE);
             struct stat status;
             assert_int_equal(stat(path, &status), 0);
