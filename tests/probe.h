@@ -47,10 +47,11 @@ static inline const Passport *probe_passport(void)
                                false);
 }
 
-// Returns the least precision at which one build of a kernel must give the same bits for the same operations:
-// `single`, unless the device's arithmetic is broken. PoCL on 32-bit x86 rounds a number once or twice,
-// depending on whether its compiler keeps it in an x87 register or in memory.
-static inline Precision probe_repeats_from(void)
+// Returns the least precision whose error bounds hold, and at which the same operations give the same bits
+// everywhere in a kernel: `single`, which glint renders at on any device, unless its arithmetic is broken.
+// PoCL on 32-bit x86 rounds a number once or twice, depending on whether its compiler keeps it in an x87
+// register or in memory.
+static inline Precision probe_sound_from(void)
 {
     Text broken = {0};
     const Passport *passport = probe_passport();
@@ -66,7 +67,7 @@ static inline Precision probe_same_bits_from(void)
 {
     const Passport *passport = probe_passport();
     const bool is_exact = passport && passport->quotients.wrong_count + passport->roots.wrong_count == 0;
-    return is_exact ? probe_repeats_from() : PRECISION_STRICT;
+    return is_exact ? probe_sound_from() : PRECISION_STRICT;
 }
 
 // Returns whether the device has the precision. If a passport refuses it, prints the reason.

@@ -196,7 +196,7 @@ static void assert_same_with_the_bvh(const Scene *scene, Precision precision)
 
 static bool is_tested(Precision precision)
 {
-    const Precision from = probe_repeats_from();
+    const Precision from = probe_sound_from();
     return precision == from || (tests_are_long() && precision > from && probe_has(precision));
 }
 

@@ -31,7 +31,7 @@ static void sample_has_a_pixel_of_each_cell(void **state)
 {
     (void)state;
     Scene scene = scene_of_file("scenes/globe.yaml");
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_repeats_from());
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_sound_from());
     settings.sample_count = 2;
     Film whole = film_render(&probe_compute, &scene, &settings, 0);
     settings.cell = CELL;
