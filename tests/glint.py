@@ -118,7 +118,7 @@ def refused_precisions():
 
 
 def broken_at_single():
-    """What the error bounds of `single` assume and the default device's arithmetic does not have; glint renders all the same."""
+    """Returns the properties that the bounds of `single` assume and the default device lacks, as text."""
     return ", ".join(f"{found['name']}: {found['value']}" for passport in probed_device()["passports"]
                      for found in passport["properties"]
                      if passport["precision"] == "single" and found["finding"] == "broken")

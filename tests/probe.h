@@ -60,7 +60,7 @@ static inline Precision probe_sound_from(void)
     return is_sound ? PRECISION_SINGLE : PRECISION_STRICT;
 }
 
-// Returns the least precision at which every build of a kernel must give the same bits: that of one build,
+// Returns the least precision at which every build of a kernel must give the same bits: probe_sound_from's,
 // unless the device's quotients or roots are inexact. Then a compiler may choose another approximation in
 // another build: at `single` an NVIDIA H100 gives other bits at one lane than at four.
 static inline Precision probe_same_bits_from(void)

@@ -53,7 +53,7 @@ static void command_fail(void *result)
     exit(status);
 }
 
-// Drivers may print warnings before: PoCL 3.1 does on arm64.
+// Drivers may print warnings first, as PoCL 3.1 does on arm64.
 static void assert_prints(const ChildEnd *end, const char *expected)
 {
     if (!strstr(end->errors, expected)) print_error("%s\n", end->errors);

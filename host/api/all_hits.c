@@ -105,7 +105,7 @@ static void batch_append(Batch *batch, size_t first, size_t count, GlintAllHits 
 static bool rays_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *all,
                            MessageList *messages)
 {
-    const size_t most = rays->count < BATCH_RAYS ? rays->count : BATCH_RAYS;
+    const size_t most = batch_rays(tracer, rays->count);
     Batch batch = batch_open(most);
     bool is_sound = true;
     for (size_t first = 0, count; first < rays->count && is_sound; first += count) {

@@ -55,7 +55,14 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
 Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
                           MessageList *messages);
 
-enum { BATCH_RAYS = 1 << 16 }; // traced at once, which bounds the memory that rays take
+// Returns how many of the rays are traced at once: on a CPU few enough that what they take, some 300 bytes
+// each, stays in its caches, on a GPU enough to occupy it.
+static inline size_t batch_rays(const GlintTracer *tracer, size_t ray_count)
+{
+    const bool is_gpu = tracer->device->compute.device->type & CL_DEVICE_TYPE_GPU;
+    const size_t most = is_gpu ? 1 << 18 : 1 << 16;
+    return ray_count < most ? ray_count : most;
+}
 
 // Copies a caller's rays as struct_read does. Returns false with a message if they are invalid.
 bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);

@@ -165,7 +165,7 @@ static void hit_batch_write(void *context, size_t begin, size_t end)
 static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
                        MessageList *messages)
 {
-    const size_t batch = rays->count < BATCH_RAYS ? rays->count : BATCH_RAYS;
+    const size_t batch = batch_rays(tracer, rays->count);
     TraceRay *scaled = memory_allocate(batch + 1, sizeof *scaled);
     TraceHit *found = memory_allocate(batch + 1, sizeof *found);
     int *exponents = memory_allocate(batch + 1, sizeof *exponents);

@@ -3,6 +3,7 @@
 #include "host/base/fault.h"
 #include "host/base/text.h"
 
+#include <ctype.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -192,6 +193,24 @@ void message_list_free(MessageList *list)
     *list = (MessageList){0};
 }
 
+// Returns whether texts are the same but for numbers that are not both whole.
+static bool texts_are_alike(const char *a, const char *b)
+{
+    while (*a && *b) {
+        if (!isdigit((unsigned char)*a) || !isdigit((unsigned char)*b)) {
+            if (*a++ != *b++) return false;
+            continue;
+        }
+        char *a_end, *b_end;
+        const double a_value = strtod(a, &a_end), b_value = strtod(b, &b_end);
+        const size_t a_digits = strspn(a, "0123456789"), b_digits = strspn(b, "0123456789");
+        if (a + a_digits == a_end && b + b_digits == b_end && a_value != b_value) return false;
+        a = a_end;
+        b = b_end;
+    }
+    return *a == *b;
+}
+
 static bool message_is_known(const Message *message, const MessageList *known)
 {
     for (size_t i = 0; i < known->count; i++) {
@@ -200,7 +219,7 @@ static bool message_is_known(const Message *message, const MessageList *known)
         if (message->severity == other->severity && message->line == other->line &&
             message->column == other->column &&
             (has_file ? strcmp(message->file, other->file) == 0 : message->file == other->file) &&
-            (message->line > 0 || strcmp(message->text, other->text) == 0))
+            texts_are_alike(message->text, other->text))
             return true;
     }
     return false;
@@ -208,6 +227,7 @@ static bool message_is_known(const Message *message, const MessageList *known)
 
 void message_list_remove(MessageList *list, const MessageList *known)
 {
+    if (known->count == 0) return;
     size_t kept = 0;
     for (size_t i = 0; i < list->count; i++)
         if (message_is_known(&list->items[i], known))

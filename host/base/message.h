@@ -56,8 +56,8 @@ void message_list_print(const MessageList *list, FILE *stream);
 char *message_list_text(const MessageList *list);
 void message_free(Message *message);
 void message_list_free(MessageList *list);
-// Removes the messages that are about a place that one of `known`, as severe, is about, or have no line and
-// its text.
+// Removes each message that `known` has: one of the same severity and place, whose text differs at most in
+// numbers that are not whole.
 void message_list_remove(MessageList *list, const MessageList *known);
 // Appends all messages of `from`, which is then empty.
 void message_list_move(MessageList *to, MessageList *from);

@@ -304,7 +304,7 @@ bool option_only_scene(const char *command, int argument_count, char **arguments
     return false;
 }
 
-static void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
+void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
 {
     const char *ending = path ? strrchr(path, '.') : NULL;
     if (ending && strcasecmp(ending, ".rt") == 0 && message_count(messages, MESSAGE_ERROR) > 0)

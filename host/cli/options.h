@@ -192,8 +192,11 @@ bool option_only_scene(const char *command, int argument_count, char **arguments
 SceneOptions scene_options_of(const CommonOptions *common);
 // Loads the scene and prints its messages. Returns false, with nothing to free, if it cannot be read.
 bool scene_open(Scene *scene, const char *path, const CommonOptions *common);
-// The same, but prints only the messages that `printed` lacks, and moves them there.
+// Loads the scene, prints those of its messages that `printed` lacks, and appends them to `printed`. Returns
+// false, with nothing to free, if the scene cannot be read.
 bool scene_open_once(Scene *scene, const char *path, const CommonOptions *common, MessageList *printed);
+// Prints those of the messages that `printed` lacks, and moves them there.
+void messages_print_once(MessageList *messages, MessageList *printed, const char *path);
 // Prints and frees messages. Errors in an .rt file follow the line `Error` that miniRT's testers expect.
 void messages_print(MessageList *messages, const char *path);
 

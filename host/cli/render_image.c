@@ -19,9 +19,10 @@ typedef struct {
     Shutter shutter;
     HostTimes *times;
     RenderSettings settings;
-    Checkpoint *checkpoint;         // NULL without --checkpoint
-    ImageOutput *output;            // NULL unless this is the shutter's last time
-    MessageList messages, *printed; // `printed`: when the scene was read
+    Checkpoint *checkpoint; // NULL without --checkpoint
+    ImageOutput *output;    // NULL unless this is the shutter's last time
+    MessageList messages;
+    MessageList *printed; // the warnings of all times
 } ImageRender;
 
 // Prints one estimate of the time and the size of a long render.
@@ -167,7 +168,7 @@ static int image_render(ImageRender *render)
     whole = files_write(render, whole);
     if (whole) warnings_add(render);
     bool faulty = message_count(&render->messages, MESSAGE_ERROR) > 0;
-    messages_print(&render->messages, NULL);
+    messages_print_once(&render->messages, render->printed, NULL);
     int status = whole                    ? EXIT_DONE
                  : faulty                 ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
                  : progress_interrupted() ? EXIT_INTERRUPTED
@@ -190,7 +191,7 @@ static int precision_choose(ImageRender *render, Pilot *pilot)
                                   render->scene, &render->settings, &render->messages);
     progress_close(&progress);
     const bool is_unfit = render->messages.count > 0;
-    messages_print(&render->messages, NULL);
+    messages_print_once(&render->messages, render->printed, NULL);
     if (!chosen) return is_unfit ? EXIT_USER : progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
     render->settings.precision = pilot->chosen;
     if (options->quiet) return EXIT_DONE;
@@ -225,13 +226,11 @@ static int time_render(ImageRender *render)
     if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
-        if (has_started && render->shutter.time > 0)
-            message_list_free(&render->messages); // the first time's, with other numbers
         const bool can_start = has_started && checkpoint_start(render);
         if (ranks) ranks->start(can_start);
         if (can_start) status = image_render(render);
     }
-    messages_print(&render->messages, NULL);
+    messages_print_once(&render->messages, render->printed, NULL);
     render->times->pilot = options->output.pilot = NULL;
     return status;
 }

@@ -42,7 +42,7 @@ bool arithmetic_suits(Compute *compute, const RenderSettings *settings, MessageL
         if (is_refused)
             message_error(messages,
                           "precision %s relies on arithmetic that the device \"%s\" does not have: %s; "
-                          "precision single works without it, but its error bounds may not hold",
+                          "precision single does not need it, but may exceed its error bounds",
                           precision_names[precision], device->name, text_c(&why));
         text_free(&why);
         if (is_refused) return false;

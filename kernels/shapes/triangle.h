@@ -193,7 +193,8 @@ static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdg
     return t;
 }
 
-// Whether the ray's line crosses a triangle, edges included, but not one that it runs in.
+// Returns whether the ray's line crosses the triangle, edges included. A line in the triangle's plane, where
+// all edge functions are 0, does not cross it.
 static inline mask triangle_is_crossed(const TriangleEdges *edges)
 {
     const real zero = (real)(0);

@@ -252,7 +252,8 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
             stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, met.entry.each[leaf]});
             continue;
         }
-        if (intersect_leaf(traversal, scene, ray, kind, first, hit_by)) group_shrink(group, traversal);
+        if (intersect_leaf_or_block(traversal, scene, ray, kind, first, hit_by))
+            group_shrink(group, traversal);
         if (group->active == 0) return;
     }
     for (uint left = met.children & ~leaves; left != 0; left &= left - 1) {

@@ -202,15 +202,15 @@ static inline Vector block_vertex(global const scalar *rows)
     return (Vector){real_load(rows), real_load(rows + LANES), real_load(rows + 2 * LANES)};
 }
 
-// Returns the triangles, as bits of the first `count` of a block, that one ray may hit. Rejects by what
-// begins the full test; at `certified` with errors of vertices that are not smaller.
+// Returns the triangles among the first `count` of a block, as bits, that one ray may hit. Runs the first
+// step of the full test, a lane per triangle; at `certified` with error bounds at least as large as its.
 static inline uint block_triangles_near(global const TriangleBlock *block, uint count, const Ray *ray,
                                         uint lane)
 {
     global const scalar *rows = (global const scalar *)block->rows;
     const Corners corners = {block_vertex(rows), block_vertex(rows + 3 * LANES),
                              block_vertex(rows + 6 * LANES)};
-    Ray one;
+    Ray one; // only what triangle_edges reads
     one.origin = vector_of_lane(&ray->origin, lane);
     one.across_u = vector_of_lane(&ray->across_u, lane);
     one.across_v = vector_of_lane(&ray->across_v, lane);
@@ -232,7 +232,7 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 {
     const uint first = block_first(scene, index);
     uint near = (1u << count) - 1;
-    if (popcount(lanes) < count) { // otherwise fewer full tests than rays
+    if (popcount(lanes) < count) { // otherwise there are no more full tests than rays
         near = 0;
         for (; lanes != 0; lanes &= lanes - 1)
             near |= block_triangles_near(&scene->triangle_blocks[index], count, ray, lowest_bit(lanes));
@@ -246,24 +246,35 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 }
 #endif
 
-// Intersects a leaf, count << 8 | kind (BvhNode.child_kind) and its index there, with the rays of some lanes,
-// given as bits. Instances are left out.
+#define IS_IN_BLOCKS(feature)                                                                                \
+    (LANES > 1 && (KIND_##feature == KIND_SPHERES || KIND_##feature == KIND_TRIANGLES))
+
+// Intersects a leaf, count << 8 | kind (BvhNode.child_kind) and its first primitive. Blocks and instances are
+// left out.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
-                                  uint index, uint lanes)
+                                  uint first)
+{
+    const uint kind = leaf & 0xff, last = first + (leaf >> 8);
+#define INTERSECT_LEAF(feature, Type, name, names)                                                           \
+    if (HAS_##feature && !IS_IN_BLOCKS(feature) && kind == KIND_##feature)                                   \
+        return intersect_##names(traversal, scene, ray, first, last);
+    SHAPE_LIST(INTERSECT_LEAF)
+    return false;
+}
+
+#if LANES > 1
+// Intersects a block or another leaf with the rays of some lanes, given as bits. Instances are left out.
+static inline bool intersect_leaf_or_block(Traversal *traversal, const Scene *scene, const Ray *ray,
+                                           uint leaf, uint index, uint lanes)
 {
     const uint kind = leaf & 0xff, count = leaf >> 8;
-#if LANES > 1
     if (HAS_SPHERES && kind == KIND_SPHERES)
         return intersect_sphere_block(traversal, scene, ray, index, count, lanes);
     if (HAS_TRIANGLES && kind == KIND_TRIANGLES)
         return intersect_triangle_block(traversal, scene, ray, index, count, lanes);
-#endif
-#define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && kind == KIND_##feature)                                                             \
-        return intersect_##names(traversal, scene, ray, index, index + count);
-    SHAPE_LIST(INTERSECT_LEAF)
-    return false;
+    return intersect_leaf(traversal, scene, ray, leaf, index);
 }
+#endif
 
 // Intersects the planes, which are never in the BVH.
 static inline void intersect_all_planes(Traversal *traversal, const Scene *scene, const Ray *ray)

@@ -41,7 +41,7 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
                 if (HAS_INSTANCES && (next.child_kind & 0xff) == KIND_INSTANCES)
                     instance_traverse(traversal, scene, ray, next.child_index, 1);
                 else
-                    intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index, 1);
+                    intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
                 if (!traversal->active) return;
                 tmax = traversal_tmax(traversal);
             }

@@ -100,16 +100,15 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
 {
     for (; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
-        Traversal *traversal = &tile->traversals[packet];
         if (HAS_INSTANCES && (leaf->kind & 0xff) == KIND_INSTANCES) {
             const uint rays = rays_within(tile, packet, &leaf->seen);
-            if (rays != 0 && instance_traverse(traversal, scene, &tile->rays[packet], leaf->index, rays))
+            if (rays != 0 &&
+                instance_traverse(&tile->traversals[packet], scene, &tile->rays[packet], leaf->index, rays))
                 tile_update(tile, packet);
             continue;
         }
         tile_prepare(tile, packet);
-        if (intersect_leaf(traversal, scene, &tile->rays[packet], leaf->kind, leaf->index,
-                           lanes_bits(traversal->active)))
+        if (intersect_leaf(&tile->traversals[packet], scene, &tile->rays[packet], leaf->kind, leaf->index))
             tile_update(tile, packet);
     }
 }
