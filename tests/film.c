@@ -45,7 +45,7 @@ bool arithmetic_is_refused(Compute *compute, const RenderSettings *settings)
     const bool needs_double = settings->precision >= PRECISION_DOUBLE;
     if (needs_double && !compute_in_double(compute)->device->fp64) return false; // has no passport
     RenderSettings usual = *settings;
-    usual.lanes = 0; // other lanes are not refused alone, but wrong
+    usual.lanes = 0; // as test_passport, which fails where these are refused wrongly
     MessageList messages = {0};
     const bool is_refused = !arithmetic_suits(compute, &usual, &messages) && messages.count > 0;
     message_list_print(&messages, stderr);

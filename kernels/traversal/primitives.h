@@ -135,10 +135,15 @@ static inline global const scalar *block_row(global const SphereBlock *block, ui
     return (global const scalar *)block->rows + row * LANES;
 }
 
+// Returns points, one per lane, whose x, y and z are in three rows.
+static inline Vector rows_load(global const scalar *rows)
+{
+    return (Vector){real_load(rows), real_load(rows + LANES), real_load(rows + 2 * LANES)};
+}
+
 static inline Vector block_centers(global const SphereBlock *block)
 {
-    return (Vector){real_load(block_row(block, 0)), real_load(block_row(block, 1)),
-                    real_load(block_row(block, 2))};
+    return rows_load(block_row(block, 0));
 }
 
 // Returns the sphere of one lane.
@@ -197,19 +202,13 @@ static inline bool intersect_sphere_block(Traversal *traversal, const Scene *sce
     return intersect_block_spheres(traversal, scene, ray, block, near);
 }
 
-static inline Vector block_vertex(global const scalar *rows)
-{
-    return (Vector){real_load(rows), real_load(rows + LANES), real_load(rows + 2 * LANES)};
-}
-
 // Returns the triangles among the first `count` of a block, as bits, that one ray may hit. Runs the first
 // step of the full test, a lane per triangle; at `certified` with error bounds at least as large as its.
 static inline uint block_triangles_near(global const TriangleBlock *block, uint count, const Ray *ray,
                                         uint lane)
 {
     global const scalar *rows = (global const scalar *)block->rows;
-    const Corners corners = {block_vertex(rows), block_vertex(rows + 3 * LANES),
-                             block_vertex(rows + 6 * LANES)};
+    const Corners corners = {rows_load(rows), rows_load(rows + 3 * LANES), rows_load(rows + 6 * LANES)};
     Ray one; // only what triangle_edges reads
     one.origin = vector_of_lane(&ray->origin, lane);
     one.across_u = vector_of_lane(&ray->across_u, lane);
@@ -232,7 +231,7 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 {
     const uint first = block_first(scene, index);
     uint near = (1u << count) - 1;
-    if (popcount(lanes) < count) { // otherwise there are no more full tests than rays
+    if (popcount(lanes) < count) { // the shorter loop
         near = 0;
         for (; lanes != 0; lanes &= lanes - 1)
             near |= block_triangles_near(&scene->triangle_blocks[index], count, ray, lowest_bit(lanes));
@@ -246,8 +245,11 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 }
 #endif
 
-#define IS_IN_BLOCKS(feature)                                                                                \
-    (LANES > 1 && (KIND_##feature == KIND_SPHERES || KIND_##feature == KIND_TRIANGLES))
+// Whether the leaves of a kind are blocks.
+static inline bool kind_has_blocks(uint kind)
+{
+    return LANES > 1 && (kind == KIND_SPHERES || kind == KIND_TRIANGLES);
+}
 
 // Intersects a leaf, count << 8 | kind (BvhNode.child_kind) and its first primitive. Blocks and instances are
 // left out.
@@ -256,7 +258,7 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
 {
     const uint kind = leaf & 0xff, last = first + (leaf >> 8);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && !IS_IN_BLOCKS(feature) && kind == KIND_##feature)                                   \
+    if (HAS_##feature && !kind_has_blocks(KIND_##feature) && kind == KIND_##feature)                         \
         return intersect_##names(traversal, scene, ray, first, last);
     SHAPE_LIST(INTERSECT_LEAF)
     return false;
