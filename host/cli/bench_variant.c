@@ -158,20 +158,34 @@ bool variant_run(Variant *variant, BenchTimes *times)
     return true;
 }
 
-// Renders frames until at least `seconds_min` have passed and the counter has changed since the previous
-// frame, for at most `seconds_max` if it does not change. `joules` is its last reading. Adds the frames to
-// *count, clears *is_whole if a render failed or the user interrupted, and returns the counter's reading.
+// Reads the counter into *joules and returns the seconds that this took.
+static double energy_read(EnergyMeter *meter, double *joules)
+{
+    const double start_seconds = clock_seconds();
+    *joules = energy_joules(meter);
+    return clock_seconds() - start_seconds;
+}
+
+// Renders frames until at least `seconds_min` have passed and the counter has changed since its previous
+// reading, for at most `seconds_max` if it does not change. `joules` is its last reading. Between readings,
+// during which the device idles (3.5 ms by NVML), frames take READ_SHARE times as long as one. Adds the
+// frames to *count, clears *is_whole if a render failed or the user interrupted, and returns the counter's
+// reading.
 static double frames_run(Variant *variant, EnergyMeter *meter, double joules, double seconds_min,
                          size_t *count, bool *is_whole)
 {
+    enum { READ_SHARE = 20 };
     static const double seconds_max = 5;
     const double start_seconds = clock_seconds();
-    double before, seconds;
+    double before, seconds, read_seconds = 0;
     do {
         before = joules;
-        *is_whole = *is_whole && variant_run(variant, NULL);
-        ++*count;
-        joules = energy_joules(meter);
+        const double frames_start_seconds = clock_seconds();
+        do {
+            *is_whole = *is_whole && variant_run(variant, NULL);
+            ++*count;
+        } while (*is_whole && clock_seconds() - frames_start_seconds < READ_SHARE * read_seconds);
+        read_seconds = energy_read(meter, &joules);
         seconds = clock_seconds() - start_seconds;
     } while (*is_whole && (seconds < seconds_min || (joules == before && seconds < seconds_max)));
     return joules;
@@ -179,12 +193,13 @@ static double frames_run(Variant *variant, EnergyMeter *meter, double joules, do
 
 bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
 {
-    static const double seconds_min = 0.5;
+    static const double seconds_min = 1;
     bool is_whole = true;
     size_t count = 0;
     row->energy.why_not = "the energy counter did not change or could not be read";
-    const double first_joules = energy_joules(meter),
-                 start_joules = frames_run(variant, meter, first_joules, 0, &count, &is_whole);
+    double first_joules;
+    energy_read(meter, &first_joules);
+    const double start_joules = frames_run(variant, meter, first_joules, 0, &count, &is_whole);
     if (!(start_joules > first_joules)) return is_whole;
     const double start_seconds = clock_seconds();
     count = 0;
