@@ -18,7 +18,7 @@ static uint8_t shown(float value, const ImageHeader *settings)
     header.width = header.channels = 1;
     header.bits = 8;
     uint8_t byte;
-    display_row(&byte, &value, &header, 0);
+    display_rows(&byte, &value, &header, 0, 1);
     return byte;
 }
 
@@ -63,11 +63,10 @@ static void block_show(uint8_t bytes[SIDE * SIDE], float value, Transfer transfe
 {
     const ImageHeader header = {
         .width = SIDE, .channels = 1, .transfer = transfer, .bits = 8, .dither = dither};
-    float values[SIDE];
-    for (int i = 0; i < SIDE; i++)
+    float values[SIDE * SIDE];
+    for (int i = 0; i < SIDE * SIDE; i++)
         values[i] = value;
-    for (uint32_t row = 0; row < SIDE; row++)
-        display_row(bytes + (size_t)SIDE * row, values, &header, row);
+    display_rows(bytes, values, &header, 0, SIDE);
 }
 
 // A block's mean is the exact display value to 1/64 of a step, or half a step of 16 bits, and it has two
@@ -169,6 +168,27 @@ static void test_regions_and_bands(void **state)
     text_free(&part);
 }
 
+// Many rows at once, which threads share, have the bytes of each by itself.
+static void test_rows_at_once(void **state)
+{
+    (void)state;
+    enum { ROWS = 300, COLUMNS = 700 };
+    static float values[ROWS * COLUMNS * 3];
+    static uint8_t together[2 * sizeof values / sizeof *values], alone[sizeof together];
+    for (size_t i = 0; i < ROWS * COLUMNS * 3; i++)
+        values[i] = (float)(i % 1021) / 1000;
+    for (unsigned bits = 8; bits <= 16; bits += 8) {
+        const ImageHeader header = {
+            .width = COLUMNS, .height = ROWS, .channels = 3, .bits = bits, .dither = bits == 8};
+        const size_t row_size = display_row_size(&header);
+        assert_int_equal(row_size, COLUMNS * 3 * bits / 8);
+        display_rows(together, values, &header, 0, ROWS);
+        for (uint32_t row = 0; row < ROWS; row++)
+            display_rows(alone + row * row_size, values + (size_t)row * COLUMNS * 3, &header, row, 1);
+        assert_memory_equal(together, alone, ROWS * row_size);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -177,6 +197,7 @@ int main(void)
         cmocka_unit_test(test_dither_keeps_the_mean),
         cmocka_unit_test(test_dither_keeps_exact_values),
         cmocka_unit_test(test_dither_spreads),
+        cmocka_unit_test(test_rows_at_once),
         cmocka_unit_test_setup_teardown(test_regions_and_bands, folder_open, folder_close),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

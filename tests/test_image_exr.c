@@ -1,5 +1,6 @@
 // EXR files as other programs write them: halves, every lossless compression, tiles, more channels than
 // three.
+#include "host/base/text.h"
 #include "host/image/image.h"
 #include "tests/files.h"
 
@@ -382,6 +383,53 @@ static void test_blocks_as_large_as_compressed(void **state)
     }
 }
 
+// The file is the same however many rows come at once: parts of blocks, many blocks, or both.
+static void test_rows_in_any_number(void **state)
+{
+    (void)state;
+    enum { ROWS = 611, COLUMNS = 7, LAYERS = 3 };
+    const ImageLayer layers[] = {{"object", 1, 'u'}, {"position.X,position.Y", 2, 'f'}};
+    const ImageHeader header = {.format = IMAGE_EXR,
+                                .width = COLUMNS,
+                                .height = ROWS,
+                                .channels = 3,
+                                .npy_type = 'f',
+                                .layers = layers,
+                                .layer_count = 2};
+    static const size_t channels[LAYERS] = {3, 1, 2};
+    static float values[LAYERS][ROWS * COLUMNS * 3];
+    for (size_t i = 0; i < LAYERS; i++)
+        for (size_t k = 0; k < ROWS * COLUMNS * 3; k++)
+            values[i][k] = (float)(k * (k + i) % 1009);
+    static const uint32_t steps[] = {ROWS, 1, 5, 15, 16, 17, 32, 100, 600};
+    Text whole = {0};
+    for (size_t k = 0; k < sizeof steps / sizeof *steps; k++) {
+        MessageList messages = {0};
+        ImageWriter *writer = image_writer_open(path, &header, &messages);
+        for (uint32_t row = 0; row < ROWS; row += steps[k]) {
+            const void *arrays[LAYERS];
+            for (size_t i = 0; i < LAYERS; i++)
+                arrays[i] = values[i] + row * COLUMNS * channels[i];
+            const uint32_t count = steps[k] < ROWS - row ? steps[k] : ROWS - row;
+            if (!image_writer_layer_rows(writer, arrays, count, &messages))
+                fail_msg("step %u row %u: %s", steps[k], row, messages.items[0].text);
+        }
+        assert_true(image_writer_commit(writer, &messages));
+        Text text = {0};
+        assert_true(text_read_file(&text, path, &messages));
+        if (k == 0) whole = text;
+        assert_int_equal(text.count, whole.count);
+        assert_memory_equal(text.items, whole.items, whole.count);
+        if (k > 0) text_free(&text);
+    }
+    text_free(&whole);
+    Image image;
+    MessageList messages = {0};
+    assert_true(image_read(&image, path, &messages));
+    assert_memory_equal(image.values, values[0], sizeof values[0]);
+    image_free(&image);
+}
+
 static void test_integer_channels_are_refused(void **state)
 {
     (void)state;
@@ -409,6 +457,7 @@ int main(void)
         cmocka_unit_test(test_luminance_and_chroma),
         cmocka_unit_test(test_other_primaries_are_named),
         cmocka_unit_test(test_blocks_as_large_as_compressed),
+        cmocka_unit_test(test_rows_in_any_number),
         cmocka_unit_test(test_integer_channels_are_refused),
     };
     return cmocka_run_group_tests(tests, folder_open, folder_close);

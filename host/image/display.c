@@ -1,12 +1,13 @@
 #include "host/image/display.h"
+#include "host/base/parallel.h"
 #include "host/image/transfer.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-// Values that are converted at once.
-enum { CHUNK = 768 };
+// Values that are converted at once, and the fewest that a thread converts.
+enum { CHUNK = 768, VALUES_OF_THREAD_MIN = 1 << 16 };
 
 // Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2016: a rational fit of the Academy's reference
 // transforms, per channel. It reaches 1 at 7.24.
@@ -40,7 +41,7 @@ static uint8_t dithered(float value, Transfer transfer, uint32_t x, uint32_t y)
     return (uint8_t)((image_quantize(value, transfer, 16) + ((2 * bayer(x, y) + 1) * 257 >> 7)) / 257);
 }
 
-void display_row(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t row)
+static void row_convert(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t row)
 {
     const size_t count = (size_t)header->width * header->channels, value_size = header->bits / 8;
     const double gain =
@@ -62,4 +63,34 @@ void display_row(uint8_t *bytes, const float *values, const ImageHeader *header,
                 dithered(chunk[i], header->transfer,
                          header->left + (uint32_t)((start + i) / header->channels), header->top + row);
     }
+}
+
+size_t display_row_size(const ImageHeader *header)
+{
+    return (size_t)header->width * header->channels * (header->bits / 8);
+}
+
+typedef struct {
+    uint8_t *bytes;
+    const float *values;
+    const ImageHeader *header;
+    uint32_t first_row;
+} DisplayRows;
+
+static void rows_convert(void *context, size_t begin, size_t end)
+{
+    const DisplayRows *rows = context;
+    const ImageHeader *header = rows->header;
+    for (size_t row = begin; row < end; row++)
+        row_convert(rows->bytes + row * display_row_size(header),
+                    rows->values + row * header->width * header->channels, header,
+                    rows->first_row + (uint32_t)row);
+}
+
+void display_rows(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t first_row,
+                  uint32_t row_count)
+{
+    DisplayRows rows = {bytes, values, header, first_row};
+    const size_t row_values = (size_t)header->width * header->channels;
+    parallel_run(row_count, (VALUES_OF_THREAD_MIN + row_values - 1) / row_values, rows_convert, &rows);
 }

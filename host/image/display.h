@@ -3,8 +3,12 @@
 
 #include "host/image/image.h"
 
-// Writes a row of the image, the first one being 0.
-void display_row(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t row);
+// Returns the size of a row's bytes.
+size_t display_row_size(const ImageHeader *header);
+
+// Converts rows first_row..first_row+row_count-1 of the image, on all cores.
+void display_rows(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t first_row,
+                  uint32_t row_count);
 
 // Returns the displayed fraction of a linear value, which is not limited by TONE_NONE, and from 0 to 1 by
 // others.

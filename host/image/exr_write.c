@@ -4,6 +4,7 @@
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/base/parallel.h"
 #include "host/base/text.h"
 
 #include <errno.h>
@@ -16,7 +17,7 @@ typedef struct {
     char *channels; // names, each ended by a null
     size_t channel_count;
     bool is_integer;
-    void *block; // rows of the incomplete block
+    uint8_t *rows_held; // of a block that is not complete
 } WrittenLayer;
 
 // A channel of the file and the place of its values: the number of the layer and of the value in each pixel.
@@ -25,13 +26,21 @@ typedef struct {
     size_t layer, value;
 } ExrChannel;
 
-enum { VALUE_BYTES = 4 };
+enum { VALUE_BYTES = 4, BLOCKS_MAX = 16 };
+
+// A block of rows that waits for its compression, which threads do, each for some blocks.
+typedef struct {
+    exr_encode_pipeline_t pipeline;
+    bool has_pipeline; // which is kept for later blocks
+    exr_result_t code;
+} ExrBlock;
 
 typedef struct {
     exr_context_t context;
-    exr_encode_pipeline_t pipeline;
-    bool has_pipeline;
+    ExrBlock blocks[BLOCKS_MAX];
+    size_t block_count, block_capacity;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
+    exr_result_t (*write)(exr_encode_pipeline_t *pipeline);    // likewise
     WrittenLayer layers[1 + IMAGE_LAYERS_MAX];
     size_t layer_count;
     ExrChannel *channels; // of all layers, by name, as in the file
@@ -161,6 +170,11 @@ static exr_result_t exr_header(ImageWriter *writer)
     return code;
 }
 
+static size_t layer_row_size(const ImageWriter *writer, const WrittenLayer *layer)
+{
+    return writer->header.width * layer->channel_count * VALUE_BYTES;
+}
+
 static bool exr_begin(ImageWriter *writer, MessageList *messages)
 {
     const ImageHeader *header = &writer->header;
@@ -175,19 +189,27 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
     exr_result_t code = exr_header(writer);
     if (code != EXR_ERR_SUCCESS) return exr_write_failed(writer, code, messages);
     for (size_t i = 0; i < state->layer_count; i++)
-        state->layers[i].block = memory_allocate(
-            (size_t)state->block_rows * header->width * state->layers[i].channel_count, VALUE_BYTES);
+        state->layers[i].rows_held =
+            memory_allocate(state->block_rows, layer_row_size(writer, &state->layers[i]));
+    const size_t threads = parallel_threads();
+    state->block_capacity = threads < BLOCKS_MAX ? threads : BLOCKS_MAX;
     return true;
 }
 
-// Points a channel of the file at its values in the incomplete block.
-static void channel_place(const ExrWriter *state, int index, uint32_t width)
+// The rows of a block by layer: in the caller's arrays or in rows_held.
+typedef struct {
+    const uint8_t *layers[1 + IMAGE_LAYERS_MAX];
+} BlockRows;
+
+// Points a channel of the file at its values in the block's rows.
+static void channel_place(const ExrWriter *state, exr_encode_pipeline_t *pipeline, const BlockRows *rows,
+                          int index, uint32_t width)
 {
     const ExrChannel *from = &state->channels[index];
     const WrittenLayer *layer = &state->layers[from->layer];
-    exr_coding_channel_info_t *channel = &state->pipeline.channels[index];
+    exr_coding_channel_info_t *channel = &pipeline->channels[index];
     const size_t pixel_bytes = layer->channel_count * VALUE_BYTES;
-    channel->encode_from_ptr = (const uint8_t *)layer->block + from->value * VALUE_BYTES;
+    channel->encode_from_ptr = rows->layers[from->layer] + from->value * VALUE_BYTES;
     channel->user_pixel_stride = (int32_t)pixel_bytes;
     channel->user_line_stride = (int32_t)(pixel_bytes * width);
     channel->user_bytes_per_element = VALUE_BYTES;
@@ -205,58 +227,114 @@ static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
     return code;
 }
 
-// Writes the buffered rows as one block.
-static exr_result_t exr_block(ImageWriter *writer)
+// Blocks are written in their order once all that wait are compressed.
+static exr_result_t exr_wait(exr_encode_pipeline_t *pipeline)
+{
+    (void)pipeline;
+    return EXR_ERR_SUCCESS;
+}
+
+static void blocks_compress(void *context, size_t begin, size_t end)
+{
+    ExrWriter *state = context;
+    for (size_t i = begin; i < end; i++)
+        state->blocks[i].code = exr_encoding_run(state->context, 0, &state->blocks[i].pipeline);
+}
+
+static exr_result_t blocks_write(ExrWriter *state)
+{
+    exr_result_t code = EXR_ERR_SUCCESS;
+    parallel_run(state->block_count, 1, blocks_compress, state);
+    for (size_t i = 0; i < state->block_count; i++) {
+        EXR_STEP(code, state->blocks[i].code);
+        EXR_STEP(code, state->write(&state->blocks[i].pipeline));
+    }
+    state->block_count = 0;
+    return code;
+}
+
+// Lets the library choose how a pipeline packs, compresses and writes, and inserts exr_compress and exr_wait.
+static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pipeline)
+{
+    const exr_result_t code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
+    state->compress = pipeline->compress_fn;
+    state->write = pipeline->write_fn;
+    pipeline->compress_fn = exr_compress;
+    pipeline->yield_until_ready_fn = pipeline->write_fn = exr_wait; // the default fails out of order
+    pipeline->encoding_user_data = state;
+    return code;
+}
+
+// Lets the next block wait. Its rows stay until it is written.
+static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;
+    ExrBlock *block = &state->blocks[state->block_count++];
+    exr_encode_pipeline_t *pipeline = &block->pipeline;
     exr_chunk_info_t chunk;
-    exr_encode_pipeline_t *pipeline = &state->pipeline;
     exr_result_t code = exr_write_scanline_chunk_info(state->context, 0,
                                                       (int)(writer->header.top + state->block_start), &chunk);
+    const bool is_first = !block->has_pipeline;
+    EXR_STEP(code, is_first ? exr_encoding_initialize(state->context, 0, &chunk, pipeline)
+                            : exr_encoding_update(state->context, 0, &chunk, pipeline));
     if (code != EXR_ERR_SUCCESS) return code;
-    bool is_first = !state->has_pipeline;
-    code = is_first ? exr_encoding_initialize(state->context, 0, &chunk, pipeline)
-                    : exr_encoding_update(state->context, 0, &chunk, pipeline);
-    if (code != EXR_ERR_SUCCESS) return code;
-    state->has_pipeline = true;
+    block->has_pipeline = true;
     for (int i = 0; i < pipeline->channel_count; i++)
-        channel_place(state, i, writer->header.width);
-    if (is_first) {
-        code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
-        state->compress = pipeline->compress_fn;
-        pipeline->compress_fn = exr_compress;
-        pipeline->encoding_user_data = state;
-    }
-    EXR_STEP(code, exr_encoding_run(state->context, 0, pipeline));
-    state->block_start += state->rows_held;
+        channel_place(state, pipeline, rows, i, writer->header.width);
+    if (is_first) code = pipeline_prepare(state, pipeline);
+    state->block_start += row_count;
     state->rows_held = 0;
+    if (state->block_count == state->block_capacity) EXR_STEP(code, blocks_write(state));
+    return code;
+}
+
+// Copies rows of the arrays to those held. What waits may be there.
+static exr_result_t rows_hold(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
+{
+    ExrWriter *state = writer->state;
+    const exr_result_t code = state->rows_held == 0 ? blocks_write(state) : EXR_ERR_SUCCESS;
+    for (size_t i = 0; i < state->layer_count; i++) {
+        const size_t row_size = layer_row_size(writer, &state->layers[i]);
+        memcpy(state->layers[i].rows_held + state->rows_held * row_size, rows->layers[i],
+               row_count * row_size);
+    }
+    state->rows_held += row_count;
     return code;
 }
 
 static bool exr_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
                      MessageList *messages)
 {
-    const ImageHeader *header = &writer->header;
     ExrWriter *state = writer->state;
-    for (uint32_t row = 0; row < row_count; row++) {
-        for (size_t i = 0; i < state->layer_count; i++) {
-            const size_t row_bytes = header->width * state->layers[i].channel_count * VALUE_BYTES;
-            memcpy((char *)state->layers[i].block + state->rows_held * row_bytes,
-                   (const char *)arrays[i] + row * row_bytes, row_bytes);
+    exr_result_t code = EXR_ERR_SUCCESS;
+    BlockRows held;
+    for (size_t i = 0; i < state->layer_count; i++)
+        held.layers[i] = state->layers[i].rows_held;
+    for (uint32_t row = 0, taken; row < row_count && code == EXR_ERR_SUCCESS; row += taken) {
+        const uint32_t left = writer->header.height - state->block_start;
+        const uint32_t block_rows = left < state->block_rows ? left : state->block_rows;
+        BlockRows rows;
+        for (size_t i = 0; i < state->layer_count; i++)
+            rows.layers[i] = (const uint8_t *)arrays[i] + row * layer_row_size(writer, &state->layers[i]);
+        taken = block_rows - state->rows_held;
+        if (taken > row_count - row) taken = row_count - row;
+        if (taken == block_rows) {
+            code = block_add(writer, &rows, block_rows);
+        } else {
+            code = rows_hold(writer, &rows, taken);
+            if (state->rows_held == block_rows) EXR_STEP(code, block_add(writer, &held, block_rows));
         }
-        state->rows_held++;
-        if (state->rows_held < state->block_rows && state->block_start + state->rows_held < header->height)
-            continue;
-        exr_result_t code = exr_block(writer);
-        if (code != EXR_ERR_SUCCESS) return exr_write_failed(writer, code, messages);
     }
-    return true;
+    EXR_STEP(code, blocks_write(state));
+    return code == EXR_ERR_SUCCESS || exr_write_failed(writer, code, messages);
 }
 
 static exr_result_t exr_close(ExrWriter *state)
 {
-    if (state->has_pipeline) exr_encoding_destroy(state->context, &state->pipeline);
-    state->has_pipeline = false;
+    for (size_t i = 0; i < BLOCKS_MAX; i++) {
+        if (state->blocks[i].has_pipeline) exr_encoding_destroy(state->context, &state->blocks[i].pipeline);
+        state->blocks[i].has_pipeline = false;
+    }
     return state->context ? exr_finish(&state->context) : EXR_ERR_SUCCESS;
 }
 
@@ -273,7 +351,7 @@ static void exr_free(ImageWriter *writer)
     exr_close(state);
     for (size_t i = 0; i < state->layer_count; i++) {
         free(state->layers[i].channels);
-        free(state->layers[i].block);
+        free(state->layers[i].rows_held);
     }
     free(state->channels);
     free(state);

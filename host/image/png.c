@@ -17,7 +17,7 @@
 typedef struct {
     png_structp png;
     png_infop info;
-    uint8_t *bytes; // the row to write, or all rows read
+    uint8_t *bytes; // the rows to write, or all rows read
     char problem[256];
 } PngState;
 
@@ -71,7 +71,6 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
     state->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, state, png_fail, png_ignore);
     state->info = state->png ? png_create_info_struct(state->png) : NULL;
     if (!state->info) fault("libpng cannot write");
-    state->bytes = memory_allocate((size_t)header->width * header->channels, header->bits / 8);
     if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
 
     png_set_write_fn(state->png, writer->output.file, png_write_bytes, png_flush_none);
@@ -93,16 +92,14 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
 static bool png_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
                      MessageList *messages)
 {
-    const void *pixels = arrays[0];
     const ImageHeader *header = &writer->header;
     PngState *state = writer->state;
-    size_t row_values = (size_t)header->width * header->channels;
+    const size_t row_size = display_row_size(header);
+    state->bytes = memory_resize(state->bytes, row_count, row_size);
+    display_rows(state->bytes, arrays[0], header, writer->rows_written, row_count);
     if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
-    for (uint32_t row = 0; row < row_count; row++) {
-        display_row(state->bytes, (const float *)pixels + row * row_values, header,
-                    writer->rows_written + row);
-        png_write_row(state->png, state->bytes);
-    }
+    for (uint32_t row = 0; row < row_count; row++)
+        png_write_row(state->png, state->bytes + row * row_size);
     return true;
 }
 

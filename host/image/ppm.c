@@ -10,7 +10,6 @@
 static bool ppm_begin(ImageWriter *writer, MessageList *messages)
 {
     const ImageHeader *header = &writer->header;
-    writer->state = memory_allocate((size_t)header->width * header->channels, header->bits / 8);
     char start[64];
     int length = snprintf(start, sizeof start, "P%c\n%u %u\n%u\n", header->channels == 1 ? '5' : '6',
                           header->width, header->height, (1U << header->bits) - 1);
@@ -20,24 +19,15 @@ static bool ppm_begin(ImageWriter *writer, MessageList *messages)
 static bool ppm_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
                      MessageList *messages)
 {
-    const void *pixels = arrays[0];
-    const ImageHeader *header = &writer->header;
-    size_t row_values = (size_t)header->width * header->channels;
-    const float *values = pixels;
-    for (uint32_t row = 0; row < row_count; row++, values += row_values) {
-        display_row(writer->state, values, header, writer->rows_written + row);
-        if (!output_write(&writer->output, writer->state, row_values * (header->bits / 8), messages))
-            return false;
-    }
-    return true;
+    const size_t size = row_count * display_row_size(&writer->header);
+    uint8_t *bytes = memory_allocate(size, 1);
+    display_rows(bytes, arrays[0], &writer->header, writer->rows_written, row_count);
+    const bool written = output_write(&writer->output, bytes, size, messages);
+    free(bytes);
+    return written;
 }
 
-static void ppm_free(ImageWriter *writer)
-{
-    free(writer->state);
-}
-
-const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, ppm_free, NULL};
+const Encoder ppm_encoder = {ppm_begin, ppm_rows, NULL, NULL, NULL};
 
 // Reads the number at `*at` after white space and comments. Returns false unless it is below 2^31.
 static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)
