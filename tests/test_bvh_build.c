@@ -35,9 +35,9 @@ static void assert_contains(const Bounds *outer, const Bounds *inner)
 
 static void leaf_check(TreeCheck *check, const BvhChild *leaf)
 {
-    assert_true(leaf->count <= check->bvh->leaves.size_max);
     assert_true(leaf->first + leaf->count <= check->bvh->primitive_count);
     const uint32_t *order = check->bvh->order + leaf->first;
+    assert_true(leaf->count <= leaf_size_max(check->bvh->leaves, check->kinds[order[0]]));
     for (uint32_t i = 0; i < leaf->count; i++) {
         assert_int_equal(check->seen[order[i]]++, 0);
         assert_int_equal(check->kinds[order[i]], check->kinds[order[0]]);
@@ -52,7 +52,7 @@ static void node_check(TreeCheck *check, uint32_t index, unsigned depth)
     for (int side = 0; side < 2; side++) {
         const BvhChild *child = &check->bvh->nodes[index].children[side];
         if (bounds_is_empty(&child->box)) {
-            assert_true(check->bvh->primitive_count <= check->bvh->leaves.size_max);
+            assert_int_equal(check->bvh->node_count, 1);
         } else if (child->count > 0) {
             leaf_check(check, child);
         } else {
@@ -131,7 +131,8 @@ static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count, 
 
 static void trees_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
 {
-    static const BvhLeaves leaves[] = {{8, false}, {4, false}, {4, true}, {16, true}};
+    static const BvhLeaves leaves[] = {{8, 0, false}, {4, 0, false},  {8, 4, false},
+                                       {8, 4, true},  {8, 16, false}, {8, 16, true}};
     for (size_t i = 0; i < sizeof leaves / sizeof *leaves; i++)
         tree_check(boxes, kinds, count, leaves[i]);
 }
@@ -205,6 +206,40 @@ static void few_boxes_make_a_tree(void **state)
     }
 }
 
+// Returns the costs of testing the cylinders: the area of each leaf's box times its number of them.
+static double cylinder_cost(const Bvh *bvh)
+{
+    double cost = 0;
+    for (size_t i = 0; i < 2 * bvh->node_count; i++) {
+        const BvhChild *child = &bvh->nodes[i / 2].children[i % 2];
+        if (child->count > 0 && bvh->kinds[child->first] == KIND_CYLINDERS)
+            cost += child->count * bounds_half_area(child->box);
+    }
+    return cost;
+}
+
+// Blocks of spheres do not enlarge the leaves of the cylinders among them.
+static void blocks_keep_other_leaves_small(void **state)
+{
+    (void)state;
+    enum { COUNT = 8000 };
+    static Bounds boxes[COUNT];
+    static uint8_t kinds[COUNT];
+    for (size_t part = 2; part <= 32; part *= 2) { // of as many primitives one is a cylinder
+        for (size_t i = 0; i < COUNT; i++) {
+            boxes[i] =
+                cube_around(random_cube_point(&random_state, 10), random_between(&random_state, 0, 0.5));
+            kinds[i] = i % part == 0 ? KIND_CYLINDERS : KIND_SPHERES;
+        }
+        Bvh with, without;
+        bvh_build(&with, boxes, kinds, COUNT, (BvhLeaves){8, 16, part > 16}, NULL);
+        bvh_build(&without, boxes, kinds, COUNT, (BvhLeaves){8}, NULL);
+        assert_true(cylinder_cost(&with) <= 1.2 * cylinder_cost(&without));
+        bvh_free(&with);
+        bvh_free(&without);
+    }
+}
+
 // Next to a town of size 2, the slack of its boxes must not be that of a planet.
 static void planets_stay_outside_the_tree(void **state)
 {
@@ -265,6 +300,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(any_boxes_make_a_tree),
         cmocka_unit_test(few_boxes_make_a_tree),
+        cmocka_unit_test(blocks_keep_other_leaves_small),
         cmocka_unit_test(planets_stay_outside_the_tree),
         cmocka_unit_test(points_make_a_tree),
     };

@@ -4,7 +4,6 @@
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/bvh_split.h"
-#include "host/compile/flat_types.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
@@ -77,7 +76,7 @@ static bool range_divide(const Builder *builder, const PrimitiveRange *range, un
         left = range_split(references, count, &range->bounds, builder->leaves,
                            depth == 0 && count >= THREAD_RANGE_MIN, bounds);
     if (left == count) {
-        const bool fits = count <= builder->leaves.size_max;
+        const bool fits = range_fits_leaf(references, count, builder->leaves);
         if (fits) range_sort_by_kind(builder, range);
         left = fits ? range_kind_boundary(builder, range) - range->begin : count / 2;
         if (left == count && count > 1 && reference_kind(references) == KIND_INSTANCES) left = count / 2;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "host/base/stage.h"
+#include "host/compile/flat_types.h"
 #include "host/scene/bounds.h"
 #include <stddef.h>
 #include <stdint.h>
@@ -19,12 +20,24 @@ typedef struct {
     BvhChild children[2];
 } BvhBinaryNode;
 
+// The most primitives of a leaf. Those of a block, all of one kind that has blocks, are tested at once, so
+// that what fits one is split by kinds alone.
 typedef struct {
-    unsigned size_max; // primitives per leaf
-    // Whether leaves count as tested at one cost whatever their size, and what fits one is split by kinds
-    // alone.
-    bool are_blocks;
+    unsigned size_max;
+    unsigned block_size; // 0: there are no blocks
+    bool counts_blocks;  // whether splits are chosen by numbers of blocks instead of primitives
 } BvhLeaves;
+
+static inline bool kind_is_in_blocks(BvhLeaves leaves, unsigned kind)
+{
+    return leaves.block_size > 0 && kind_has_blocks(kind);
+}
+
+// Returns the most primitives of a leaf of one kind.
+static inline unsigned leaf_size_max(BvhLeaves leaves, unsigned kind)
+{
+    return kind_is_in_blocks(leaves, kind) ? leaves.block_size : leaves.size_max;
+}
 
 // An empty child adds nothing.
 static inline Bounds bvh_node_bounds(const BvhBinaryNode *node)

@@ -115,8 +115,7 @@ typedef struct {
 // What testing `count` primitives costs, relative to one primitive or to one block.
 static inline float test_cost(BvhLeaves leaves, uint32_t count)
 {
-    const uint32_t blocks = (count + leaves.size_max - 1) / leaves.size_max;
-    return (float)(leaves.are_blocks ? blocks : count);
+    return (float)(leaves.counts_blocks ? (count + leaves.block_size - 1) / leaves.block_size : count);
 }
 
 static inline Int4 bins_of(const BinMap *map, const PrimitiveReference *reference)
@@ -294,11 +293,25 @@ static size_t range_partition(PrimitiveReference *references, size_t count, cons
     return left;
 }
 
+bool range_fits_leaf(const PrimitiveReference *references, size_t count, BvhLeaves leaves)
+{
+    for (size_t i = 0; i < count; i++)
+        if (count > leaf_size_max(leaves, reference_kind(&references[i]))) return false;
+    return true;
+}
+
+static bool all_in_blocks(const PrimitiveReference *references, size_t count, BvhLeaves leaves)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!kind_is_in_blocks(leaves, reference_kind(&references[i]))) return false;
+    return true;
+}
+
 size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, BvhLeaves leaves,
                    bool is_parallel, RangeBounds sides[2])
 {
-    const bool fits = count <= leaves.size_max;
-    if (fits && leaves.are_blocks) return count;
+    const bool fits = range_fits_leaf(references, count, leaves);
+    if (fits && all_in_blocks(references, count, leaves)) return count;
     const BinMap map = bins_make(bounds->centers, count, leaves);
     const Split split = count <= FEW_MAX ? split_find_of_few(references, (int)count, &map)
                                          : split_find(references, count, &map, is_parallel);

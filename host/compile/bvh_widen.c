@@ -46,9 +46,10 @@ static bool child_is_node(const BvhChild *child)
     return child->count == 0 && !child_is_empty(child);
 }
 
-static float leaf_cost(const Widening *widening, double half_area, uint32_t count)
+static float leaf_cost(const Widening *widening, double half_area, uint32_t first, uint32_t count)
 {
-    const double test_cost = widening->bvh->leaves.are_blocks ? block_cost : intersection_cost * count;
+    const bool is_block = kind_is_in_blocks(widening->bvh->leaves, widening->bvh->kinds[first]);
+    const double test_cost = is_block ? block_cost : intersection_cost * count;
     return (float)(half_area * widening->scale * (visit_cost + test_cost));
 }
 
@@ -58,7 +59,7 @@ static const Subtree *child_subtree(const Widening *widening, const BvhChild *ch
     if (child_is_node(child)) return &widening->subtrees[child->first];
     *leaf = (Subtree){.slots_max = 1, .first = child->first, .count = child->count};
     if (!child_is_empty(child))
-        leaf->leaves_cost = leaf_cost(widening, bounds_half_area(child->box), child->count);
+        leaf->leaves_cost = leaf_cost(widening, bounds_half_area(child->box), child->first, child->count);
     return leaf;
 }
 
@@ -79,7 +80,7 @@ static void subtree_count(const Widening *widening, const Subtree *first, const 
 {
     const uint8_t *kinds = widening->bvh->kinds;
     bool joins = first->count > 0 && second->count > 0 &&
-                 first->count + second->count <= widening->bvh->leaves.size_max &&
+                 first->count + second->count <= leaf_size_max(widening->bvh->leaves, kinds[first->first]) &&
                  kinds[first->first] == kinds[second->first] && kinds[first->first] != KIND_INSTANCES;
     subtree->first = first->first < second->first ? first->first : second->first;
     subtree->count = joins ? first->count + second->count : 0;
@@ -106,7 +107,8 @@ static void costs_find(Widening *widening)
         const double half_area = bounds_half_area(bvh_node_bounds(node));
         const float as_node = subtree->costs[subtree->slots_max] +
                               (float)(half_area * widening->scale * (node_cost + visit_cost));
-        const float as_leaf = leaf_cost(widening, half_area, subtree->count) - subtree->leaves_cost;
+        const float as_leaf =
+            leaf_cost(widening, half_area, subtree->first, subtree->count) - subtree->leaves_cost;
         subtree->is_leaf = subtree->count > 0 && as_leaf < as_node;
         subtree->costs[1] = (subtree->is_leaf ? as_leaf : as_node) + tie_cost;
         for (unsigned slots = 2; slots <= subtree->slots_max; slots++)
