@@ -40,7 +40,7 @@ typedef struct {
     ExrBlock blocks[BLOCKS_MAX];
     size_t block_count, block_capacity;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
-    exr_result_t (*write)(exr_encode_pipeline_t *pipeline);    // likewise
+    exr_result_t (*write)(exr_encode_pipeline_t *pipeline);    // the library's
     WrittenLayer layers[1 + IMAGE_LAYERS_MAX];
     size_t layer_count;
     ExrChannel *channels; // of all layers, by name, as in the file
