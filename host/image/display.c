@@ -90,7 +90,8 @@ static void rows_convert(void *context, size_t begin, size_t end)
 void display_rows(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t first_row,
                   uint32_t row_count)
 {
-    DisplayRows rows = {bytes, values, header, first_row};
+    DisplayRows rows = {.values = values, .header = header, .first_row = first_row};
+    rows.bytes = bytes;
     const size_t row_values = (size_t)header->width * header->channels;
     parallel_run(row_count, (VALUES_OF_THREAD_MIN + row_values - 1) / row_values, rows_convert, &rows);
 }
