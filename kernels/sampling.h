@@ -117,4 +117,15 @@ static inline SquarePoint disc_of_square(SquarePoint point)
     return (SquarePoint){lanes_select(is_wide, along, across), lanes_select(is_wide, across, along)};
 }
 
+// Maps the square onto the triangle (0, 0), (1, 0), (0, 1) so that equal areas remain equal (Heitz, A
+// low-distortion map between triangle and square, 2019), and returns the point relative to (1/4, 1/4), which
+// the square's center becomes.
+static inline SquarePoint triangle_of_square(SquarePoint point)
+{
+    mask is_above = point.y > point.x;
+    real low = (real)(0.25f) * lanes_select(is_above, point.x, point.y);
+    real high = (real)(0.5f) * lanes_select(is_above, point.y, point.x) - low;
+    return (SquarePoint){lanes_select(is_above, low, high), lanes_select(is_above, high, low)};
+}
+
 #endif

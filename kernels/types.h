@@ -367,9 +367,9 @@ enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADO
 
 enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
 
-// The area that a light shines from: a rectangle or an ellipse around its position, or the half of a sphere
-// that faces the surface.
-enum { LIGHT_AREA_NONE, LIGHT_AREA_RECTANGLE, LIGHT_AREA_ELLIPSE, LIGHT_AREA_SPHERE };
+// The area that a light shines from: a rectangle or an ellipse around its position, the half of a sphere that
+// faces the surface, or a triangle.
+enum { LIGHT_AREA_NONE, LIGHT_AREA_RECTANGLE, LIGHT_AREA_ELLIPSE, LIGHT_AREA_SPHERE, LIGHT_AREA_TRIANGLE };
 
 typedef struct {
     scalar4 color;     // w: the largest of its channels
@@ -381,7 +381,8 @@ typedef struct {
     // With HAS_FADING_LIGHTS: the strength is divided by x + y d + z d^2 at the distance d.
     scalar4 fading;
     // With HAS_AREA_LIGHTS: from the center of a rectangle or an ellipse to the middles of two sides,
-    // relative to the direction for directional lights; across_u.w: a sphere's radius.
+    // relative to the direction for directional lights; two sides of a triangle, one of whose vertices is at
+    // position - (across_u + across_v) / 4; across_u.w: a sphere's radius.
     scalar4 across_u, across_v;
     uint4 kind; // x: LIGHT_KIND_…, y: LIGHT_AREA_…
 } Light;

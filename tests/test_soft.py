@@ -55,6 +55,8 @@ class Soft(TestCase):
         lights = {
             "rectangle: {center: [0, 1000, 0], edges: [[3.6, 0, 0], [0, 0, 9]]}": lambda x: min(max(0.5 + x / 2, 0), 1),
             "disc: {center: [0, 1000, 0], normal: [0, 1, 0], radius: 1.8}": cap,
+            # narrows to a point at x = 1.8
+            "triangle: {vertices: [[1.8, 1000, 0], [-1.8, 1000, 3], [-1.8, 1000, -3]]}": lambda x: (1 + x) ** 2 / 4,
             "sphere: {center: [0, 1000, 0], radius: 1.8}": cap,
             "spot: {position: [0, 1000, 0], look_at: [0, 0, 0], angle: 20, radius: 1.8}": cap,
             # tan(angle / 2) = 0.2 / 100
@@ -75,7 +77,8 @@ class Soft(TestCase):
         camera = "camera: {position: [0, 2.5, 8], look_at: [0, 1.5, 0], fov: 45}\nlights:\n"
         lights = [("sphere: {{center: [-2.2, 2.5, 0], radius: 0.4, color: [1, 0.75, 0.5]{}}}", (1, 0.75, 0.5)),
                   ("rectangle: {{center: [2.5, 3.5, -1], edges: [[1.5, 0, 0], [0, 1, 0.3]], intensity: 0.5{}}}", (0.5, 0.5, 0.5)),
-                  ("disc: {{center: [0, 4, 1], normal: [0, -1, 0.4], radius: 0.6, color: [4, 0, 1]{}}}", (4, 0, 1))]
+                  ("disc: {{center: [0, 4, 1], normal: [0, -1, 0.4], radius: 0.6, color: [4, 0, 1]{}}}", (4, 0, 1)),
+                  ("triangle: {{vertices: [[-2, 4, 0], [-1, 4, 0], [-1, 5, 1]], color: [0, 2, 1]{}}}", (0, 2, 1))]
         # behind the eye, so that the same kernels serve both scenes
         objects = ("  - disc: {center: [0, 2, 99], normal: [0, 0, 1], radius: 1, intensity: 0.1, visible: true}\n"
                    "  - rectangle: {center: [0, 2, 99], edges: [[1, 0, 0], [0, 1, 0]], intensity: 0.1, visible: true}\n"
@@ -88,7 +91,7 @@ class Soft(TestCase):
                     self.glint(f"render {name}.yaml --quiet --lanes 1 --size 96x64 --aov object --precision {precision} -o {name}.npy")
                 hidden, shown, numbers = (npy_read(f"{name}.npy")[2] for name in ("hidden", "shown", "shown.object"))
                 # the rectangle is two triangles
-                lamps = {3: 0, 4: 1, 5: 1, 6: 2}
+                lamps = {3: 0, 4: 1, 5: 1, 6: 2, 7: 3}
                 self.assertEqual(set(numbers) & lamps.keys(), lamps.keys())
                 for before, after, number in zip(hidden, shown, numbers):
                     self.assertEqual(after, lights[lamps[number]][1] if number in lamps else before)

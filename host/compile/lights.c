@@ -5,7 +5,8 @@ _Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL ==
                    (int)LIGHT_SPOT == LIGHT_KIND_SPOT,
                "kinds of lights have the kernels' numbers");
 _Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT_AREA_RECTANGLE &&
-                   (int)AREA_ELLIPSE == LIGHT_AREA_ELLIPSE && (int)AREA_SPHERE == LIGHT_AREA_SPHERE,
+                   (int)AREA_ELLIPSE == LIGHT_AREA_ELLIPSE && (int)AREA_SPHERE == LIGHT_AREA_SPHERE &&
+                   (int)AREA_TRIANGLE == LIGHT_AREA_TRIANGLE,
                "areas of lights have the kernels' numbers");
 
 // 1 - cos of an angle in degrees, without cancellation.

@@ -125,6 +125,7 @@ static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *
         scene->is_animated |= other.is_animated;
         scene->frame = options->frame;
         if (scene->frame_count == 0) scene->frame_count = other.frame_count;
+        if (scene->frame_rate == 0) scene->frame_rate = other.frame_rate;
         if (!scene->has_shutter) scene->shutter = other.shutter;
         scene->text_hash = hash_bytes(scene->text_hash, &other.text_hash, sizeof other.text_hash);
         const IncludedFile file = {memory_copy_text(options->camera), other.text_hash};

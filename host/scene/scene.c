@@ -137,6 +137,15 @@ static void lamp_add(Scene *scene, const Light *light, uint32_t material)
         array_push(scene->objects, lamp);
         return;
     }
+    if (light->area == AREA_TRIANGLE) {
+        const Vector3 vertex = vector_subtract(center, vector_scale(vector_add(u, v), 0.25));
+        lamp.kind = SHAPE_TRIANGLE;
+        lamp.as.triangle.vertices[0] = vertex;
+        lamp.as.triangle.vertices[1] = vector_add(vertex, u);
+        lamp.as.triangle.vertices[2] = vector_add(vertex, v);
+        array_push(scene->objects, lamp);
+        return;
+    }
     const Vector3 first = vector_subtract(center, vector_add(u, v)),
                   last = vector_add(center, vector_add(u, v));
     for (int side = -1; side <= 1; side += 2) {

@@ -38,8 +38,8 @@ typedef struct {
 
 typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
 
-// What a light shines from: its position, a rectangle or an ellipse around it, or a sphere.
-typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE } LightArea;
+// What a light shines from: its position, a rectangle or an ellipse around it, a sphere, or a triangle.
+typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE } LightArea;
 
 typedef struct {
     LightKind kind;
@@ -50,7 +50,8 @@ typedef struct {
     double half_angle, penumbra;
     LightArea area;
     // From the center of a rectangle or an ellipse to the middles of two sides; for a directional light
-    // across `direction`, and relative to its length.
+    // across `direction`, and relative to its length. Two sides of a triangle from one vertex, which is at
+    // position - (across[0] + across[1]) / 4.
     Vector3 across[2];
     double radius;   // of a sphere or a disc
     bool is_visible; // the area is an object that shows `color` and casts no shadow
@@ -299,6 +300,7 @@ typedef struct {
     Source *overrides;    // what replaced values of the file, PATH=VALUE each, in order; NULL if none
     bool is_animated;     // values depend on the frame
     uint32_t frame_count; // of the animation; 0: not given
+    double frame_rate;    // its frames per second; 0: not given
     double frame;         // that the options named
     double shutter;       // the part of the time to the next frame for which the shutter is open, 0 to 1
     bool has_shutter;     // whether it is given

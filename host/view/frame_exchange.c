@@ -59,6 +59,7 @@ void scene_publish(FrameLoop *loop)
     update->camera = *camera;
     update->frame = loop->scene_frame;
     update->frame_count = file_obstacle(loop->options.scene_path) ? 0 : loop->scene.frame_count;
+    update->frame_rate = loop->scene.frame_rate;
     loop->has_update = true;
     if (loop->current.follows_scene) loop->current.camera = *camera;
     loop->scene_state = SCENE_LOADED;

@@ -92,6 +92,7 @@ typedef struct {
     bool has_new_camera;  // other than before at the same frame, or the first
     uint32_t frame;       // of the animation
     uint32_t frame_count; // 0: not given, or the file cannot be read again, as standard input
+    double frame_rate;    // 0: not given
 } SceneUpdate;
 // Returns false if none was read since the last call.
 bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update);

@@ -4,7 +4,7 @@
 #include "host/base/clock.h"
 #include "host/base/text.h"
 
-static const double FRAMES_PER_SECOND = 24;
+static const double FRAME_RATE_DEFAULT = 24;
 enum { MARGIN = 2, INDENT = 8, MARK_WIDTH = 3 };
 
 bool has_time_line(const Window *window)
@@ -38,7 +38,8 @@ void play(Window *window)
 {
     if (window->drag == DRAG_TIME) play_start(window);
     if (window->frame.number != window->request || window->scene_frame_changed) return;
-    const double frames = FRAMES_PER_SECOND * (clock_seconds() - window->play_seconds);
+    const double rate = window->scene.frame_rate > 0 ? window->scene.frame_rate : FRAME_RATE_DEFAULT;
+    const double frames = rate * (clock_seconds() - window->play_seconds);
     const uint32_t due = (uint32_t)((window->play_frame + (uint64_t)frames) % window->scene.frame_count);
     window->scene_frame_changed = due != window->scene_frame;
     window->scene_frame = due;

@@ -39,7 +39,10 @@ static inline real light_fading(const Light *light, Vector to_light)
 static inline Vector light_area_offset(const Light *light, uint index, const Surface *surface)
 {
     SquarePoint point = sample_point(&surface->sample, SAMPLED_LIGHTS + index);
-    if (light->kind.y != LIGHT_AREA_RECTANGLE) point = disc_of_square(point);
+    if (light->kind.y == LIGHT_AREA_TRIANGLE)
+        point = triangle_of_square(point);
+    else if (light->kind.y != LIGHT_AREA_RECTANGLE)
+        point = disc_of_square(point);
     if (light->kind.y != LIGHT_AREA_SPHERE)
         return vector_fma(vector_of(light->across_u), point.x,
                           vector_scale(vector_of(light->across_v), point.y));

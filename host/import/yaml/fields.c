@@ -215,6 +215,11 @@ bool read_vector(YamlReader *reader, const Field *field, const YamlNode *node, v
     return true;
 }
 
+bool read_three_points(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
+{
+    return items_read(reader, field, node, 3, "three points", read_vector, sizeof(Vector3), target);
+}
+
 bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     if (!read_vector(reader, field, node, target)) return false;

@@ -85,7 +85,7 @@ bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected,
 
 // Target types: `const YamlNode *`, double, Vector3, nonzero Vector3, bool. Numbers must lie in the field's
 // range.
-FieldReader read_node, read_number, read_vector, read_direction, read_boolean;
+FieldReader read_node, read_number, read_vector, read_direction, read_three_points, read_boolean;
 
 // Read a Color from three numbers, from one for a gray, or from sRGB as "#rrggbb", "#rgb" or a name. Whole
 // numbers that look like values from 0 to 255 are an error: those above 1 of a surface's color, and those

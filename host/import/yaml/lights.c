@@ -1,5 +1,6 @@
 #include "host/base/array.h"
 #include "host/import/yaml/yaml.h"
+#include "host/scene/polygon.h"
 #include "host/scene/portable.h"
 
 #include <string.h>
@@ -10,7 +11,7 @@ const Range range_disc_angle = {0, 90, false, "from 0 to 90"};
 typedef struct {
     Light light;
     double intensity, angle;
-    Vector3 edges[2], normal;
+    Vector3 edges[2], normal, vertices[3];
 } LightFields;
 
 // Takes `inverse_square`, or what divides the strength at a distance d: constant + linear d + quadratic d^2.
@@ -103,6 +104,13 @@ static const Field disc_fields[] = {
     COLOR,
 };
 
+static const Field triangle_fields[] = {
+    {"vertices", read_three_points, offsetof(LightFields, vertices), FORM_ANY, REQUIRED, NULL},
+    VISIBLE,
+    FALLOFF,
+    COLOR,
+};
+
 static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, Light *light)
 {
     if (form == FORM_FIRST) light->direction = vector_subtract(light->direction, light->position);
@@ -143,6 +151,12 @@ static void area_set(LightFields *read)
     } else if (light->area == AREA_RECTANGLE) {
         light->across[0] = vector_scale(read->edges[0], 0.5);
         light->across[1] = vector_scale(read->edges[1], 0.5);
+    } else if (light->area == AREA_TRIANGLE) {
+        const Vector3 *vertices = read->vertices;
+        for (int i = 0; i < 2; i++)
+            light->across[i] = vector_subtract(vertices[i + 1], vertices[0]);
+        const Vector3 diagonal = vector_add(light->across[0], light->across[1]);
+        light->position = vector_add(vertices[0], vector_scale(diagonal, 0.25));
     } else if (light->radius > 0) {
         light->area = AREA_SPHERE;
     }
@@ -162,6 +176,7 @@ static const struct {
     {"sphere", LIGHT_POINT, AREA_SPHERE, FIELDS(sphere_fields)},
     {"rectangle", LIGHT_POINT, AREA_RECTANGLE, FIELDS(rectangle_fields)},
     {"disc", LIGHT_POINT, AREA_ELLIPSE, FIELDS(disc_fields)},
+    {"triangle", LIGHT_POINT, AREA_TRIANGLE, FIELDS(triangle_fields)},
 };
 
 static void light_read(YamlReader *reader, const YamlNode *item)
@@ -191,6 +206,12 @@ static void light_read(YamlReader *reader, const YamlNode *item)
     if (fields.light.area == AREA_RECTANGLE && vector_length(across) < 1e-9) {
         report_error(&reader->report, field_node(reader, mapping, "edges")->offset,
                      "'edges' must not be parallel");
+        return;
+    }
+    const Vector3 *vertices = fields.vertices;
+    if (fields.light.area == AREA_TRIANGLE && !triangle_has_area(vertices[0], vertices[1], vertices[2])) {
+        report_error(&reader->report, field_node(reader, mapping, "vertices")->offset,
+                     "'vertices' must not be on one line");
         return;
     }
     area_set(&fields);

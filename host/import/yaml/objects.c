@@ -117,11 +117,6 @@ static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
     return axis_finish(reader, mapping, object->as.cone.from, &object->as.cone.axis);
 }
 
-static bool read_three_points(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 3, "three points", read_vector, sizeof(Vector3), target);
-}
-
 static bool read_three_directions(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     return items_read(reader, field, node, 3, "three directions", read_direction, sizeof(Vector3), target);

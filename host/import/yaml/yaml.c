@@ -116,7 +116,7 @@ typedef struct {
     Background background;
     Color ambient;
     uint32_t frame_count;
-    double shutter;
+    double frame_rate, shutter;
     const YamlNode *camera, *lights, *materials, *definitions, *objects;
 } Document;
 
@@ -124,10 +124,12 @@ static void document_read(YamlReader *reader)
 {
     static const Range range_shutter = {0, 1, false, "from 0 to 1"};
     static const Range range_frames = {1, FRAMES_MAX, false, "from 1 to 1000000"};
+    static const Range range_frame_rate = {0, 1000, true, "above 0 and at most 1000"};
     static const Field fields[] = {
         {"include", read_include, 0, FORM_ANY, OPTIONAL, NULL},
         {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL, NULL},
         {"frames", read_frames, offsetof(Document, frame_count), FORM_ANY, OPTIONAL, &range_frames},
+        {"fps", read_number, offsetof(Document, frame_rate), FORM_ANY, OPTIONAL, &range_frame_rate},
         {"shutter", read_number, offsetof(Document, shutter), FORM_ANY, OPTIONAL, &range_shutter},
         {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
         {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
@@ -140,6 +142,7 @@ static void document_read(YamlReader *reader)
     const YamlNode *root = reader->tree.nodes.items;
     fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document, NULL);
     reader->scene->frame_count = document.frame_count;
+    reader->scene->frame_rate = document.frame_rate;
     reader->scene->has_shutter = !isnan(document.shutter);
     if (reader->scene->has_shutter) reader->scene->shutter = document.shutter;
     yaml_set_background(reader, &document.background, document.ambient);
