@@ -198,7 +198,7 @@ MEANINGS = {
     "unbounded": "count; objects outside `bounds`",
     "{lights,materials,pixels}": "count",
     "frames": "count; that the scene names; 0 if it does not",
-    "frame_rate": "number; frames per second that the scene names; 0 if it does not",
+    "fps": "number; frames per second that the scene names; 0 if it does not",
     "bounds": "object or null; of all bounded objects; null if there are none",
     "bounds.{min,max}": "number; x, y, z",
     "features": "text; the kernel's (kernels/features.h)",

@@ -278,24 +278,25 @@ for line in worker.stdout:
         self.assertFalse(report["device"]["passports"])
         self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
 
-    def check_energy(self, source, low, high, env):
-        """The counter has grown by a joule at each reading, one after each frame unless readings take long. A frame takes low to high
-        millijoules."""
+    def check_energy(self, source, high, env):
+        """The counter has grown by a joule at each reading, which follows each frame unless readings take long. A frame takes at most
+        `high` millijoules."""
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=env)["runs"]
         self.assertEqual(row["energy"]["source"], source)
-        self.assertTrue(low < row["energy"]["frame_mj"] < high, row["energy"])
+        self.assertTrue(0 < row["energy"]["frame_mj"] < high, row["energy"])
         self.assertGreater(row["energy"]["watts"], 1e-3)
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers must be loaded before a shim")
     def test_energy(self):
-        self.check_energy("RAPL", 500, 1001, {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c"))})
+        self.check_energy("RAPL", 1001, {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c"))})
         os.mkdir("nvml")
         shim_build("nvml/libnvidia-ml.so.1", NVML)
         limits = shim_build("limits.so", read(ROOT / "tests/shims/limits.c"), "-ldl", "-pthread")
         board = {"OCL_ICD_VENDORS": find_icd("pocl"), "LD_PRELOAD": limits, "GLINT_LIMITS": "nv"}
         nvml = board | {"LD_LIBRARY_PATH": os.path.abspath("nvml")}
-        self.check_energy("NVML", 500, 1001, nvml)
-        self.check_energy("NVML", 0, 200, nvml | {"SLOW": "1"})
+        self.check_energy("NVML", 1001, nvml)
+        # readings of 50 ms: a second of frames between two, at least three of them
+        self.check_energy("NVML", 334, nvml | {"SLOW": "1"})
         set_back = nvml | {"SET_BACK": "1"}
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=set_back)["runs"]
         self.assertEqual(row["energy"]["reason"], "the energy counter did not change or could not be read")

@@ -78,11 +78,11 @@ class Frames(TestCase):
         """`glint check` states the frames' number and rate, which --camera brings unless the scene has one."""
         write("shot.yaml", SPHERE + "frames: 48\nfps: 12.5\n")
         write("slow.yaml", SPHERE + "fps: 2\n")
-        self.assertIn("\n  frames     48, 12.5 per second\n", self.glint("check shot.yaml").stdout)
+        self.assertIn("\n  frames     48\n  fps        12.5\n", self.glint("check shot.yaml").stdout)
         for name, rate in ("sphere.yaml", 12.5), ("slow.yaml", 2):
             write("sphere.yaml", SPHERE)
             scene = self.json(f"check {name} --camera shot.yaml --json")
-            self.assertEqual((scene["frames"], scene["frame_rate"]), (48, rate))
+            self.assertEqual((scene["frames"], scene["fps"]), (48, rate))
 
     def test_names(self):
         write("moving.yaml", SCENE.format(**KEYS))

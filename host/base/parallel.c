@@ -19,16 +19,11 @@ static void *range_run(void *context)
     return NULL;
 }
 
-size_t parallel_threads(void)
-{
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return cores < 1 ? 1 : cores > THREADS_MAX ? THREADS_MAX : (size_t)cores;
-}
-
 void parallel_run(size_t count, size_t least, void (*work)(void *context, size_t begin, size_t end),
                   void *context)
 {
-    size_t threads = parallel_threads();
+    long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    size_t threads = cores < 1 ? 1 : cores > THREADS_MAX ? THREADS_MAX : (size_t)cores;
     if (threads > count / least) threads = count < least ? 1 : count / least;
     IndexRange ranges[THREADS_MAX];
     pthread_t others[THREADS_MAX];

@@ -158,34 +158,29 @@ bool variant_run(Variant *variant, BenchTimes *times)
     return true;
 }
 
-// Reads the counter into *joules and returns the seconds that this took.
-static double energy_read(EnergyMeter *meter, double *joules)
-{
-    const double start_seconds = clock_seconds();
-    *joules = energy_joules(meter);
-    return clock_seconds() - start_seconds;
-}
-
 // Renders frames until at least `seconds_min` have passed and the counter has changed since its previous
-// reading, for at most `seconds_max` if it does not change. `joules` is its last reading. Between readings,
-// during which the device idles (3.5 ms by NVML), frames take READ_SHARE times as long as one. Adds the
-// frames to *count, clears *is_whole if a render failed or the user interrupted, and returns the counter's
-// reading.
+// reading, for at most `seconds_max` if it does not change. `joules` is its last reading, which took
+// *read_seconds; that of the next ones is stored. Adds the frames to *count, clears *is_whole if a render
+// failed or the user interrupted, and returns the counter's reading.
+// The device idles during a reading (3.5 ms with NVML), so the frames between two readings take READ_SHARE
+// times as long as one.
 static double frames_run(Variant *variant, EnergyMeter *meter, double joules, double seconds_min,
-                         size_t *count, bool *is_whole)
+                         double *read_seconds, size_t *count, bool *is_whole)
 {
     enum { READ_SHARE = 20 };
     static const double seconds_max = 5;
     const double start_seconds = clock_seconds();
-    double before, seconds, read_seconds = 0;
+    double before, seconds;
     do {
         before = joules;
         const double frames_start_seconds = clock_seconds();
         do {
             *is_whole = *is_whole && variant_run(variant, NULL);
             ++*count;
-        } while (*is_whole && clock_seconds() - frames_start_seconds < READ_SHARE * read_seconds);
-        read_seconds = energy_read(meter, &joules);
+        } while (*is_whole && clock_seconds() - frames_start_seconds < READ_SHARE * *read_seconds);
+        const double read_start_seconds = clock_seconds();
+        joules = energy_joules(meter);
+        *read_seconds = clock_seconds() - read_start_seconds;
         seconds = clock_seconds() - start_seconds;
     } while (*is_whole && (seconds < seconds_min || (joules == before && seconds < seconds_max)));
     return joules;
@@ -196,15 +191,16 @@ bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
     static const double seconds_min = 1;
     bool is_whole = true;
     size_t count = 0;
+    double read_seconds = 0;
     row->energy.why_not = "the energy counter did not change or could not be read";
-    double first_joules;
-    energy_read(meter, &first_joules);
-    const double start_joules = frames_run(variant, meter, first_joules, 0, &count, &is_whole);
+    const double first_joules = energy_joules(meter),
+                 start_joules = frames_run(variant, meter, first_joules, 0, &read_seconds, &count, &is_whole);
     if (!(start_joules > first_joules)) return is_whole;
     const double start_seconds = clock_seconds();
     count = 0;
     const double joules =
-        frames_run(variant, meter, start_joules, seconds_min, &count, &is_whole) - start_joules;
+        frames_run(variant, meter, start_joules, seconds_min, &read_seconds, &count, &is_whole) -
+        start_joules;
     if (joules > 0)
         row->energy = (BenchEnergy){.source = energy_source(meter),
                                     .joules = joules / (double)count,

@@ -83,7 +83,7 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
     if (facts->unbounded_count > 0) printf(", plus %zu unbounded", facts->unbounded_count);
     if (scene->frame_count > 0) printf("\n  frames     %" PRIu32, scene->frame_count);
-    if (scene->frame_rate > 0) printf(", %g per second", scene->frame_rate);
+    if (scene->frame_rate > 0) printf("\n  fps        %g", scene->frame_rate);
     printf("\n  features  ");
     for (unsigned i = 0; i < FEATURE_COUNT; i++) {
         if (!(facts->features >> i & 1)) continue;
@@ -140,7 +140,7 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         json_int64(json, "lights", (int64_t)scene->lights.count);
         json_int64(json, "materials", (int64_t)scene->materials.count);
         json_int64(json, "frames", scene->frame_count);
-        json_number(json, "frame_rate", scene->frame_rate);
+        json_number(json, "fps", scene->frame_rate);
         if (bounds_is_empty(&facts.bounds)) {
             json_none(json, "bounds");
         } else {

@@ -11,8 +11,11 @@
 #include <unistd.h>
 
 enum {
-    // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
-    // 2^28 primitives, and at most 7 cuts by kind follow; or 26 leave 4, and 3 follow; or 24 leave 16, and 8.
+    // Below this depth ranges are halved by count, which bounds the depth. 25 halvings leave at most 8 of
+    // 2^28
+    // primitives, which at most 7 cuts by kind follow. Ranges of up to 16 fit a leaf only if all are
+    // triangles
+    // or spheres, and 24 halvings and a cut suffice. Blocks of 4 need 26 halvings and a cut.
     HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
     THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };
@@ -141,7 +144,8 @@ static BvhChild leaf_make(const Builder *builder, const PrimitiveRange *range)
 // Prefetches the boxes of a range whose leaves come soon: they may be anywhere.
 static void boxes_prefetch(const Builder *builder, const PrimitiveRange *range)
 {
-    if (range->end - range->begin > builder->leaves.size_max) return;
+    const unsigned size_max = builder->leaves.size_max, block_size = builder->leaves.block_size;
+    if (range->end - range->begin > (size_max > block_size ? size_max : block_size)) return;
     for (size_t i = range->begin; i < range->end; i++)
         __builtin_prefetch(&builder->boxes[reference_index(&builder->references[i])]);
 }

@@ -20,12 +20,12 @@ typedef struct {
     BvhChild children[2];
 } BvhBinaryNode;
 
-// The most primitives of a leaf. Those of a block, all of one kind that has blocks, are tested at once, so
-// that what fits one is split by kinds alone.
+// Limits on the sizes of leaves. A leaf of a kind with blocks holds up to block_size primitives, which are
+// tested at once, so that a range of such kinds that fits is divided only by kind.
 typedef struct {
-    unsigned size_max;
+    unsigned size_max;   // of other leaves
     unsigned block_size; // 0: there are no blocks
-    bool counts_blocks;  // whether splits are chosen by numbers of blocks instead of primitives
+    bool counts_blocks;  // splits are chosen by numbers of blocks, not of primitives; needs a block_size
 } BvhLeaves;
 
 static inline bool kind_is_in_blocks(BvhLeaves leaves, unsigned kind)

@@ -312,6 +312,7 @@ size_t range_split(PrimitiveReference *references, size_t count, const RangeBoun
 {
     const bool fits = range_fits_leaf(references, count, leaves);
     if (fits && all_in_blocks(references, count, leaves)) return count;
+    leaves.counts_blocks &= !fits; // what fits and is not in blocks is tested one by one
     const BinMap map = bins_make(bounds->centers, count, leaves);
     const Split split = count <= FEW_MAX ? split_find_of_few(references, (int)count, &map)
                                          : split_find(references, count, &map, is_parallel);

@@ -45,7 +45,7 @@ RangeBounds range_bounds_empty(void);
 RangeBounds range_bounds_join(RangeBounds a, RangeBounds b);
 RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count);
 
-// Returns whether a leaf of any of the range's kinds has room for all of it.
+// Returns whether the range is within the leaf size of every kind in it.
 bool range_fits_leaf(const PrimitiveReference *references, size_t count, BvhLeaves leaves);
 
 // Partitions the range where that pays or it is too large for a leaf, and sets the bounds of both sides.

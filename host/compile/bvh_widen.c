@@ -107,9 +107,10 @@ static void costs_find(Widening *widening)
         const double half_area = bounds_half_area(bvh_node_bounds(node));
         const float as_node = subtree->costs[subtree->slots_max] +
                               (float)(half_area * widening->scale * (node_cost + visit_cost));
-        const float as_leaf =
-            leaf_cost(widening, half_area, subtree->first, subtree->count) - subtree->leaves_cost;
-        subtree->is_leaf = subtree->count > 0 && as_leaf < as_node;
+        float as_leaf = FLT_MAX;
+        if (subtree->count > 0)
+            as_leaf = leaf_cost(widening, half_area, subtree->first, subtree->count) - subtree->leaves_cost;
+        subtree->is_leaf = as_leaf < as_node;
         subtree->costs[1] = (subtree->is_leaf ? as_leaf : as_node) + tie_cost;
         for (unsigned slots = 2; slots <= subtree->slots_max; slots++)
             subtree->costs[slots] = fminf(subtree->costs[slots], subtree->costs[1]);

@@ -18,10 +18,10 @@ typedef struct {
     unsigned depth; // nodes on the longest path
 } BvhWide;
 
-// Nodes of at most `width` children, 2 to BVH_WIDTH_MAX, and leaves of up to leaves.size_max primitives,
-// so chosen that they cost the least that the binary tree allows: areas stand for how often rays come by
-// (Ylitie, Karras, Laine, Efficient incoherent ray traversal on GPUs through compressed wide BVHs, HPG 2017;
-// here the binary tree's leaves may have more than one primitive, and are not split). What is written to
-// `wide` lasts as long as the binary tree.
+// Nodes of at most `width` children, 2 to BVH_WIDTH_MAX, and leaves of up to leaf_size_max primitives of
+// their kind, so chosen that they cost the least that the binary tree allows: areas stand for how often rays
+// come by (Ylitie, Karras, Laine, Efficient incoherent ray traversal on GPUs through compressed wide BVHs,
+// HPG 2017; here the binary tree's leaves may have more than one primitive, and are not split). What is
+// written to `wide` lasts as long as the binary tree.
 void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width);
 void bvh_wide_free(BvhWide *wide);

@@ -91,7 +91,7 @@ void display_rows(uint8_t *bytes, const float *values, const ImageHeader *header
                   uint32_t row_count)
 {
     DisplayRows rows = {.values = values, .header = header, .first_row = first_row};
-    rows.bytes = bytes;
+    rows.bytes = bytes; // in the initializer, clang-tidy would take it to be const
     const size_t row_values = (size_t)header->width * header->channels;
     parallel_run(row_count, (VALUES_OF_THREAD_MIN + row_values - 1) / row_values, rows_convert, &rows);
 }

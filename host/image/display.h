@@ -3,10 +3,10 @@
 
 #include "host/image/image.h"
 
-// Returns the size of a row's bytes.
+// Returns the bytes of a converted row.
 size_t display_row_size(const ImageHeader *header);
 
-// Converts rows first_row..first_row+row_count-1 of the image, on all cores.
+// Converts rows first_row..first_row+row_count-1 of the image, in up to 64 threads.
 void display_rows(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t first_row,
                   uint32_t row_count);
 

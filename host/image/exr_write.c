@@ -28,17 +28,17 @@ typedef struct {
 
 enum { VALUE_BYTES = 4, BLOCKS_MAX = 16 };
 
-// A block of rows that waits for its compression, which threads do, each for some blocks.
+// A block of rows in the queue, which threads compress. The buffers of a queue take about twice its rows.
 typedef struct {
     exr_encode_pipeline_t pipeline;
-    bool has_pipeline; // which is kept for later blocks
+    bool has_pipeline; // kept and reused
     exr_result_t code;
 } ExrBlock;
 
 typedef struct {
     exr_context_t context;
     ExrBlock blocks[BLOCKS_MAX];
-    size_t block_count, block_capacity;
+    size_t block_count;
     exr_result_t (*compress)(exr_encode_pipeline_t *pipeline); // the library's
     exr_result_t (*write)(exr_encode_pipeline_t *pipeline);    // the library's
     WrittenLayer layers[1 + IMAGE_LAYERS_MAX];
@@ -191,8 +191,6 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
     for (size_t i = 0; i < state->layer_count; i++)
         state->layers[i].rows_held =
             memory_allocate(state->block_rows, layer_row_size(writer, &state->layers[i]));
-    const size_t threads = parallel_threads();
-    state->block_capacity = threads < BLOCKS_MAX ? threads : BLOCKS_MAX;
     return true;
 }
 
@@ -227,13 +225,6 @@ static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
     return code;
 }
 
-// Blocks are written in their order once all that wait are compressed.
-static exr_result_t exr_wait(exr_encode_pipeline_t *pipeline)
-{
-    (void)pipeline;
-    return EXR_ERR_SUCCESS;
-}
-
 static void blocks_compress(void *context, size_t begin, size_t end)
 {
     ExrWriter *state = context;
@@ -253,19 +244,20 @@ static exr_result_t blocks_write(ExrWriter *state)
     return code;
 }
 
-// Lets the library choose how a pipeline packs, compresses and writes, and inserts exr_compress and exr_wait.
+// Lets the library choose how a pipeline packs, compresses and writes. Blocks are written later, in file
+// order: the default functions refuse any other.
 static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pipeline)
 {
     const exr_result_t code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
     state->compress = pipeline->compress_fn;
     state->write = pipeline->write_fn;
     pipeline->compress_fn = exr_compress;
-    pipeline->yield_until_ready_fn = pipeline->write_fn = exr_wait; // the default fails out of order
+    pipeline->yield_until_ready_fn = pipeline->write_fn = NULL;
     pipeline->encoding_user_data = state;
     return code;
 }
 
-// Lets the next block wait. Its rows stay until it is written.
+// Queues a block, and writes the queue if it is full. The rows must stay valid until then.
 static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;
@@ -284,11 +276,11 @@ static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32
     if (is_first) code = pipeline_prepare(state, pipeline);
     state->block_start += row_count;
     state->rows_held = 0;
-    if (state->block_count == state->block_capacity) EXR_STEP(code, blocks_write(state));
+    if (state->block_count == BLOCKS_MAX) EXR_STEP(code, blocks_write(state));
     return code;
 }
 
-// Copies rows of the arrays to those held. What waits may be there.
+// Copies rows into rows_held. First writes the queue, which may still refer to these.
 static exr_result_t rows_hold(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;

@@ -9,7 +9,7 @@
     KEY("double click", "look at that point")                                                                \
     KEY("right drag", "look around; W A S D fly, Q and E sink and rise")                                     \
     KEY("arrows", "orbit about the point looked at, by 5 degrees")                                           \
-    KEY("Space", "play or pause an animation; a slow one skips frames")                  \
+    KEY("Space", "play or pause an animation; a slow one skips frames")                                      \
     KEY(", .", "previous or next frame; in the time line, click or drag to any")                             \
     KEY("V", "next view: depth, normal, object, shadow, error, color")                                       \
     KEY("1 2 3 4", "precision single, strict, double, certified")                                            \

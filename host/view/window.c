@@ -161,12 +161,15 @@ static bool is_refused(const Window *window)
 static void scene_take(Window *window)
 {
     const bool follows = cameras_equal(&window->camera, &window->scene.camera);
+    const double frame_rate = window->scene.frame_rate;
     if (!frame_loop_take_scene(window->frames, &window->scene)) return;
     if (follows || window->scene.has_new_camera) window->camera = window->scene.camera;
     window->camera_changed |= window->scene.has_new_camera;
     window->plays &= has_time_line(window);
     if (window->scene_frame > 0 && window->scene_frame >= window->scene.frame_count)
         scene_frame_show(window, (int64_t)window->scene.frame_count - 1);
+    if (window->scene.frame_rate != frame_rate)
+        scene_frame_show(window, window->scene_frame); // play from here
 }
 
 static void work_exchange(Window *window)
