@@ -229,7 +229,7 @@ static void test_mistakes_in_files(void **state)
         "scene.yaml:7:19: error: sphere lacks 'radius'\n"
         "parts/a.yaml:2:41: error: 'radius' must be greater than 0\n"
         "parts/a.yaml:3:18: error: parts/lost.obj: No such file or directory\n"
-        "parts/a.yaml:4:1: error: unknown scene key 'purple'; the choices are include, camera, frames, "
+        "parts/a.yaml:4:1: error: unknown scene key 'purple'; the choices are include, camera, frames, fps, "
         "shutter, background, ambient, lights, materials, define, objects\n"
         "b.yaml:1:19: error: sphere lacks 'center'\n"
         "b.yaml:1:19: error: sphere lacks 'radius'\n"
