@@ -56,10 +56,10 @@ GLINT_VERSION := $(or $(patsubst v%,%,$(if $(wildcard .git),$(shell git describe
 GLINT_COMMIT  := $(if $(wildcard .git),$(shell git describe --always --exclude '*' --abbrev=40 --dirty 2>/dev/null))
 version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' $(if $(GLINT_COMMIT),'-DGLINT_COMMIT="$(GLINT_COMMIT)"')
 
-# KERNELS=folder: its files stand in for those of the same name in kernels/: the textbook's formulas, to measure beside
-# (tools/numerics/textbook), never to ship.
-kernels := $(foreach file,$(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h)),$(or \
-           $(if $(KERNELS),$(wildcard $(KERNELS)/$(notdir $(file)))),$(file)))
+kernels := $(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h))
+ifeq ($(TEXTBOOK),1)
+kernels := $(patsubst kernels/traversal/primitives.h,$(BUILD)/primitives.h,$(kernels))
+endif
 window_sources := $(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c
 sources := $(filter-out $(if $(has_window),,$(window_sources) host/cli/view_start.c), \
            $(filter-out host/mpi/%,$(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))))
@@ -116,6 +116,11 @@ $(mpi_objects): OURS += $(mpi_flags)
 
 $(BUILD)/glint-mpi: $(mpi_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs ompi-c) -o $@
+
+# With the formulas of tools/numerics/textbook.h.
+$(BUILD)/primitives.h: kernels/traversal/primitives.h tools/numerics/textbook.h
+	@mkdir -p $(@D)
+	sed -e '/^#include "traversal\/cutout.h"/r tools/numerics/textbook.h' -e 's/\bname##_hit(/textbook_##name##_hit(/' $< > $@
 
 $(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)
@@ -201,7 +206,7 @@ $(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 # These two change only when what they hold does, and what depends on it is then built anew.
-$(BUILD)/flags: text := $(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(KERNELS)
+$(BUILD)/flags: text := $(CC) $(OURS) $(CPPFLAGS) $(CFLAGS) $(LDFLAGS) $(LIBS) $(TEXTBOOK)
 $(BUILD)/version: text := $(GLINT_VERSION) $(GLINT_COMMIT)
 $(BUILD)/flags $(BUILD)/version: FORCE
 	@mkdir -p $(@D)
@@ -261,7 +266,7 @@ for_embree := $(embree_sources) tools/peers/hard-cases.c
 linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
           $(if $(has_embree),$(for_embree)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
-formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/textbook/*.h host/*/*.h host/*/*/*.h tests/*.h \
+formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/*.h host/*/*.h host/*/*/*.h tests/*.h \
              tests/oracle/*.h tests/failing/*.h) $(for_embree) $(embree_headers) docs/example.c
 
 format:

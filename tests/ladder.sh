@@ -7,7 +7,11 @@ build=${BUILD:-build}
 make=${MAKE:-make}
 check "the ladder builds" $make -s BUILD="$build" ladder
 rays=250
-is_long && rays=1500
+if is_long; then
+    rays=1500
+    check "the textbook's ladder builds" $make -s BUILD="$build-textbook" TEXTBOOK=1 ladder
+    check "the textbook's formulas run" "$build-textbook/tools/numerics/ladder" --rays 250 --precision single
+fi
 for shape in sphere plane disc box cylinder cone triangle torus paraboloid; do
     check "$shape" "$build/tools/numerics/ladder" --rays $rays --check --shape $shape
 done
