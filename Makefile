@@ -58,6 +58,9 @@ version_flags := '-DGLINT_VERSION="$(GLINT_VERSION)"' $(if $(GLINT_COMMIT),'-DGL
 
 kernels := $(sort $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h))
 ifeq ($(TEXTBOOK),1)
+ifeq ($(BUILD),build)
+$(error TEXTBOOK=1 needs another BUILD than build, since it is never installed)
+endif
 kernels := $(patsubst kernels/traversal/primitives.h,$(BUILD)/primitives.h,$(kernels))
 endif
 window_sources := $(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c
@@ -121,6 +124,7 @@ $(BUILD)/glint-mpi: $(mpi_objects) $(library)
 $(BUILD)/primitives.h: kernels/traversal/primitives.h tools/numerics/textbook.h
 	@mkdir -p $(@D)
 	sed -e '/^#include "traversal\/cutout.h"/r tools/numerics/textbook.h' -e 's/\bname##_hit(/textbook_##name##_hit(/' $< > $@
+	grep -q '^static inline mask textbook_sphere_hit' $@ && grep -q 'textbook_##name##_hit(' $@
 
 $(BUILD)/kernel_files.c: $(kernels) kernels $(wildcard kernels/*/) tools/embed $(BUILD)/flags
 	@mkdir -p $(@D)

@@ -227,14 +227,14 @@ static CylinderLeaves cylinder_leaves(const Bounds *boxes, const uint8_t *kinds,
     return found;
 }
 
-// Blocks of spheres change the leaves of the cylinders among them little.
+// Blocks of spheres barely change the leaves of the cylinders among them.
 static void blocks_keep_other_leaves(void **state)
 {
     (void)state;
     enum { COUNT = 8000 };
     static Bounds boxes[COUNT];
     static uint8_t kinds[COUNT];
-    for (size_t part = 2; part <= 32; part *= 2) { // of as many primitives one is a cylinder
+    for (size_t part = 2; part <= 32; part *= 2) { // one primitive in `part` is a cylinder
         for (size_t i = 0; i < COUNT; i++) {
             boxes[i] =
                 cube_around(random_cube_point(&random_state, 10), random_between(&random_state, 0, 0.5));

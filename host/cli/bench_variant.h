@@ -29,7 +29,7 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
 // render failed or the user interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
 // Renders frames for a second or more, from about one step of the counter to another, and stores the mean
-// energy of one in the row: idle readings are at most a 21st of the time, and each end is off by at most the
+// energy of one in the row: idle readings are about a 21st of the time, and each end is off by at most the
 // frames between two readings. Returns false if a render failed or the user interrupted.
 bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row);
 // Closes the variant and sets it to zeros. Accepts a variant of zeros.

@@ -11,11 +11,9 @@
 #include <unistd.h>
 
 enum {
-    // Below this depth ranges are halved by count, which bounds the depth. 25 halvings leave at most 8 of
-    // 2^28
-    // primitives, which at most 7 cuts by kind follow. Ranges of up to 16 fit a leaf only if all are
-    // triangles
-    // or spheres, and 24 halvings and a cut suffice. Blocks of 4 need 26 halvings and a cut.
+    // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
+    // 2^28 primitives, and at most 7 cuts by kind follow. Ranges of 16 fit a leaf only if all are triangles
+    // or spheres: 24 halvings and a cut. With blocks of 4, 26 halvings leave 4, and at most 3 cuts follow.
     HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
     THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
 };

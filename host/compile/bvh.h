@@ -21,7 +21,7 @@ typedef struct {
 } BvhBinaryNode;
 
 // Limits on the sizes of leaves. A leaf of a kind with blocks holds up to block_size primitives, which are
-// tested at once, so that a range of such kinds that fits is divided only by kind.
+// tested at once. A range of these kinds that fits is divided only by kind.
 typedef struct {
     unsigned size_max;   // of other leaves
     unsigned block_size; // 0: there are no blocks

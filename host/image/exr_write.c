@@ -244,8 +244,8 @@ static exr_result_t blocks_write(ExrWriter *state)
     return code;
 }
 
-// Lets the library choose how a pipeline packs, compresses and writes. Blocks are written later, in file
-// order: the default functions refuse any other.
+// Lets the library choose how a pipeline packs, compresses and writes. Blocks are written later, in the
+// file's order: the default functions fail for any block but the next.
 static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pipeline)
 {
     const exr_result_t code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
@@ -261,7 +261,7 @@ static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pi
 static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;
-    ExrBlock *block = &state->blocks[state->block_count++];
+    ExrBlock *block = &state->blocks[state->block_count];
     exr_encode_pipeline_t *pipeline = &block->pipeline;
     exr_chunk_info_t chunk;
     exr_result_t code = exr_write_scanline_chunk_info(state->context, 0,
@@ -274,6 +274,8 @@ static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32
     for (int i = 0; i < pipeline->channel_count; i++)
         channel_place(state, pipeline, rows, i, writer->header.width);
     if (is_first) code = pipeline_prepare(state, pipeline);
+    if (code != EXR_ERR_SUCCESS) return code;
+    state->block_count++;
     state->block_start += row_count;
     state->rows_held = 0;
     if (state->block_count == BLOCKS_MAX) EXR_STEP(code, blocks_write(state));

@@ -169,7 +169,7 @@ static void scene_take(Window *window)
     if (window->scene_frame > 0 && window->scene_frame >= window->scene.frame_count)
         scene_frame_show(window, (int64_t)window->scene.frame_count - 1);
     if (window->scene.frame_rate != frame_rate)
-        scene_frame_show(window, window->scene_frame); // play from here
+        scene_frame_show(window, window->scene_frame); // at the new rate from here
 }
 
 static void work_exchange(Window *window)

@@ -27,8 +27,8 @@ static inline mask textbook_sphere_hit(const Sphere *sphere, const Ray *ray, rea
     return hit & (*t > ray->tmin);
 }
 
-// Textbook plane: a ray within a millionth of parallel to it does not meet it (Glassner, An introduction to
-// ray tracing, 1989, section 2.2).
+// Textbook plane: a ray whose direction's product with the normal is at most a millionth does not hit it
+// (Glassner, An introduction to ray tracing, 1989, section 2.2; here neither is normalized).
 static inline mask textbook_plane_crossing(Vector point, Vector normal, const Ray *ray, real *t)
 {
     real along = vector_dot(normal, ray->direction);
@@ -151,7 +151,8 @@ static inline mask textbook_cone_hit(const Cone *cone, const Ray *ray, real *t)
 }
 
 // Textbook torus: the quartic in t from the ray's start, by Ferrari (Schwarze, Cubic and quartic roots,
-// Graphics Gems, 1990, with its threshold of 1e-9 for zero).
+// Graphics Gems, 1990, with its threshold of 1e-9 for zero
+// where the resolvent splits the quartic alone).
 static inline mask textbook_is_zero(real x)
 {
     return fabs(x) < (real)(1e-9f);
@@ -246,6 +247,6 @@ static inline mask textbook_triangle_hit(const Triangle *triangle, const Ray *ra
     return hit & (u >= (real)(0)) & (v >= (real)(0)) & (u + v <= (real)(1)) & (*t > ray->tmin);
 }
 
-// Which have none.
+// The paraboloid and the oval have no textbook formula: glint's are used.
 #define textbook_paraboloid_hit paraboloid_hit
 #define textbook_oval_hit       oval_hit
