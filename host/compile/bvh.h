@@ -24,7 +24,7 @@ typedef struct {
 // tested at once. A range of these kinds that fits is divided only by kind.
 typedef struct {
     unsigned size_max;   // of other leaves
-    unsigned block_size; // 0: there are no blocks
+    unsigned block_size; // 0: kernels read no blocks
     bool counts_blocks;  // splits are chosen by numbers of blocks, not of primitives; needs a block_size
 } BvhLeaves;
 

@@ -151,8 +151,7 @@ static inline mask textbook_cone_hit(const Cone *cone, const Ray *ray, real *t)
 }
 
 // Textbook torus: the quartic in t from the ray's start, by Ferrari (Schwarze, Cubic and quartic roots,
-// Graphics Gems, 1990, with its threshold of 1e-9 for zero
-// where the resolvent splits the quartic alone).
+// Graphics Gems, 1990; its threshold of 1e-9 for zero is used only where the resolvent splits the quartic).
 static inline mask textbook_is_zero(real x)
 {
     return fabs(x) < (real)(1e-9f);
