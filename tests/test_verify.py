@@ -102,12 +102,12 @@ class Verify(VerifyTestCase):
     def test_a_crash_fails_its_case_alone(self):
         """The driver crashes in building or running one kernel; the other cases keep their bits."""
         cases = ["S2", "S5", "P4"]
-        whole = self.verify(cases, "--precision single")["cases"]
+        whole = self.verify(cases, "--precision single --quick")["cases"]
         env = {"LD_PRELOAD": shim_build("crashing.so", CRASHING, "-ldl")}
         for call in "clCreateKernel", "clEnqueueNDRangeKernel":
             env["CRASHING_CALL"] = call
             with self.subTest(call):
-                process = run(f"verify {' '.join(cases)} --precision single --json", env=env)
+                process = run(f"verify {' '.join(cases)} --precision single --quick --json", env=env)
                 self.assertEqual((process.returncode, process.stderr), (3, ""))
                 (report,) = json.loads(process.stdout)["precisions"]
                 crash, *others = report["cases"]
@@ -116,7 +116,7 @@ class Verify(VerifyTestCase):
                 self.assertEqual([(case["name"], case["hash"]) for case in others],
                                  [(case["name"], case["hash"]) for case in whole[1:]])
                 self.assertEqual((report["passed"], report["failed"]), (2, 1))
-        process = run(f"verify {' '.join(cases)} --precision single", env=env)
+        process = run(f"verify {' '.join(cases)} --precision single --quick", env=env)
         self.assertEqual(process.returncode, 3)
         self.assertRegex(process.stdout, r"\A.*; reference of .*\nsingle\n  S2 .* FAIL  clEnqueue.* at the kernel path\n"
                                          r"  S5 .* ok\n  P4 .* ok\n  tier B: 2 of 3 cases passed")
