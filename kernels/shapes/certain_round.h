@@ -24,15 +24,18 @@ typedef struct {
     Vector foot;  // a point of the axis, seen from the same point
     Vector axis;  // unit, or 0
     real radius, slope, k;
-    real power;                    // with HAS_POWER, that for the unit axis
-    real foot_norm1;               // the 1-norm of the foot
-    real start_error, error_per_t; // a point at t is off by start_error + error_per_t |t|
+    real power;                                    // with HAS_POWER, that for the unit axis
+    real foot_norm1, start_norm1, direction_norm1; // 1-norms, the last of the ray's direction
+    real shape_error;              // how far the roundings of the shape and of the start move it
+    real units;                    // the error of the axis and the products, in u of a point's 1-norm
+    real start_error, error_per_t; // a point at t is off by no more than start_error + error_per_t |t|
     bool has_power, curves;        // curves means k > 0
 } Round;
 
 typedef struct {
-    real value, band; // outside if value > band, inside if value < -band
-    Vector across;    // from the axis
+    real rounding, place; // by how much it is off: by roundings, and with the ray's error
+    real value, band;     // outside if value > band, inside if value < -band
+    Vector across;        // from the axis
     real rho, radius;
 } RoundPoint;
 
@@ -45,7 +48,11 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
 {
     RoundPoint point;
     Vector x = vector_fma(ray->direction, t, round->start);
-    real place = real_fma(round->error_per_t, fabs(t), round->start_error);
+    // the sum that gives x is rounded by its terms, the axis and the products act on x
+    real terms = real_fma(round->direction_norm1, fabs(t), round->start_norm1);
+    real units = real_min(round->units * terms, real_fma((real)(3), terms, round->units * vector_norm1(x)));
+    point.rounding = real_fma((real)(UNIT_ROUNDOFF), units, round->shape_error);
+    real place = point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
     real z = vector_dot(round->axis, x);
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
     point.rho = vector_norm(point.across);
@@ -218,7 +225,8 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         // otherwise it was not a root; from an end, where it is clamped, a step would lead beyond the end
         mask settles = (t == roots[i]) & (fabs(step) * (real)(0x1p6f) < fabs(t));
         roots[i] = t = lanes_select(settles, t - step, t);
-        real band = (real)(2.5f) * point.band, bend = fabs(a) * band;
+        // beyond one band the sign is certain, unless it widens or the root is rough
+        real band = (real)(1.125f) * point.band, bend = fabs(a) * band;
         real steepness = real_max(fabs(slope), (real)(0.5f) * real_sqrt(bend));
         real width =
             divide_or(band, steepness + real_sqrt(real_max(real_fma(steepness, steepness, -bend), (real)(0))),
@@ -264,16 +272,15 @@ static inline real round_range(const Ray *ray, real size)
 // the height, the axis' length adds to it.
 enum { ROUND_ERROR = 8, SLOPED_ROUND_ERROR = 20 };
 
-static inline real round_error_per_t(const Ray *ray, uint units)
+static inline void round_set_place_errors(Round *round, const Ray *ray, real shape_error, uint units)
 {
-    return real_fma(ray->length, ray->direction_error,
-                    (real)(units * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
-}
-
-static inline real round_start_error(const Ray *ray, Vector start, uint units)
-{
-    return ray->origin_error + (real)(UNIT_ROUNDOFF)*real_fma((real)(units), vector_norm1(start),
-                                                              (real)(2) * vector_norm1(ray->origin));
+    round->shape_error = real_fma((real)(2 * UNIT_ROUNDOFF), vector_norm1(ray->origin), shape_error);
+    round->units = (real)(units);
+    round->start_norm1 = vector_norm1(round->start);
+    round->direction_norm1 = vector_norm1(ray->direction);
+    const real rounding = (real)(units * UNIT_ROUNDOFF);
+    round->start_error = real_fma(rounding, round->start_norm1, ray->origin_error + round->shape_error);
+    round->error_per_t = real_fma(ray->length, ray->direction_error, rounding * round->direction_norm1);
 }
 
 #endif

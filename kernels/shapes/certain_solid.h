@@ -155,20 +155,20 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 }
 
 // Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the
-// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 2 / k, along the
-// surface. A vector that is off by e is, once normalized, off by up to 2 e over its length.
+// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 2 / k, half as much
+// more where a point off the surface is moved onto it. The ray's error moves the point alone, which counts in
+// place_error. A vector that is off by e is, once normalized, off by up to 2 e over its length.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {
     const Round *round = &solid->round;
     const RoundPoint at = round_point(round, ray, t);
-    real place = real_fma(round->error_per_t, fabs(t), round->start_error),
-         error = (real)(2) * (place_error + place);
-    real curvature = divide_or((real)(round->curves ? 2 : 1), round->curves ? round->k : at.rho,
+    real error = (real)(2) * (place_error + at.place);
+    real curvature = divide_or((real)(round->curves ? 3 : 1), round->curves ? round->k : at.rho,
                                (real)(1 / SMALLEST_RATIO));
-    real turned = solid->is_finite ? divide_or(place, solid->half_height, (real)(1)) : (real)(0);
+    real turned = solid->is_finite ? divide_or(at.rounding, solid->half_height, (real)(1)) : (real)(0);
     point->curvature = curvature;
-    point->normal_error = (real)(4) * real_fma(place, curvature, turned);
+    point->normal_error = (real)(4) * real_fma(at.rounding, curvature, turned);
     if (!(flags & REVOLUTION_CAPPED)) return mask_none();
     real z = vector_dot(round->axis, vector_fma(ray->direction, t, round->start));
     real from_end = real_min(fabs(z - solid->low), fabs(z - solid->high));

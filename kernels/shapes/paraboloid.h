@@ -142,17 +142,14 @@ static inline RoundSolid round_of_paraboloid(const Paraboloid *shape, const Ray 
     round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
     round->foot_norm1 = vector_norm1(round->foot);
     round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, apex);
-    round->start_error = round_start_error(ray, round->start, SLOPED_ROUND_ERROR);
-    round->error_per_t = round_error_per_t(ray, SLOPED_ROUND_ERROR);
     real lift = round->has_power ? (real)(shape->foot_lift.w) * inverse : (real)(0);
     solid.high = (real)(shape->axis_end.w) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high + lift);
     solid.low = solid.high - (real)(4) * solid.half_height; // well below the apex
     solid.widest = solid.is_finite ? real_sqrt((real)(2) * solid.half_height * round->k) : round->k;
     solid.middle = vector_fma(round->axis, solid.high - solid.half_height, round->foot);
-    if (!round->has_power)
-        round->start_error =
-            round->start_error + (real)(16 * UNIT_ROUNDOFF) * (solid.widest + solid.half_height);
+    real shape_error = (real)(16 * UNIT_ROUNDOFF) * (solid.widest + solid.half_height);
+    round_set_place_errors(round, ray, round->has_power ? (real)(0) : shape_error, SLOPED_ROUND_ERROR);
     return solid;
 }
 

@@ -434,9 +434,6 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
     round->foot_norm1 = vector_norm1(base);
     round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, base);
-    const uint units = sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR;
-    round->start_error = round_start_error(ray, round->start, units);
-    round->error_per_t = round_error_per_t(ray, units);
     solid.low = (real)(shape->range.w) * inverse;
     solid.high = (real)(shape->range.x) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high - solid.low);
@@ -445,15 +442,19 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     if (solid.is_finite)
         solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
                                 real_fma(round->slope, solid.high, round->radius));
-    if (round->has_power) return solid;
-    round->start_error = round->start_error + (real)(16 * UNIT_ROUNDOFF) * solid.widest;
-    if (!solid.is_finite) return solid;
-    // both ends are rounded as points, which turns the axis
-    Vector end = vector_fma(round->axis, solid.high, base);
-    real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
-    real turned = (real)(2) + divide_or(solid.widest, solid.half_height, (real)(0));
-    round->start_error =
-        round->start_error + real_fma(moved, turned, (real)(16 * UNIT_ROUNDOFF) * solid.half_height);
+    real shape_error = (real)(0);
+    if (!round->has_power) {
+        shape_error = (real)(16 * UNIT_ROUNDOFF) * solid.widest;
+        if (solid.is_finite) {
+            // both ends are rounded as points, which turns the axis
+            Vector end = vector_fma(round->axis, solid.high, base);
+            real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
+            real turned = (real)(2) + divide_or(solid.widest, solid.half_height, (real)(0));
+            shape_error =
+                shape_error + real_fma(moved, turned, (real)(16 * UNIT_ROUNDOFF) * solid.half_height);
+        }
+    }
+    round_set_place_errors(round, ray, shape_error, sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
     return solid;
 }
 

@@ -171,8 +171,7 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     round.slope = round.k = zero;
     round.power = eye_power_of(sphere->id);
     round.foot_norm1 = vector_norm1(round.foot);
-    round.start_error = round_start_error(ray, ray->origin, ROUND_ERROR);
-    round.error_per_t = round_error_per_t(ray, ROUND_ERROR);
+    round_set_place_errors(&round, ray, zero, ROUND_ERROR);
     round.has_power = true;
     round.curves = false;
     real range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));

@@ -220,11 +220,12 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
 typedef struct {
     Vector start, axis; // the ray's origin, seen from the center
     real major, minor;
-    real start_error, error_per_t; // a point at t is off by start_error + error_per_t |t|
+    real start_rounding, rounding_per_t; // move a point at t by start_rounding + rounding_per_t |t|
 } CertainTorus;
 
 typedef struct {
-    real distance, slope, rho, place;
+    real distance, slope, rho;
+    real rounding, place; // by how much it is off: by roundings, and with the ray's error
 } TorusPoint;
 
 static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
@@ -234,12 +235,10 @@ static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
     certain.axis = vector_of(torus->axis_minor);
     certain.major = (real)(torus->center_major.w);
     certain.minor = (real)(torus->axis_minor.w);
-    certain.start_error =
-        ray->origin_error + (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
-                                                     (real)(2) * vector_norm1(ray->origin) +
-                                                     (real)(28) * (certain.major + certain.minor));
-    certain.error_per_t =
-        real_fma(ray->length, ray->direction_error, (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction));
+    certain.start_rounding = (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
+                                                      (real)(2) * vector_norm1(ray->origin) +
+                                                      (real)(28) * (certain.major + certain.minor));
+    certain.rounding_per_t = (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction);
     return certain;
 }
 
@@ -254,7 +253,8 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
     real rho_slope = vector_dot(across, ray->direction) * real_inverse_or_zero(point.rho);
     point.slope = real_fma(off, rho_slope, z * rise) * real_inverse_or_zero(from_circle);
     point.distance = from_circle - torus->minor;
-    point.place = real_fma(torus->error_per_t, fabs(t), torus->start_error);
+    point.rounding = real_fma(torus->rounding_per_t, fabs(t), torus->start_rounding);
+    point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
     return point;
 }
 
@@ -281,8 +281,8 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 }
 
 // Returns the crossing in a bracket at whose ends the exact ray is certainly on different sides. The bracket
-// is narrowed. Only signs beyond `place` count, and the constants only choose the points: the zero is off by
-// `place` over the slope, and beyond twice that the sign is certain.
+// is narrowed. Only signs beyond `place` count, and the constants only choose the points: the sign is certain
+// from `place` over the slope on, and a quarter more allows for a rough zero and for the curvature.
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {
@@ -296,13 +296,13 @@ static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ra
         low = lanes_select(before, t, low);
         high = lanes_select(before, high, t);
         real next = bracket_next(low, high, t, point.distance, point.slope);
-        mask settled = !certain | (fabs(next - t) * fabs(point.slope) <= (real)(0.25f) * point.place);
+        mask settled = fabs(next - t) * fabs(point.slope) <= (real)(0.0625f) * point.place;
         next = lanes_select(settled, t, next);
         if (lanes_all(next == t)) break;
         t = next;
     }
     mask steep = fabs(point.slope) * ray_inverse_length(ray) > (real)(0x1p-10f);
-    real width = real_divide((real)(2.5f) * point.place, lanes_select(steep, fabs(point.slope), (real)(1)));
+    real width = real_divide((real)(1.25f) * point.place, lanes_select(steep, fabs(point.slope), (real)(1)));
     const real sides[2] = {t - width, t + width};
     for (uint i = 0; i < 2; i++) {
         TorusPoint side = torus_point(torus, ray, sides[i]);
@@ -391,7 +391,7 @@ static inline mask torus_set_errors(const Torus *torus, const Ray *ray, real t, 
     const CertainTorus certain = certain_torus(torus, ray);
     const TorusPoint at = torus_point(&certain, ray, t);
     point->curvature = torus_curvature(&certain, at.rho);
-    point->normal_error = (real)(4) * at.place * point->curvature;
+    point->normal_error = (real)(4) * at.rounding * point->curvature;
     return mask_none();
 }
 
