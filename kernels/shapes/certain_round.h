@@ -26,14 +26,14 @@ typedef struct {
     real radius, slope, k;
     real power;                                    // with HAS_POWER, that for the unit axis
     real foot_norm1, start_norm1, direction_norm1; // 1-norms, the last of the ray's direction
-    real shape_error;              // how far the roundings of the shape and of the start move it
-    real units;                    // the error of the axis and the products, in u of a point's 1-norm
+    real shape_error;              // bounds how far roundings of the shape and the start move a point
+    real units;                    // the error from the axis and the products, in u of a point's 1-norm
     real start_error, error_per_t; // a point at t is off by no more than start_error + error_per_t |t|
     bool has_power, curves;        // curves means k > 0
 } Round;
 
 typedef struct {
-    real rounding, place; // by how much it is off: by roundings, and with the ray's error
+    real rounding, place; // bounds of its error: of roundings alone, and with the ray's error
     real value, band;     // outside if value > band, inside if value < -band
     Vector across;        // from the axis
     real rho, radius;
@@ -48,7 +48,7 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
 {
     RoundPoint point;
     Vector x = vector_fma(ray->direction, t, round->start);
-    // the sum that gives x is rounded by its terms, the axis and the products act on x
+    // The sum is rounded by its terms; errors of the axis and the products grow with x. Both bounds hold.
     real terms = real_fma(round->direction_norm1, fabs(t), round->start_norm1);
     real units = real_min(round->units * terms, real_fma((real)(3), terms, round->units * vector_norm1(x)));
     point.rounding = real_fma((real)(UNIT_ROUNDOFF), units, round->shape_error);
@@ -225,7 +225,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         // otherwise it was not a root; from an end, where it is clamped, a step would lead beyond the end
         mask settles = (t == roots[i]) & (fabs(step) * (real)(0x1p6f) < fabs(t));
         roots[i] = t = lanes_select(settles, t - step, t);
-        // beyond one band the sign is certain, unless it widens or the root is rough
+        // one band away the sign is certain; an eighth more allows for a wider band and a rough root
         real band = (real)(1.125f) * point.band, bend = fabs(a) * band;
         real steepness = real_max(fabs(slope), (real)(0.5f) * real_sqrt(bend));
         real width =

@@ -220,12 +220,12 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
 typedef struct {
     Vector start, axis; // the ray's origin, seen from the center
     real major, minor;
-    real start_rounding, rounding_per_t; // move a point at t by start_rounding + rounding_per_t |t|
+    real start_rounding, rounding_per_t; // bound roundings at t: start_rounding + rounding_per_t |t|
 } CertainTorus;
 
 typedef struct {
     real distance, slope, rho;
-    real rounding, place; // by how much it is off: by roundings, and with the ray's error
+    real rounding, place; // bounds of its error: of roundings alone, and with the ray's error
 } TorusPoint;
 
 static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
