@@ -48,10 +48,10 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
 {
     RoundPoint point;
     Vector x = vector_fma(ray->direction, t, round->start);
-    // The sum is rounded by its terms; errors of the axis and the products grow with x. Both bounds hold.
+    // rounding the sum moves x in proportion to its terms, the axis and the products in proportion to x
     real terms = real_fma(round->direction_norm1, fabs(t), round->start_norm1);
-    real units = real_min(round->units * terms, real_fma((real)(3), terms, round->units * vector_norm1(x)));
-    point.rounding = real_fma((real)(UNIT_ROUNDOFF), units, round->shape_error);
+    real in_u = real_min(round->units * terms, real_fma((real)(3), terms, round->units * vector_norm1(x)));
+    point.rounding = real_fma((real)(UNIT_ROUNDOFF), in_u, round->shape_error);
     real place = point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
     real z = vector_dot(round->axis, x);
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
@@ -272,6 +272,8 @@ static inline real round_range(const Ray *ray, real size)
 // the height, the axis' length adds to it.
 enum { ROUND_ERROR = 8, SLOPED_ROUND_ERROR = 20 };
 
+// Bounds the errors of points. `shape_error` bounds those of the shape's numbers, and `units` is ROUND_ERROR
+// or SLOPED_ROUND_ERROR. The start must be set.
 static inline void round_set_place_errors(Round *round, const Ray *ray, real shape_error, uint units)
 {
     round->shape_error = real_fma((real)(2 * UNIT_ROUNDOFF), vector_norm1(ray->origin), shape_error);

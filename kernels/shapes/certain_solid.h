@@ -155,9 +155,10 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 }
 
 // Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the
-// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 2 / k, half as much
-// more where a point off the surface is moved onto it. The ray's error moves the point alone, which counts in
-// place_error. A vector that is off by e is, once normalized, off by up to 2 e over its length.
+// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 2 / k, to which half as
+// much is added, since the point is moved onto the surface. The ray's error only moves the point, so it
+// counts in place_error alone. A vector that is off by e is, once normalized, off by up to 2 e over its
+// length.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {

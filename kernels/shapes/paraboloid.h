@@ -148,8 +148,8 @@ static inline RoundSolid round_of_paraboloid(const Paraboloid *shape, const Ray 
     solid.low = solid.high - (real)(4) * solid.half_height; // well below the apex
     solid.widest = solid.is_finite ? real_sqrt((real)(2) * solid.half_height * round->k) : round->k;
     solid.middle = vector_fma(round->axis, solid.high - solid.half_height, round->foot);
-    real shape_error = (real)(16 * UNIT_ROUNDOFF) * (solid.widest + solid.half_height);
-    round_set_place_errors(round, ray, round->has_power ? (real)(0) : shape_error, SLOPED_ROUND_ERROR);
+    const real size = round->has_power ? (real)(0) : solid.widest + solid.half_height;
+    round_set_place_errors(round, ray, (real)(16 * UNIT_ROUNDOFF) * size, SLOPED_ROUND_ERROR);
     return solid;
 }
 

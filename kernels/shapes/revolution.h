@@ -417,6 +417,20 @@ static inline SurfacePoint cone_surface_point(const Cone *cone, const Ray *ray, 
     return revolution_surface_point(cone, true, ray, t);
 }
 
+// Bounds how far roundings of a shape's numbers move it, which the eye's power excludes.
+static inline real revolution_shape_error(const RoundSolid *solid, Vector base)
+{
+    const Round *round = &solid->round;
+    if (round->has_power) return (real)(0);
+    const real rounded = (real)(16 * UNIT_ROUNDOFF), of_radius = rounded * solid->widest;
+    if (!solid->is_finite) return of_radius;
+    // both ends are rounded as points, which turns the axis
+    const Vector end = vector_fma(round->axis, solid->high, base);
+    const real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end)),
+               turned = (real)(2) + divide_or(solid->widest, solid->half_height, (real)(0));
+    return of_radius + real_fma(moved, turned, rounded * solid->half_height);
+}
+
 static inline RoundSolid round_of_revolution(const Revolution *shape, bool sloped, const Ray *ray)
 {
     RoundSolid solid;
@@ -442,19 +456,8 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     if (solid.is_finite)
         solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
                                 real_fma(round->slope, solid.high, round->radius));
-    real shape_error = (real)(0);
-    if (!round->has_power) {
-        shape_error = (real)(16 * UNIT_ROUNDOFF) * solid.widest;
-        if (solid.is_finite) {
-            // both ends are rounded as points, which turns the axis
-            Vector end = vector_fma(round->axis, solid.high, base);
-            real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
-            real turned = (real)(2) + divide_or(solid.widest, solid.half_height, (real)(0));
-            shape_error =
-                shape_error + real_fma(moved, turned, (real)(16 * UNIT_ROUNDOFF) * solid.half_height);
-        }
-    }
-    round_set_place_errors(round, ray, shape_error, sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
+    round_set_place_errors(round, ray, revolution_shape_error(&solid, base),
+                           sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
     return solid;
 }
 

@@ -282,7 +282,7 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 
 // Returns the crossing in a bracket at whose ends the exact ray is certainly on different sides. The bracket
 // is narrowed. Only signs beyond `place` count, and the constants only choose the points: the sign is certain
-// from `place` over the slope on, and a quarter more allows for a rough zero and for the curvature.
+// beyond `place` over the slope, and a quarter more allows for a rough zero and for the curvature.
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {
