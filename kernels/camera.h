@@ -14,13 +14,10 @@ typedef struct {
 // Returns the direction of a place in the image, in half pixels from its center.
 static inline Vector equirectangular_direction(global const SceneHeader *header, real x, real y)
 {
-    const real quarter = (real)(0.25f), half_turn = (real)(0.5f);
     real longitude = x * (real)(header->right.w), latitude = y * (real)(header->up.w);
-    real away = fabs(longitude), sine = real_sine_of_turns(real_min(away, half_turn - away));
-    Vector level = vector_fma(vector_of(header->right), lanes_select(longitude < (real)(0), -sine, sine),
-                              vector_scale(vector_of(header->forward), real_sine_of_turns(quarter - away)));
+    Vector level = vector_of_turns(vector_of(header->forward), vector_of(header->right), longitude);
     return vector_fma(vector_of(header->up), real_sine_of_turns(latitude),
-                      vector_scale(level, real_sine_of_turns(quarter - fabs(latitude))));
+                      vector_scale(level, real_sine_of_turns((real)(0.25f) - fabs(latitude))));
 }
 
 // Returns the ray of sample `index`, through a point of each pixel. dx and dy run from -1 to 1 across the

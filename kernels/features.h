@@ -12,6 +12,7 @@
     FEATURE(SPOT_LIGHTS, )        \
     FEATURE(FADING_LIGHTS, )      \
     FEATURE(AREA_LIGHTS, )        \
+    FEATURE(SKY_LIGHT, )          \
     FEATURE(LENS, )               \
     FEATURE(ORTHOGRAPHIC, )       \
     FEATURE(EQUIRECTANGULAR, )    \

@@ -368,8 +368,23 @@ enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADO
 enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
 
 // The area that a light shines from: a rectangle or an ellipse around its position, the half of a sphere that
-// faces the surface, or a triangle.
-enum { LIGHT_AREA_NONE, LIGHT_AREA_RECTANGLE, LIGHT_AREA_ELLIPSE, LIGHT_AREA_SPHERE, LIGHT_AREA_TRIANGLE };
+// faces the surface, a triangle, or the sky.
+enum {
+    LIGHT_AREA_NONE,
+    LIGHT_AREA_RECTANGLE,
+    LIGHT_AREA_ELLIPSE,
+    LIGHT_AREA_SPHERE,
+    LIGHT_AREA_TRIANGLE,
+    LIGHT_AREA_SKY
+};
+
+// One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's image.
+typedef struct {
+    scalar4 place; // x: the least longitude, in turns from sky_forward, y: its range; z, w: of the latitude's
+                   // sine
+} SkyCell;
+
+enum { SKY_ROWS = 128, SKY_COLUMNS = 128 };
 
 typedef struct {
     scalar4 color;     // w: the largest of its channels
@@ -382,7 +397,8 @@ typedef struct {
     scalar4 fading;
     // With HAS_AREA_LIGHTS: from the center of a rectangle or an ellipse to the middles of two sides,
     // relative to the direction for directional lights; two sides of a triangle, one of whose vertices is at
-    // position - (across_u + across_v) / 4; across_u.w: a sphere's radius.
+    // position - (across_u + across_v) / 4; across_u.w: a sphere's radius, or for
+    // the sky what its color times both ranges of a cell is multiplied by to be a part of `color`.
     scalar4 across_u, across_v;
     uint4 kind; // x: LIGHT_KIND_…, y: LIGHT_AREA_…
 } Light;
@@ -443,6 +459,7 @@ typedef struct {
     ARRAY(OBJECTS, ObjectEntry, , objects)                             \
     ARRAY(MATERIALS, Material, , materials)                            \
     ARRAY(LIGHTS, Light, , lights)                                     \
+    ARRAY(SKY_CELLS, SkyCell, , sky_cells)                             \
     ARRAY(TEXTURE_LEVELS, TextureLevel, , texture_levels)              \
     ARRAY(SHARED_MESHES, SharedMesh, , shared_meshes)                  \
     ARRAY(INSTANCE_IDS, InstanceIds, , instance_ids)

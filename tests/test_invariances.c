@@ -205,8 +205,9 @@ static void precision_holds(void **state)
         c.settings.extra_features |= features_of(&scene); // also where a changed scene needs fewer
         // without points of areas, which depend on the pixel, and so change in a mirror image
         assert_int_equal(features_of(&scene) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
-                             FEATURE_CUTOUTS | FEATURE_NORMAL_MAPS | FEATURE_AREA_LIGHTS | FEATURE_LENS |
-                             FEATURE_ORTHOGRAPHIC | FEATURE_EQUIRECTANGULAR | FEATURE_INSTANCES,
+                             FEATURE_CUTOUTS | FEATURE_NORMAL_MAPS | FEATURE_AREA_LIGHTS | FEATURE_SKY_LIGHT |
+                             FEATURE_LENS | FEATURE_ORTHOGRAPHIC | FEATURE_EQUIRECTANGULAR |
+                             FEATURE_INSTANCES,
                          FEATURE_ALL);
         c.film = render(&scene, &c.settings);
         assert_int_equal(film_count_faulty(&c.film), 0);

@@ -110,6 +110,7 @@ typedef struct {
     REALS(FLAT_LIGHTS, Light, FlatLight, across_u)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, across_v)                               \
     INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)                                \
+    REALS(FLAT_SKY_CELLS, SkyCell, FlatSkyCell, place)                           \
     INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
     INTEGERS(FLAT_TEXELS, Texel, Texel, color)                                   \
     REALS(FLAT_SHARED_MESHES, SharedMesh, SharedMesh, extent)                    \
@@ -152,6 +153,7 @@ static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0,
                                  "scenes/images/globe.png}}\n";
 
 static const char instance_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
+                                    "background: {horizon: 1, zenith: 1, light: true}\n"
                                     "define: {quad: {objects: [{mesh: {file: tests/textures/quad.obj}}]}}\n"
                                     "objects: [{instance: {of: quad}}]\n";
 

@@ -257,6 +257,8 @@ class Soft(TestCase):
             self.refuses(command, f"{message}which has no error bound: choose a precision other than certified")
             if "projection" not in key:
                 self.refuses("certify soft.yaml --precision strict --size 8x8", "the exact reference has no .*cannot judge this scene")
+        write("soft.yaml", camera.format("", f"{{{point}}}") + "background: {horizon: 1, zenith: 1, light: true}\n")
+        self.refuses(command, "the sky is a light, which has no error bound")
         write("soft.yaml", camera.format(", shift: [0, 5]", f"{{{point}}}"))
         self.refuses(command, "'shift' moves the middle of the frame to [0-9.]+ focal lengths from the eye, where certified has error bounds up to 4.33")
         ghost = "materials: {{ghost: {{shadow: false}}}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1{}}}}}]\n"

@@ -36,7 +36,8 @@ static int variants_close(void **state)
 
 // Points of areas depend on the pixel, so that a mirrored image has others. Parallel rays need another
 // camera.
-#define SAMPLED_FEATURES (FEATURE_AREA_LIGHTS | FEATURE_LENS | FEATURE_ORTHOGRAPHIC | FEATURE_EQUIRECTANGULAR)
+#define SAMPLED_FEATURES                                                                                     \
+    (FEATURE_AREA_LIGHTS | FEATURE_SKY_LIGHT | FEATURE_LENS | FEATURE_ORTHOGRAPHIC | FEATURE_EQUIRECTANGULAR)
 
 // Renders with the settings' features unchanged.
 static Film render(const Scene *scene, const RenderSettings *settings)
@@ -57,7 +58,8 @@ static void scene_has_every_feature(void **state)
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
                          FEATURE_CUTOUTS | FEATURE_NORMAL_MAPS | FEATURE_INSTANCES | SAMPLED_FEATURES,
                      FEATURE_ALL);
-    assert_int_equal(features_of(&sampled) & SAMPLED_FEATURES, FEATURE_AREA_LIGHTS | FEATURE_LENS);
+    assert_int_equal(features_of(&sampled) & SAMPLED_FEATURES,
+                     FEATURE_AREA_LIGHTS | FEATURE_SKY_LIGHT | FEATURE_LENS);
 }
 
 static void lanes_agree(void **state)
@@ -182,6 +184,9 @@ static const struct {
                                                 "projection: equirectangular}\nambient: 0.5\n" SPHERE},
     {FEATURE_SKY, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
                   "background: {horizon: 1, zenith: [0, 0, 1], up: [0.1, 1, 0]}\n"},
+    {FEATURE_SPHERES | FEATURE_SKY | FEATURE_DIRECTIONAL_LIGHTS | FEATURE_AREA_LIGHTS | FEATURE_SKY_LIGHT,
+     "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
+     "background: {horizon: 1, zenith: [0, 0, 1], light: true}\n" SPHERE},
     {FEATURE_SKY | FEATURE_IMAGES, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
                                    "background: {image: scenes/images/globe.png}\n"},
     {FEATURE_SPHERES | FEATURE_CHECKERS,

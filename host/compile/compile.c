@@ -38,6 +38,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     objects_flatten(compiled, scene, &rounding);
     materials_flatten(compiled, scene, &rounding);
     lights_flatten(compiled, scene, &rounding);
+    sky_cells_flatten(compiled, scene);
     if (!numbers_fit(compiled, scene, settings, messages)) return false;
     neighbors_find(compiled, scene, settings);
     compiled->features |= features_of(scene) | settings->extra_features;

@@ -32,6 +32,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
     [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, normal_map),
     [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
+    [FLAT_SKY_CELLS] = LAYOUT_OF_REALS(FlatSkyCell),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
     [FLAT_SHARED_MESHES] = LAYOUT(SharedMesh, place, place),
     [FLAT_INSTANCE_IDS] = LAYOUT(InstanceIds, ids, ids),

@@ -77,6 +77,7 @@ FeatureSet features_of(const Scene *scene)
         set |= light_features[light->kind];
         if (light_fades(light)) set |= FEATURE_FADING_LIGHTS;
         if (light->area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
+        if (light->area == AREA_SKY) set |= FEATURE_SKY_LIGHT;
     }
     if (scene->camera.lens_radius > 0) set |= FEATURE_LENS;
     if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;

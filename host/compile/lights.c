@@ -6,8 +6,11 @@ _Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL ==
                "kinds of lights have the kernels' numbers");
 _Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT_AREA_RECTANGLE &&
                    (int)AREA_ELLIPSE == LIGHT_AREA_ELLIPSE && (int)AREA_SPHERE == LIGHT_AREA_SPHERE &&
-                   (int)AREA_TRIANGLE == LIGHT_AREA_TRIANGLE,
+                   (int)AREA_TRIANGLE == LIGHT_AREA_TRIANGLE && (int)AREA_SKY == LIGHT_AREA_SKY,
                "areas of lights have the kernels' numbers");
+
+_Static_assert((int)SKY_CELL_ROWS == SKY_ROWS && (int)SKY_CELL_COLUMNS == SKY_COLUMNS,
+               "the sky has the kernels' cells");
 
 // 1 - cos of an angle in degrees, without cancellation.
 static double versine(double degrees)
@@ -25,8 +28,9 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
                                 .kind = {.x = (uint32_t)light->kind, .y = (uint32_t)light->area}};
         if (light->area != AREA_NONE) {
+            const double radius = light->area == AREA_SKY ? scene->sky.cell_factor : light->radius;
             const double unit = light->kind == LIGHT_DIRECTIONAL ? 1 / vector_length(light->direction) : 1;
-            lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), light->radius);
+            lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), radius);
             lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
         }
         lights[i].fading =
@@ -39,5 +43,16 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
             double outer = versine(light->half_angle), inner = versine(light->half_angle - light->penumbra);
             lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
         }
+    }
+}
+
+void sky_cells_flatten(CompiledScene *compiled, const Scene *scene)
+{
+    flat_array_renew(compiled, FLAT_SKY_CELLS, scene->sky.cells ? (size_t)SKY_ROWS * SKY_COLUMNS : 0);
+    FlatSkyCell *cells = compiled->arrays[FLAT_SKY_CELLS].items;
+    for (size_t i = 0; i < compiled->arrays[FLAT_SKY_CELLS].count; i++) {
+        const SkyCell *cell = &scene->sky.cells[i];
+        cells[i].place = (scalar4){cell->longitude_begin, cell->longitude_end - cell->longitude_begin,
+                                   cell->sine_begin, cell->sine_end - cell->sine_begin};
     }
 }

@@ -101,6 +101,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_FRESNEL, "a material has 'fresnel'"},
         {FEATURE_CONDUCTORS, "a material has 'conductor'"},
         {FEATURE_ABSORPTION, "a material has 'absorption'"},
+        {FEATURE_SKY_LIGHT, "the sky is a light"},
         {FEATURE_AREA_LIGHTS, "a light has an area"},
         {FEATURE_LENS, "the camera has an 'aperture'"},
         {FEATURE_ORTHOGRAPHIC, "the camera has parallel rays"},

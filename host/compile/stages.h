@@ -27,12 +27,13 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
 void textures_flatten(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);
 
 // objects.c, materials.c, lights.c: the arrays of each shape, FLAT_TRIANGLE_NORMALS, FLAT_TRIANGLE_UVS,
-// FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS.
+// FLAT_OBJECTS; FLAT_MATERIALS; FLAT_LIGHTS; FLAT_SKY_CELLS.
 void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 // The arrays of each shape as another eye sees them, in their order; FEATURE_EYE_POWERS.
 void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 void materials_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
 void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding *rounding);
+void sky_cells_flatten(CompiledScene *compiled, const Scene *scene);
 
 // neighbors.c: FLAT_TRIANGLE_NEIGHBORS, where it is compiled for `certified`; else none.
 void neighbors_find(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings);

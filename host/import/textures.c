@@ -2,8 +2,7 @@
 
 #include "host/base/file.h"
 #include "host/base/memory.h"
-#include "host/image/srgb.h"
-#include "host/scene/portable.h"
+#include "host/scene/sky.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -169,29 +168,6 @@ static void cutouts_prune(Scene *scene)
     }
 }
 
-// Returns the mean of an image's linear colors over all directions, of which it is an image. A row's share is
-// the difference of the sines of its edges' latitudes.
-static Color directions_mean(const Image *image)
-{
-    Color mean = {0};
-    double below = 1;
-    for (uint32_t y = 0; y < image->height; y++) {
-        const double above = below;
-        below = portable_cosine((y + 1) * M_PI / image->height);
-        const double share = (above - below) / 2 / image->width;
-        for (uint32_t x = 0; x < image->width; x++) {
-            const float *values = image->values + ((size_t)y * image->width + x) * image->channels;
-            double color[3];
-            for (size_t channel = 0; channel < 3; channel++) {
-                const double value = (double)values[image->channels < 3 ? 0 : channel];
-                color[channel] = image->display ? (double)(float)srgb_decode(value) : fmax(value, 0);
-            }
-            mean = vector_add(mean, vector_scale((Color){color[0], color[1], color[2]}, share));
-        }
-    }
-    return mean;
-}
-
 void textures_decode(Scene *scene, Report *report, Stage *stage)
 {
     AlphaUse *uses = alpha_uses(scene);
@@ -205,7 +181,7 @@ void textures_decode(Scene *scene, Report *report, Stage *stage)
     }
     free(uses);
     cutouts_prune(scene);
-    if (scene->sky.is_ambient && report->error_count == 0)
-        scene->ambient = vector_scale(directions_mean(&scene->textures.items[scene->sky.texture - 1].image),
-                                      scene->sky.intensity);
+    if (report->error_count > 0) return;
+    if (scene->sky.is_ambient) scene->ambient = sky_mean(scene);
+    if (scene->sky.is_light) scene_add_sky_light(scene);
 }

@@ -5,7 +5,7 @@
 #include "host/import/report.h"
 #include "host/scene/scene.h"
 
-// Decodes the images, removes cutouts by opaque ones and sets the ambient light if it is that of the sky.
-// Reports images that cannot be read or used, and warns of alpha that is not shown and of cutouts that are
-// removed.
+// Decodes the images, removes cutouts by opaque ones and sets the ambient light if it is that of the sky,
+// and the light that the sky may be. Reports images that cannot be read or used, and warns of alpha that is
+// not shown and of cutouts that are removed.
 void textures_decode(Scene *scene, Report *report, Stage *stage);

@@ -104,7 +104,7 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
 static bool is_without_eye(size_t kind)
 {
     return kind == FLAT_TRIANGLE_NORMALS || kind == FLAT_TRIANGLE_UVS || kind == FLAT_TRIANGLE_NEIGHBORS ||
-           kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS;
+           kind == FLAT_SKY_CELLS || kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS;
 }
 
 // Stages the buffers whose size differs. Then all arrays in them have changed: only scene_compile changes the

@@ -200,6 +200,7 @@ void scene_free(Scene *scene)
         free(scene->material_names.items[i]);
     free(scene->material_names.items);
     free(scene->lights.items);
+    free(scene->sky.cells);
     free(scene->materials.items);
     free(scene->objects.items);
     for (size_t i = 0; i < scene->meshes.count; i++)

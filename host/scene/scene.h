@@ -38,8 +38,9 @@ typedef struct {
 
 typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
 
-// What a light shines from: its position, a rectangle or an ellipse around it, a sphere, or a triangle.
-typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE } LightArea;
+// What a light shines from: its position, a rectangle or an ellipse around it, a sphere, a triangle, or the
+// directions of sky.cells.
+typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE, AREA_SKY } LightArea;
 
 typedef struct {
     LightKind kind;
@@ -249,6 +250,13 @@ typedef struct {
     uint64_t hash; // of its bytes; hash_bytes
 } IncludedFile;
 
+// A range of directions: of longitudes in turns, from -1/2 to 1/2, and of the sines of latitudes.
+typedef struct {
+    double longitude_begin, longitude_end, sine_begin, sine_end;
+} SkyCell;
+
+enum { SKY_CELL_ROWS = 128, SKY_CELL_COLUMNS = 128 };
+
 // How a format defines colors: as linear light, or as values that a display takes unchanged.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 
@@ -266,6 +274,11 @@ typedef struct {
         Vector3 forward;
         double intensity;
         bool is_ambient; // its mean becomes `ambient` when the image is decoded
+        bool is_light;   // becomes one of `lights` when the image is decoded
+        // Of a sky that is a light, SKY_CELL_ROWS x SKY_CELL_COLUMNS cells of nearly equal light, laid
+        // out as its image.
+        SkyCell *cells;
+        double cell_factor; // times the sky's color and both ranges of a cell: a part of the light's color
     } sky;
     struct {
         Light *items;

@@ -24,10 +24,7 @@ static inline Color3 background_color(const Scene *scene, Vector direction, mask
     if (!HAS_SKY) return color;
     if (HAS_IMAGES && header->sky_texture.x > 0)
         return lanes_any(wanted) ? sky_image_color(scene, direction, wanted) : color;
-    const real zero = (real)(0);
-    real height = vector_dot(direction, vector_of(header->sky_up));
-    color = vector_fma(vector_of(header->sky_above), real_max(height, zero), color);
-    return vector_fma(vector_of(header->sky_below), real_max(-height, zero), color);
+    return sky_blended_color(header, vector_dot(direction, vector_of(header->sky_up)));
 }
 
 // Sets the surface that a packet's rays hit and what it reflects of ambient light. Returns whether any lane

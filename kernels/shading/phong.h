@@ -9,6 +9,7 @@ typedef struct {
     real facing;      // the cosine between the shading normal and that
     real strength;    // the part of its color that arrives unless it is occluded
     real fading;      // with HAS_FADING_LIGHTS, that by the distance alone
+    Color3 tint;      // with HAS_SKY_LIGHT, factors of its color
     Ray shadow_ray;   // ends at the light
 } LightRay;
 
@@ -57,18 +58,55 @@ static inline Vector light_area_offset(const Light *light, uint index, const Sur
     return vector_scale(offset, (real)(light->across_u.w));
 }
 
+// Returns the direction of the surface's sample of the sky's light, a random one where there is one sample
+// per pixel. Sets the light that comes from there, in parts of the light's color.
+static inline Vector sky_sample(const Scene *scene, const Light *light, uint index, const Surface *surface,
+                                Color3 *tint)
+{
+    global const SceneHeader *header = scene->header;
+    Sample sample = surface->sample;
+    if (sample.index == SAMPLE_CENTER) sample.index = 0;
+    SquarePoint point = sample_point(&sample, SAMPLED_LIGHTS + index);
+    const real one = (real)(1);
+    real columns = (point.x + one) * (real)(SKY_COLUMNS / 2), rows = (point.y + one) * (real)(SKY_ROWS / 2);
+    RealLanes column = {floor(columns)}, row = {floor(rows)};
+    RealLanes longitude, longitudes, sine, sines;
+    for (uint lane = 0; lane < LANES; lane++) {
+        scalar4 cell = scene->sky_cells[(uint)row.each[lane] * SKY_COLUMNS + (uint)column.each[lane]].place;
+        longitude.each[lane] = cell.x;
+        longitudes.each[lane] = cell.y;
+        sine.each[lane] = cell.z;
+        sines.each[lane] = cell.w;
+    }
+    longitude.all = real_fma(columns - column.all, longitudes.all, longitude.all);
+    sine.all = real_fma(rows - row.all, sines.all, sine.all);
+    real across = real_sqrt(real_max(real_fma(-sine.all, sine.all, one), (real)(0)));
+    if (HAS_IMAGES && header->sky_texture.x > 0)
+        *tint = sky_texel_color(scene, longitude.all, real_turns(across, sine.all), surface_found(surface));
+    else
+        *tint = sky_blended_color(header, sine.all);
+    *tint = vector_scale(*tint, longitudes.all * sines.all * (real)(light->across_u.w));
+    Vector level =
+        vector_of_turns(vector_of(header->sky_forward), vector_of(header->sky_right), longitude.all);
+    return vector_fma(vector_of(header->sky_up), sine.all, vector_scale(level, across));
+}
+
 // The shadow ray to a point or spot light is not normalized: the light is at t = 1. It ends 32 u before, so
 // that a surface on which the light lies does not occlude it.
-static inline LightRay light_ray(const Light *light, uint index, const Surface *surface)
+static inline LightRay light_ray(const Scene *scene, const Light *light, uint index, const Surface *surface)
 {
     bool has_area = HAS_AREA_LIGHTS && light->kind.y != LIGHT_AREA_NONE;
+    bool is_sky = HAS_SKY_LIGHT && light->kind.y == LIGHT_AREA_SKY;
     LightRay to_light;
+    if (HAS_SKY_LIGHT) to_light.tint = (Color3){(real)(1), (real)(1), (real)(1)};
     Vector start = shadow_ray_origin(surface);
     to_light.strength = to_light.fading = (real)(1);
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
     if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
-        if (has_area)
+        if (is_sky)
+            to_light.direction = sky_sample(scene, light, index, surface, &to_light.tint);
+        else if (has_area)
             to_light.direction =
                 vector_normalize(vector_add(to_light.direction, light_area_offset(light, index, surface)));
         to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
@@ -295,7 +333,7 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
                                           Ray *shadow_ray)
 {
     Light light = scene->lights[index];
-    LightRay to_light = light_ray(&light, index, surface);
+    LightRay to_light = light_ray(scene, &light, index, surface);
     LightVisibility visibility;
     visibility.fraction = to_light.strength;
     visibility.lit = surface_found(surface) & (to_light.facing > (real)(0)) & (to_light.strength > (real)(0));
@@ -303,6 +341,7 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     mask skips_culling = mask_none();
     if (IS_CERTIFIED) skips_culling = light_set_errors(&light, surface, &to_light, &visibility);
     visibility.reflected = phong_reflect(surface, &to_light, to_light.shadow_ray.active);
+    if (HAS_SKY_LIGHT) visibility.reflected = color_multiply(visibility.reflected, to_light.tint);
     *shadow_ray = to_light.shadow_ray;
     bool has_area = HAS_AREA_LIGHTS && light.kind.y != LIGHT_AREA_NONE;
     if (light.kind.x != LIGHT_KIND_DIRECTIONAL && !has_area)

@@ -173,6 +173,36 @@ static inline Vector texture_lookup(const Scene *scene, uint4 texture, real alon
     return (Vector){red.all, green.all, blue.all};
 }
 
+// Returns the color of a sky without an image, for the sine of a latitude.
+static inline Vector sky_blended_color(global const SceneHeader *header, real sine)
+{
+    const real zero = (real)(0);
+    Vector color =
+        vector_fma(vector_of(header->sky_above), real_max(sine, zero), vector_of(header->background));
+    return vector_fma(vector_of(header->sky_below), real_max(-sine, zero), color);
+}
+
+// Returns the color of the texel of the sky's image in which a direction lies, for each lane in `wanted`.
+static inline Vector sky_texel_color(const Scene *scene, real longitude_turns, real latitude_turns,
+                                     mask wanted)
+{
+    uint4 level = scene->texture_levels[scene->header->sky_texture.x - 1].place;
+    const real one_half = (real)(0.5f);
+    RealLanes column = {(longitude_turns + one_half) * (real)((scalar)level.y)};
+    RealLanes row = {(one_half - latitude_turns - latitude_turns) * (real)((scalar)level.z)};
+    RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
+    IntegerLanes lanes = {wanted};
+    for (uint lane = 0; lane < LANES; lane++) {
+        if (lanes.each[lane] == 0) continue;
+        uint x = min((uint)column.each[lane], level.y - 1), y = min((uint)row.each[lane], level.z - 1);
+        scalar4 color = texel_color(scene, level.x + y * level.y + x);
+        red.each[lane] = color.x;
+        green.each[lane] = color.y;
+        blue.each[lane] = color.z;
+    }
+    return (Vector){red.all, green.all, blue.all};
+}
+
 // Returns the color of the sky's image along a unit direction, for the lanes in `wanted`. Its texels are
 // counted at the horizon or by their height, as a sphere's.
 static inline Vector sky_image_color(const Scene *scene, Vector direction, mask wanted)

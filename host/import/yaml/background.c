@@ -84,6 +84,7 @@ bool read_background(YamlReader *reader, const Field *field, const YamlNode *nod
          &range_not_negative},
         {"turn", read_number, offsetof(Background, turn), FORM_IMAGE | FORM_SUN, OPTIONAL, NULL},
         {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL, NULL},
+        {"light", read_boolean, offsetof(Background, is_light), FORM_ANY, OPTIONAL, NULL},
     };
     Background *background = target;
     if (node->kind != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
@@ -100,7 +101,7 @@ bool read_background(YamlReader *reader, const Field *field, const YamlNode *nod
 // Returns the mean of the colors over all directions.
 static Color background_mean(const Background *background)
 {
-    if (vector_is_zero(background->up)) return vector_all(0);
+    if (vector_is_zero(background->up) || background->is_light) return vector_all(0);
     const Color poles = vector_add(background->zenith, background->nadir);
     return vector_add(vector_scale(background->horizon, 0.5), vector_scale(poles, 0.25));
 }
@@ -128,16 +129,18 @@ void yaml_set_background(YamlReader *reader, const Background *background, Color
     scene->sky.zenith = background->zenith;
     scene->sky.nadir = background->nadir;
     scene->ambient = has_ambient ? ambient : background_mean(background);
-    if ((background->texture == 0 && !has_sun) || reader->report.error_count > 0) return;
-    scene->sky.texture = background->texture;
-    scene->sky.is_ambient = !has_ambient;
-    scene->sky.intensity = background->intensity;
+    scene->sky.is_light = background->is_light;
+    if (vector_is_zero(background->up) || reader->report.error_count > 0) return;
     // -z, or where that lies along `up`, -x
     const Vector3 up = vector_normalize(background->up);
     Vector3 right = vector_cross((Vector3){0, 0, -1}, up);
     if (vector_length(right) < 1e-6) right = vector_cross((Vector3){-1, 0, 0}, up);
     const double turn = has_sun ? background->turn - background->sun.position.azimuth : background->turn;
     scene->sky.forward = vector_turned(vector_cross(up, right), up, turn);
+    if (background->texture == 0 && !has_sun) return;
+    scene->sky.texture = background->texture;
+    scene->sky.is_ambient = !has_ambient && !background->is_light;
+    scene->sky.intensity = background->intensity;
     if (!has_sun) return;
     const SceneTexture sky = {.path = memory_copy_text("the sky"),
                               .offset = background->sun.node->offset,

@@ -41,13 +41,14 @@ typedef struct {
     double turbidity;
     Color ground;
     double intensity, turn;
+    bool is_light;
 } Background;
 
 // Reads a color or a sky into a Background.
 FieldReader read_background;
 
-// Sets the scene's background, adds the light of its sun and, where `ambient` is NaN, sets the ambient light.
-// Nothing after an error.
+// Sets the scene's background, adds the light of its sun and, where `ambient` is NaN, sets the ambient light,
+// to 0 where the sky is a light. Nothing after an error.
 void yaml_set_background(YamlReader *reader, const Background *background, Color ambient);
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node);
