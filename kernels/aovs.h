@@ -1,6 +1,7 @@
-// Lists the layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), which
-// describe the ray through its center. The layers' numbers and names, their places on the device and the
-// files follow from these lists. Adding an AOV also takes its computation in a kernel and its documentation.
+// Lists the layers of a film: the color of each pixel, and its AOVs (arbitrary output variables), most of
+// which describe the ray through its center. The layers' numbers and names, their places on the device and
+// the files follow from these lists. Adding an AOV also takes its computation in a kernel and its
+// documentation.
 //
 // LAYER(NAME, name, type, components, note). The type is REAL, of the kernel's precision; LENGTH, a real in
 // the scene's unit of length; or INTEGER, of 32 bits. Components are values per pixel; PER_LIGHT means one
@@ -13,16 +14,21 @@
 // clang-format off
 // aov.cl
 #define HIT_AOV_LIST(LAYER)                                                                                    \
-    LAYER(T,        t,        LENGTH,  1, "distance from the eye; infinite where nothing is hit")               \
-    LAYER(NORMAL,   normal,   REAL,    3, "unit shading normal, on the side that is seen; 0 where nothing is hit") \
+    LAYER(T,        t,        LENGTH,  1, "distance from the eye; infinite for a miss")               \
+    LAYER(NORMAL,   normal,   REAL,    3, "unit shading normal, on the side that is seen; 0 for a miss") \
     LAYER(POSITION, position, LENGTH,  3, "hit point, in the scene's coordinates")                              \
-    LAYER(OBJECT,   object,   INTEGER, 1, "number of the object, from 0; 4294967295 where nothing is hit")      \
+    LAYER(OBJECT,   object,   INTEGER, 1, "number of the object, from 0; 4294967295 for a miss")      \
     LAYER(SHADOW,   shadow,   INTEGER, PER_LIGHT, "1 where that light is occluded, 0 elsewhere")                \
-    LAYER(RAY,      ray,      REAL,    3, "direction of the ray from the eye")
+    LAYER(RAY,      ray,      REAL,    3, "direction from the eye")
 
 // path.cl
 #define PATH_AOV_LIST(LAYER) \
-    LAYER(PATH, path, INTEGER, 1, "signature of all objects met, also in mirrors and through glass")
+    LAYER(PATH, path, INTEGER, 1, "signature of all objects met, also by mirrors and glass")
+
+// coverage.cl
+#define SAMPLED_AOV_LIST(LAYER) \
+    LAYER(COVERAGE, coverage, REAL, 1, "part of the samples that hit an object") \
+    LAYER(BACKDROP, backdrop, REAL, 3, "the background's part of the color")
 
 // render.cl
 #define COLOR_LAYER(LAYER) \
@@ -30,9 +36,10 @@
 
 // host/render/repeat.c
 #define HOST_AOV_LIST(LAYER) \
-    LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where rendered again in double, 2 where undecided; else 0")
+    LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where re-rendered in double, 2 where undecided, else 0")
 
-#define LAYER_LIST(LAYER) HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)
+#define LAYER_LIST(LAYER) \
+    HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) SAMPLED_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)
 // clang-format on
 
 // Where each layer begins in a band's buffer, in units of ARENA_UNIT. The sum of each pixel's colors is

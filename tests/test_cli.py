@@ -452,7 +452,7 @@ class Images(CliTestCase):
 
     def test_exr_of_a_region_with_aovs(self):
         """One file, whose windows place the region in the image, with the values of the NPY files as layers."""
-        whole = "render sphere.yaml --size 40x30 --aov t,object,normal,shadow -o"
+        whole = "render sphere.yaml --size 40x30 --alpha --aov t,object,normal,shadow -o"
         region = whole.replace("-o", "--region 8,4,24,16 -o")
         self.assertRegex(self.glint(f"{region} a.exr").stderr, r"glint: wrote a\.exr\n$")
         self.assertEqual([path.name for path in Path().glob("a.*")], ["a.exr"])
@@ -464,7 +464,7 @@ class Images(CliTestCase):
         names = [name.decode() for name in re.findall(rb"([\w.]+)\0[\0\2]\0\0\0.{12}", channels[:500], re.DOTALL)]
         self.assertEqual(names[:10], ["A", "B", "G", "R", "depth.Z", "normal.X", "normal.Y", "normal.Z", "object.id", "shadow.0"])
         self.glint(f"{whole} b.exr")
-        self.assertRegex(self.glint(f"{whole} b.npy").stderr, r"glint: wrote b\.npy, b\.t\.npy, b\.normal\.npy, b\.object\.npy, b\.shadow\.npy\n$")
+        self.assertRegex(self.glint(f"{whole.replace('--alpha ', '')} b.npy").stderr, r"glint: wrote b\.npy, b\.t\.npy, b\.normal\.npy, b\.object\.npy, b\.shadow\.npy\n$")
         for name, layer in ("t", "depth"), ("object", "object"):
             self.assertIn("equal, bit for bit", self.glint(f"diff b.{name}.npy b.exr --layer {layer}").stdout)
         self.assertEqual(self.json("diff b.exr a.exr --json", status=3)["size"], [40, 30])
@@ -560,6 +560,43 @@ class Aovs(CliTestCase):
             self.assertLess(normal[2], 0)
             cosine = sum(n * (light - p) for n, light, p in zip(normal, (3, 4, -5), position))
             self.assertTrue(abs(cosine) < 1e-3 or shadow[0] == (cosine < 0), cosine)
+
+    @unittest.skipIf(IS_SANITIZED and not IS_LONG, "the values are the kernels'")
+    def test_alpha(self):
+        """What objects cover, and their color without the background: divided by that in PNG, not in EXR."""
+        width, height = 40, 30
+        write("disc.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0], fov: 40}\n"
+              "background: {horizon: [0.5, 0.25, 1], zenith: [0.1, 0.9, 0]}\n"
+              "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {color: 0, emission: [0.2, 0.6, 0.9]}}}]\n")
+        for precision in ("strict", "certified") if IS_LONG else ("strict",):
+            render = f"render disc.yaml --size {width}x{height} --samples 16 --lanes 1 --quiet --precision {precision}"
+            self.glint(f"{render} --aov coverage,backdrop -o plain.npy")
+            colors, backdrops, parts = (npy_read(f"plain{name}.npy")[2] for name in ("", ".backdrop", ".coverage"))
+            # the sphere's circle and the image at the distance 1
+            disc, image = math.pi / (5**2 - 1), (2 * math.tan(math.radians(20))) ** 2 * width / height
+            self.assertAlmostEqual(sum(parts) / len(parts), disc / image, delta=1e-3)
+            self.assertTrue({0, 1} < set(parts) and all(16 * part == int(16 * part) for part in parts))
+            self.glint(f"{render} --alpha --bits 16 --transfer none -o alpha.png")
+            (*size, bits, kind), rows, *_ = png_read("alpha.png")
+            self.assertEqual((size, bits, kind), ([width, height], 16, 6))
+            row_size = 1 + 8 * width
+            for row in range(height):
+                data = bytearray(rows[row * row_size : (row + 1) * row_size])
+                self.assertEqual(data.pop(0), 1)  # each byte is the difference to that of the pixel before
+                for i in range(8, len(data)):
+                    data[i] = (data[i] + data[i - 8]) % 256
+                for column, pixel in enumerate(struct.iter_unpack(">4H", data)):
+                    i = row * width + column
+                    self.assertEqual(pixel[3], round(65535 * parts[i]))
+                    for channel, emission in enumerate((0.2, 0.6, 0.9)):
+                        self.assertAlmostEqual(colors[i][channel] - backdrops[i][channel], parts[i] * emission, delta=1e-6)
+                        self.assertAlmostEqual(pixel[channel] / 65535, emission if parts[i] > 0 else 0, delta=2e-5)
+            for options in "-o black.npy", "--alpha -o black.exr":
+                self.glint(f"{render} --set background=0 --aov coverage {options}")
+            self.assertIn("equal, bit for bit", self.glint("diff black.npy black.exr").stdout)
+            self.assertIn("equal, bit for bit", self.glint("diff black.coverage.npy black.exr --layer coverage").stdout)
+        for name in "a.ppm", "a.npy":
+            self.refuses(f"render disc.yaml --alpha -o {name}", "--alpha is for PNG and EXR")
 
     def test_interpolated_normal_is_turned_with_its_triangle(self):
         """Near silhouettes it may point away from the eye, whichever way the file turns it."""

@@ -9,7 +9,7 @@ import glint
 sys.path.insert(0, str(glint.ROOT / "tools"))
 import kernel_clang  # noqa: E402
 
-KERNELS = ["render", "aov", "path", "trace"] if glint.IS_LONG else ["render"]
+KERNELS = ["render", "aov", "path", "coverage", "trace"] if glint.IS_LONG else ["render"]
 PRECISIONS = {"single": [], "strict": ["IS_STRICT"], "double": ["IS_DOUBLE"], "certified": ["IS_CERTIFIED"]}
 
 

@@ -108,7 +108,7 @@ class SpirvForm(glint.TestCase):
         process = self.form(*SCENES)
         self.assertEqual(process.returncode, 0, process.stdout)
         for scene in SCENES:
-            for kernel in "render", "aov", "path", "trace":
+            for kernel in "render", "aov", "path", "coverage", "trace":
                 self.assertIn(f"{scene} {kernel}: ", process.stdout)
 
 

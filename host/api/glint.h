@@ -142,7 +142,7 @@ typedef struct {
 } GlintRenderSettings;
 
 // Arrays of height x width pixels from the top left, which the caller owns, or NULL for layers that are not
-// wanted. Colors are linear light. The other layers describe the ray through a pixel's center. Where it
+// wanted. Colors are linear light. Those from t to shadow describe the ray through a pixel's center. Where it
 // misses, t is infinite, normal and position are 0, and object is 4294967295.
 typedef struct {
     size_t size;
@@ -153,6 +153,8 @@ typedef struct {
     uint32_t *object;
     uint32_t *shadow; // glint_scene_light_count per pixel: 1 where that light is occluded, 0 elsewhere
     uint32_t *doubt;  // at GLINT_CERTIFIED 1 where re-rendered in double, 2 where uncertified, otherwise 0
+    double *coverage; // part of the samples that hit an object
+    double *backdrop; // 3 per pixel: the background's part of the color
 } GlintImage;
 
 // Renders the scene. A failure leaves the arrays undefined.

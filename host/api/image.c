@@ -18,6 +18,8 @@ static unsigned layers_set(Film *film, const GlintImage *image)
     film->object = image->object;
     film->shadow = image->shadow;
     film->doubt = image->doubt;
+    film->coverage = image->coverage;
+    film->backdrop = image->backdrop;
     unsigned aovs = 0;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (layer != LAYER_COLOR && film->layers[layer]) aovs |= 1U << layer;

@@ -33,7 +33,7 @@ struct ImageOutput {
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted[LAYER_COUNT]; // a band's values in other types
-    Scratch positions, alpha;
+    Scratch positions, foreground;
     double bytes; // the size of all files before compression
 
     // A separate thread writes a band while the next is rendered. Until that thread has ended, all members
@@ -222,13 +222,8 @@ static bool is_exr_layer(const ImageOutput *output, const Film *film, Layer laye
     return is_exr(output) && layer != LAYER_COLOR && is_written(output, film, layer);
 }
 
-// Returns whether the file is an EXR with alpha, which needs an AOV that tells what was hit.
-static bool has_alpha(const ImageOutput *output)
-{
-    return is_exr(output) && (output->options->aovs & (AOV_T | AOV_OBJECT));
-}
-
-// Appends the names of a layer's channels: depth.Z; X, Y and Z for a vector; a number for each light.
+// Appends the names of a layer's channels: depth.Z; R, G and B for a color; X, Y and Z for a vector; a number
+// for each light.
 static void channel_names_append(Text *names, const Film *film, Layer layer)
 {
     const char *name = layer_names[layer];
@@ -238,6 +233,10 @@ static void channel_names_append(Text *names, const Film *film, Layer layer)
     else if (layer == LAYER_SHADOW)
         for (uint32_t i = 0; i < count; i++)
             text_appendf(names, "%s%s.%u", i > 0 ? "," : "", name, i);
+    else if (layer == LAYER_COVERAGE)
+        text_appendf(names, "%s.part", name);
+    else if (layer == LAYER_BACKDROP)
+        text_appendf(names, "%s.R,%s.G,%s.B", name, name, name);
     else if (count == 3)
         text_appendf(names, "%s.X,%s.Y,%s.Z", name, name, name);
     else
@@ -270,7 +269,7 @@ static bool image_open(ImageOutput *output, const Film *film, const ImageNote *n
         const char type = layer_types[layer] == LAYER_TYPE_INTEGER ? 'u' : 'f';
         layers[header.layer_count++] = (ImageLayer){text_c(text), film_components(film, layer), type};
     }
-    if (has_alpha(output)) layers[header.layer_count++] = (ImageLayer){"A", 1, 'f'};
+    if (output->options->alpha) layers[header.layer_count++] = (ImageLayer){"A", 1, 'f'};
     output->image = image_writer_open(output->options->path, &header, messages);
     output->bytes = (double)image_bytes(&header);
     for (size_t i = 0; i < header.layer_count; i++)
@@ -345,16 +344,21 @@ static const void *layer_narrowed(ImageOutput *output, const Film *band, Layer l
     return narrow;
 }
 
-// Returns 1 for each pixel whose central ray hits an object, and 0 for the others.
-static const float *alpha_of(ImageOutput *output, const Film *band)
+// Returns the colors of objects alone: in PNG those of the part of the pixel that they cover, in EXR times
+// that part.
+static const float *colors_without_background(ImageOutput *output, const Film *band)
 {
     const size_t count = film_pixel_count(band);
-    float *alpha = scratch_reserve(&output->alpha, count * sizeof *alpha);
-    const uint32_t *objects = band->layers[LAYER_OBJECT];
-    const float *distances = objects ? NULL : layer_narrowed(output, band, LAYER_T);
-    for (size_t i = 0; i < count; i++)
-        alpha[i] = (objects ? objects[i] != UINT32_MAX : isfinite(distances[i])) ? 1 : 0;
-    return alpha;
+    const float *colors = layer_narrowed(output, band, LAYER_COLOR),
+                *backdrop = layer_narrowed(output, band, LAYER_BACKDROP),
+                *coverage = layer_narrowed(output, band, LAYER_COVERAGE);
+    float *left = scratch_reserve(&output->foreground, 3 * count * sizeof *left);
+    for (size_t i = 0; i < count; i++) {
+        const float part = is_exr(output) || coverage[i] == 0 ? 1 : coverage[i];
+        for (size_t k = 3 * i; k < 3 * i + 3; k++)
+            left[k] = coverage[i] == 0 ? 0 : fmaxf(colors[k] - backdrop[k], 0) / part;
+    }
+    return left;
 }
 
 static bool band_write(ImageOutput *output)
@@ -364,10 +368,12 @@ static bool band_write(ImageOutput *output)
     const bool is_npy = output->format == IMAGE_NPY;
     const void *arrays[LAYER_COUNT + 2];
     size_t count = 0;
-    arrays[count++] = is_npy ? band->layers[LAYER_COLOR] : layer_narrowed(output, band, LAYER_COLOR);
+    arrays[count++] = output->options->alpha ? colors_without_background(output, band)
+                      : is_npy               ? band->layers[LAYER_COLOR]
+                                             : layer_narrowed(output, band, LAYER_COLOR);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (is_exr_layer(output, band, layer)) arrays[count++] = layer_narrowed(output, band, layer);
-    if (has_alpha(output)) arrays[count++] = alpha_of(output, band);
+    if (output->options->alpha) arrays[count++] = layer_narrowed(output, band, LAYER_COVERAGE);
     if (!image_writer_layer_rows(output->image, arrays, band->height, messages)) return false;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (output->aovs[layer] && !image_writer_rows(output->aovs[layer], layer_values(output, band, layer),
@@ -463,7 +469,7 @@ static void image_output_free(ImageOutput *output)
         film_free(&output->kept.items[i]);
     free(output->kept.items);
     free(output->positions.items);
-    free(output->alpha.items);
+    free(output->foreground.items);
     for (Layer i = 0; i < LAYER_COUNT; i++) {
         free(output->converted[i].items);
         free(output->layers[i].items);

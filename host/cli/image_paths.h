@@ -14,10 +14,17 @@ typedef struct {
     double exposure; // in stops
     Tone tone;
     bool dither;
+    bool alpha;         // PNG, EXR: the background is transparent
     const Pilot *pilot; // chose the precision, or NULL
     bool prints_names;  // prints the files' names once they are written
     bool synchronous;   // encodes a band before the next one is rendered, so that times do not overlap
 } ImageOutputOptions;
+
+// Returns the AOVs to render: those that are written, and those that alpha takes.
+static inline unsigned image_output_aovs(const ImageOutputOptions *options)
+{
+    return options->aovs | (options->alpha ? AOVS_OF_SAMPLES : 0U);
+}
 
 // Returns the scene's name with .png, or image.png for standard input, in the current folder. The caller
 // frees it.

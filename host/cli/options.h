@@ -105,8 +105,7 @@ enum {
 #define HELP_BOUNCES "      --bounces N       reflections and refractions of a ray, up to 255 (default: 5)\n"
 #define HELP_MIN_CONTRIBUTION                                                                                \
     "      --min-contribution W\n"                                                                           \
-    "                        trace no reflected or refracted ray whose weight in its pixel is below W,\n"    \
-    "                        from 0 to 1 (default: 0, trace all)\n"
+    "                        trace no bounced ray whose weight in its pixel is below W (default: 0)\n"
 #define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
 #define HELP_LENIENT  "      --lenient         read dialects of .rt files\n"
 #define HELP_SET                                                                                             \
@@ -120,14 +119,14 @@ enum {
     "      --work-group WxH  work-items of a group (default: 8x8, 1x1 with several lanes on a CPU, or "      \
     "fewer)\n"                                                                                               \
     "      --build-options OPTIONS\n"                                                                        \
-    "                        passed to the driver's compiler after glint's, such as \"-cl-opt-disable\"\n"
+    "                        passed to the driver's compiler, such as \"-cl-opt-disable\"\n"
 #define HELP_KEEP_KERNELS                                                                                    \
     "      --keep-kernels FOLDER\n"                                                                          \
     "                        write the text and the build log of each kernel that is built\n"
 #define HELP_REFERENCE                                                                                       \
     "      --reference-device D\n"                                                                           \
-    "                        renders in double: references, and the pixels that certified re-renders\n"      \
-    "                        (default: the device itself, else one with 64-bit floating point)\n"
+    "                        renders references, and what certified repeats in double\n"                     \
+    "                        (default: the device itself, else one with fp64)\n"
 #define HELP_JSON "      --json            print JSON\n"
 #define HELP_HELP "  -h, --help            print this help\n"
 

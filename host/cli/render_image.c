@@ -73,9 +73,9 @@ static bool checkpoint_start(ImageRender *render)
     Renderer *const *renderers = render->open->renderers;
     if (!options->checkpoint) return true;
     Text key = {0};
-    checkpoint_key(&key, &render->settings, options->output.aovs, renderers, render->open->devices.count,
-                   render->ranks);
-    const FilmHeader film = renderer_film_header(renderers[0], options->output.aovs);
+    checkpoint_key(&key, &render->settings, image_output_aovs(&options->output), renderers,
+                   render->open->devices.count, render->ranks);
+    const FilmHeader film = renderer_film_header(renderers[0], image_output_aovs(&options->output));
     render->checkpoint = checkpoint_open(options->checkpoint, text_c(&key), &film, &render->messages);
     text_free(&key);
     return render->checkpoint != NULL;
@@ -145,7 +145,7 @@ static int image_render(ImageRender *render)
     if (is_last)
         render->output = image_output_open(&options->output, options->scene, render->scene, &render->settings,
                                            renderers, devices->count, ranks);
-    const unsigned aovs = is_last ? options->output.aovs : 0;
+    const unsigned aovs = is_last ? image_output_aovs(&options->output) : 0;
     if (ranks) ranks->film = renderer_film_header(renderers[0], aovs);
     const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,
                                   .serve = ranks ? ranks->serve : NULL,
@@ -222,7 +222,7 @@ static int time_render(ImageRender *render)
     options->output.prints_names = !options->quiet && !options->has_format;
     options->output.synchronous = options->timing != TIMING_NONE;
     int status = EXIT_USER;
-    const unsigned aovs = shutter_is_last(&render->shutter) ? options->output.aovs : 0;
+    const unsigned aovs = shutter_is_last(&render->shutter) ? image_output_aovs(&options->output) : 0;
     if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
@@ -241,6 +241,7 @@ static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
     const char *const obstacle = shutter->time_count == 1           ? NULL
                                  : options->checkpoint              ? "--checkpoint keeps bands of one time"
                                  : options->budget.limit > 0        ? "--max-error measures one time"
+                                 : options->output.alpha            ? "--alpha shows one time"
                                  : strcmp(options->scene, "-") == 0 ? "standard input is read once"
                                                                     : NULL;
     if (obstacle)

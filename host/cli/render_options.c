@@ -22,6 +22,7 @@ enum {
     OPTION_DITHER,
     OPTION_BOUNCES,
     OPTION_MIN_CONTRIBUTION,
+    OPTION_ALPHA,
     OPTION_CHECKPOINT,
     OPTION_FRAMES,
     OPTION_SKIP_EXISTING,
@@ -45,6 +46,7 @@ static const struct option long_options[] = {
     {"dither", no_argument, NULL, OPTION_DITHER},
     {"bounces", required_argument, NULL, OPTION_BOUNCES},
     {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
+    {"alpha", no_argument, NULL, OPTION_ALPHA},
     {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
     {"frames", required_argument, NULL, OPTION_FRAMES},
     {"skip-existing", no_argument, NULL, OPTION_SKIP_EXISTING},
@@ -69,21 +71,22 @@ static const char help_text[] =
     "                        the scene's name with .png)\n" HELP_SET
     "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
     "      --samples N       per pixel (default: 1, at the center)\n"
-    "      --region X,Y,W,H  render these pixels of the image only\n"
-    "      --aov LIST        more files next to the image, IMAGE.NAME.npy for each NAME of the list:\n" //
+    "      --region X,Y,W,H  render these pixels only\n"
+    "      --aov LIST        more files, IMAGE.NAME.npy for each NAME of:\n" //
     LAYER_LIST(
         HELP_LAYER) "      --max-error E[:METRIC]\n"
-                    "                        choose the fastest precision that keeps this error in linear "
-                    "light; the metric is\n"
-                    "                        rmse, max or flip (default: rmse)\n"
+                    "                        choose the fastest precision within this error in linear light; "
+                    "METRIC: rmse,\n"
+                    "                        max or flip (default: rmse)\n"
                     "      --timing[=STYLE]  report the time of every stage and launch: text, json or trace\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and "
                     ".dat)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
                     "      --exposure STOPS  of a PNG or PPM: twice as bright per stop (default: 0)\n"
-                    "      --tone T          curve of a PNG or PPM, none or filmic (default: none, which "
-                    "clips at 1)\n"
+                    "      --tone T          curve of a PNG or PPM, none or filmic (default: none: clip at "
+                    "1)\n"
                     "      --dither          hide the steps of 8 bits in a pattern\n"
+                    "      --alpha           transparent background, for PNG and EXR\n"
                     "      --checkpoint FILE\n"
                     "                        keep finished bands in FILE; the same command resumes there\n"
                     "      --frames A[-B]    render these frames, or all; FILEs have %d or %04d for the "
@@ -201,6 +204,9 @@ static bool display_fits(const ImageOutputOptions *output)
     if (is_changed && image_output_holds_floats(format))
         option_usage_fault(
             "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
+    else if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
+        option_usage_fault("render",
+                           "--alpha is for PNG and EXR; for others --aov coverage,backdrop has its values");
     else if (output->dither && output->bits != 8)
         option_usage_fault("render", "--dither is for 8 bits; it cannot be combined with --bits 16");
     else
@@ -248,6 +254,9 @@ static bool option_take(RenderOptions *options, int option, const char *value)
         return true;
     case OPTION_DITHER:
         options->output.dither = true;
+        return true;
+    case OPTION_ALPHA:
+        options->output.alpha = true;
         return true;
     case OPTION_BOUNCES:
         return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);

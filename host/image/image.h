@@ -30,7 +30,7 @@ typedef struct {
     const ImageNote *notes;           // ended by a NULL key
     // The image's place in a larger one, whose size is 0 if there is none: EXR; the place is that of dither
     uint32_t full_width, full_height, left, top;
-    const ImageLayer *layers; // EXR: after the color
+    const ImageLayer *layers; // after the color: of an EXR, or alpha alone of a PNG
     size_t layer_count;       // at most IMAGE_LAYERS_MAX
     double exposure;          // in stops, before the tone curve: PNG, PPM
     Tone tone;                // before the transfer: PNG, PPM

@@ -1,6 +1,7 @@
 // PNG through libpng (Portable Network Graphics, second edition, 2003).
 #include "host/image/codec.h"
 #include "host/image/display.h"
+#include "host/image/transfer.h"
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -76,8 +77,9 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
     png_set_write_fn(state->png, writer->output.file, png_write_bytes, png_flush_none);
     png_set_user_limits(state->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX);
     png_set_IHDR(state->png, state->info, header->width, header->height, (int)header->bits,
-                 header->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+                 (header->channels == 1 ? PNG_COLOR_TYPE_GRAY : PNG_COLOR_TYPE_RGB) |
+                     (header->layer_count > 0 ? PNG_COLOR_MASK_ALPHA : 0),
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
     if (header->transfer == TRANSFER_SRGB) png_set_sRGB(state->png, state->info, PNG_sRGB_INTENT_PERCEPTUAL);
     for (const ImageNote *note = header->notes; note && note->key; note++)
         png_note(state, note);
@@ -89,14 +91,27 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
     return true;
 }
 
+// Adds alpha, whose values are linear, behind the bytes of each pixel's color. `bytes` has room for both.
+static void alpha_add(uint8_t *bytes, const float *alpha, const ImageHeader *header, size_t pixel_count)
+{
+    const size_t value_size = header->bits / 8, color_size = header->channels * value_size,
+                 pixel_size = color_size + value_size;
+    for (size_t i = pixel_count; i-- > 0;) {
+        memmove(bytes + i * pixel_size, bytes + i * color_size, color_size);
+        transfer_quantize(bytes + i * pixel_size + color_size, &alpha[i], 1, TRANSFER_NONE, header->bits);
+    }
+}
+
 static bool png_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
                      MessageList *messages)
 {
     const ImageHeader *header = &writer->header;
     PngState *state = writer->state;
-    const size_t row_size = display_row_size(header);
+    const size_t alpha_size = header->layer_count > 0 ? (size_t)header->width * (header->bits / 8) : 0,
+                 row_size = display_row_size(header) + alpha_size;
     state->bytes = memory_resize(state->bytes, row_count, row_size);
     display_rows(state->bytes, arrays[0], header, writer->rows_written, row_count);
+    if (alpha_size > 0) alpha_add(state->bytes, arrays[1], header, (size_t)header->width * row_count);
     if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
     for (uint32_t row = 0; row < row_count; row++)
         png_write_row(state->png, state->bytes + row * row_size);

@@ -64,8 +64,9 @@ size_t film_doubt_words(const Renderer *renderer, const Film *film)
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
 {
     // a kernel fills all of its layers, but computes shadows only on request
-    const unsigned filled =
-        AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) | (aovs & (AOVS_OF_PATH | AOV_DOUBT));
+    const unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) |
+                            (aovs & AOVS_OF_SAMPLES ? AOVS_OF_SAMPLES : 0u) |
+                            (aovs & (AOVS_OF_PATH | AOV_DOUBT));
     size_t end = (size_t)padded_size(2 * film_layer_size(film, LAYER_COLOR)); // with its compensation
     if (buffers) {
         buffers->layers = filled;
@@ -283,7 +284,9 @@ bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, 
     const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
     if (kind == KERNEL_AOV)
         kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
+    if (kind == KERNEL_COVERAGE)
+        kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, renderer->sample_offsets);
     doubts_clear(renderer, buffers->center_doubts, place);
     pace_begin_band(renderer_pace(renderer, kind));
-    return place_launch(renderer, kind, place, 1);
+    return place_launch(renderer, kind, place, kind == KERNEL_COVERAGE ? renderer->settings.sample_count : 1);
 }

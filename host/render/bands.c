@@ -135,14 +135,14 @@ static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows,
     return go_on && compute_ok(renderer->compute);
 }
 
-// Traces one ray per pixel for the AOVs. Returns false if the device failed or the render is stopped.
+// Traces rays for the AOVs. Returns false if the device failed or the render is stopped.
 static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
     const Place place = band_place(renderer, rows);
     const struct {
         KernelKind kind;
         unsigned layers;
-    } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}};
+    } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}, {KERNEL_COVERAGE, AOVS_OF_SAMPLES}};
     for (size_t i = 0; i < sizeof fills / sizeof *fills; i++) {
         if (!(aovs & fills[i].layers)) continue;
         if (!band_fill(renderer, fills[i].kind, buffers, aovs, &place)) return false;

@@ -15,7 +15,7 @@ static const struct {
 } kernel_sources[KERNEL_COUNT] = {
     [KERNEL_RENDER] = {"render.cl", "render"},    [KERNEL_AOV] = {"aov.cl", "aov"},
     [KERNEL_PATH] = {"path.cl", "path"},          [KERNEL_TRACE] = {"trace.cl", "trace"},
-    [KERNEL_CLOSEST] = {"closest.cl", "closest"},
+    [KERNEL_CLOSEST] = {"closest.cl", "closest"}, [KERNEL_COVERAGE] = {"coverage.cl", "coverage"},
 };
 
 static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
@@ -173,7 +173,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
 {
     KernelSlot *slot = &renderer->variant.kernels[kind];
     // AOV kernels do not change the hash that identifies an image
-    const bool is_of_image = kind != KERNEL_AOV && kind != KERNEL_PATH;
+    const bool is_of_image = kind != KERNEL_AOV && kind != KERNEL_PATH && kind != KERNEL_COVERAGE;
     if (slot->kernel) {
         if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
         return slot->kernel;

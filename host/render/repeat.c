@@ -198,7 +198,8 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
         const RenderSettings *settings = &renderer->settings;
         const uint32_t samples_of_pixel = samples_end(settings) - settings->first_sample;
         uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
-        counts->repeated += (uint64_t)list.count * (kind == KERNEL_RENDER ? samples_of_pixel : 1);
+        counts->repeated +=
+            (uint64_t)list.count * (kind == KERNEL_AOV || kind == KERNEL_PATH ? 1 : samples_of_pixel);
         doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
         is_whole = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
         if (is_whole) counts->undecided += list_keep_undecided(&list, undecided);

@@ -16,17 +16,6 @@ typedef struct {
     real color_error;
 } ShadedHit;
 
-// Returns what a ray of unit direction sees where it hits nothing, in the lanes in `wanted`.
-static inline Color3 background_color(const Scene *scene, Vector direction, mask wanted)
-{
-    global const SceneHeader *header = scene->header;
-    Color3 color = vector_of(header->background);
-    if (!HAS_SKY) return color;
-    if (HAS_IMAGES && header->sky_texture.x > 0)
-        return lanes_any(wanted) ? sky_image_color(scene, direction, wanted) : color;
-    return sky_blended_color(header, vector_dot(direction, vector_of(header->sky_up)));
-}
-
 // Sets the surface that a packet's rays hit and what it reflects of ambient light. Returns whether any lane
 // hit one.
 static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)

@@ -221,6 +221,17 @@ static inline Vector sky_image_color(const Scene *scene, Vector direction, mask 
     return vector_scale(color, (real)(header->sky_forward.w));
 }
 
+// Returns what a ray of unit direction sees where it hits nothing, in the lanes in `wanted`.
+static inline Vector background_color(const Scene *scene, Vector direction, mask wanted)
+{
+    global const SceneHeader *header = scene->header;
+    Vector color = vector_of(header->background);
+    if (!HAS_SKY) return color;
+    if (HAS_IMAGES && header->sky_texture.x > 0)
+        return lanes_any(wanted) ? sky_image_color(scene, direction, wanted) : color;
+    return sky_blended_color(header, vector_dot(direction, vector_of(header->sky_up)));
+}
+
 // Returns the texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance
 // `travelled` from the eye. At a grazing angle the footprint grows by at most 2^10.
 static inline Vector texture_color(const Scene *scene, uint kind, uint4 texture,

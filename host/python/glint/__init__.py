@@ -31,7 +31,8 @@ MISS = 0xFFFFFFFF  #: the object of a miss
 PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
 #: the layers of an image: values per pixel (0: one per light) and their type
 LAYERS = {"color": (3, np.float64), "t": (1, np.float64), "normal": (3, np.float64), "position": (3, np.float64),
-          "object": (1, np.uint32), "shadow": (0, np.uint32), "doubt": (1, np.uint32)}
+          "object": (1, np.uint32), "shadow": (0, np.uint32), "doubt": (1, np.uint32),
+          "coverage": (1, np.float64), "backdrop": (3, np.float64)}
 
 
 class SceneError(ValueError):
