@@ -66,11 +66,16 @@ static bool near(double value, double expected, double tolerance)
     return fabs(value - expected) <= tolerance;
 }
 
+static Vector3 vector_at(const double *vectors, size_t pixel)
+{
+    const double *v = vectors + 3 * pixel;
+    return (Vector3){v[0], v[1], v[2]};
+}
+
 // The world's place behind a pixel.
 static Vector3 film_place(const Film *film, const Scene *scene, size_t pixel)
 {
-    const double *p = film->position + 3 * pixel;
-    return vector_add((Vector3){p[0], p[1], p[2]}, scene->camera.position);
+    return vector_add(vector_at(film->position, pixel), scene->camera.position);
 }
 
 // Numbers that float holds exactly: the answer is exact at every precision.
@@ -551,6 +556,80 @@ static void plates_far_away(Precision precision)
     }
 }
 
+// A unit axis, and a unit direction across it.
+static const Vector3 skew_axis = {2 / 7.0, -3 / 7.0, 6 / 7.0}, skew_across = {6 / 7.0, -2 / 7.0, -3 / 7.0};
+
+// Returns a film of an object that is 1 / 100 from the eye, in the direction of -skew_across, and fills the
+// view.
+static Film render_next_to_eye(const char *object, Precision precision)
+{
+    Text text = {0};
+    text_appendf(&text,
+                 "camera: {position: [0, 0, 0], look_at: [%.17g, %.17g, %.17g], fov: 60}\nobjects:\n  - %s\n",
+                 -skew_across.x, -skew_across.y, -skew_across.z, object);
+    Scene scene = scene_of(text_c(&text));
+    Film film = render(&scene, 32, 24, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
+    for (size_t i = 0; i < film_pixel_count(&film); i++)
+        check(film.object[i] == 0);
+    scene_free(&scene);
+    text_free(&text);
+    return film;
+}
+
+static void check_normal(const Film *film, size_t pixel, Vector3 outward, double u)
+{
+    const Vector3 normal = vector_at(film->normal, pixel), expected = vector_normalize(outward);
+    check(vector_length(vector_subtract(normal, expected)) < 64 * u);
+}
+
+// A tube of radius r = 0.1 whose circle has the radius R = 10^6, seen from outside in its plane. Next to the
+// eye the circle bends away from its tangent, at the distance s, by s^2 / 2 R. The turn s / R of its normals
+// is left out.
+static void thin_torus_next_to_eye(Precision precision)
+{
+    const double major = 1e6, minor = 0.1, distance = 0.01,
+                 u = precision == PRECISION_DOUBLE ? 1e-9 : 0x1p-24;
+    const Vector3 center = vector_scale(skew_across, -(major + minor + distance)),
+                  along = vector_cross(skew_axis, skew_across);
+    char *object =
+        text_format("torus: {center: [%.17g, %.17g, %.17g], axis: [2, -3, 6], major: 1e6, minor: 0.1}",
+                    center.x, center.y, center.z);
+    Film film = render_next_to_eye(object, precision);
+    for (size_t i = 0; i < film_pixel_count(&film); i++) {
+        const Vector3 hit = vector_at(film.position, i);
+        const double s = vector_dot(hit, along), height = vector_dot(hit, skew_axis),
+                     away = vector_dot(hit, skew_across) + minor + distance + s * s / (2 * major);
+        check(near(hypot(away, height), minor, 16 * u * minor));
+        check_normal(&film, i, vector_add(vector_scale(skew_across, away), vector_scale(skew_axis, height)),
+                     u);
+    }
+    film_free(&film);
+    free(object);
+}
+
+// A paraboloid with the focal length f, seen from outside at the height h = 10^6 above its apex, where its
+// radius is 2 sqrt(f h).
+static void deep_paraboloid_next_to_eye(Precision precision)
+{
+    const double focal_length = 1e-6, height = 1e6, radius = 2, distance = 0.01,
+                 u = precision == PRECISION_DOUBLE ? 1e-10 : 0x1p-24;
+    const Vector3 foot = vector_scale(skew_across, -(radius + distance)),
+                  apex = vector_subtract(foot, vector_scale(skew_axis, height));
+    char *object = text_format(
+        "paraboloid: {apex: [%.17g, %.17g, %.17g], axis: [2, -3, 6], focal_length: 1e-6, height: 2e6}",
+        apex.x, apex.y, apex.z);
+    Film film = render_next_to_eye(object, precision);
+    for (size_t i = 0; i < film_pixel_count(&film); i++) {
+        const Vector3 from_foot = vector_subtract(vector_at(film.position, i), foot);
+        const double above = vector_dot(from_foot, skew_axis);
+        const Vector3 across = vector_subtract(from_foot, vector_scale(skew_axis, above));
+        check(near(vector_length(across), 2 * sqrt(focal_length * (height + above)), 16 * u * radius));
+        check_normal(&film, i, vector_subtract(across, vector_scale(skew_axis, 2 * focal_length)), u);
+    }
+    film_free(&film);
+    free(object);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -563,6 +642,8 @@ int main(void)
         AT_EACH_PRECISION(inside),
         AT_EACH_PRECISION(ground_horizon),
         AT_EACH_PRECISION(plates_far_away),
+        AT_EACH_PRECISION(thin_torus_next_to_eye),
+        AT_EACH_PRECISION(deep_paraboloid_next_to_eye),
         cmocka_unit_test(facing_panes),
         cmocka_unit_test(degenerate_cameras),
         cmocka_unit_test(single_pixel_and_extreme_fields),

@@ -155,21 +155,24 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 }
 
 // Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the
-// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 2 / k, to which half as
-// much is added, since the point is moved onto the surface. The ray's error only moves the point, so it
-// counts in place_error alone. A vector that is off by e is, once normalized, off by up to 2 e over its
-// length.
+// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 1 over the gradient's
+// length, which is at least rho and k / 2, to which half as much is added, since the point is moved onto the
+// surface. The ray's error only moves the point, so it counts in place_error alone. A vector that is off by e
+// is, once normalized, off by up to 2 e over its length.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {
     const Round *round = &solid->round;
     const RoundPoint at = round_point(round, ray, t);
     real error = (real)(2) * (place_error + at.place);
-    real curvature = divide_or((real)(round->curves ? 3 : 1), round->curves ? round->k : at.rho,
-                               (real)(1 / SMALLEST_RATIO));
-    real turned = solid->is_finite ? divide_or(at.rounding, solid->half_height, (real)(1)) : (real)(0);
+    real curvature =
+        divide_or((real)(round->curves ? 3 : 1), round->curves ? real_max(round->k, at.rho) : at.rho,
+                  (real)(1 / SMALLEST_RATIO));
+    real rounding = at.rounding; // with a power, also of the foot
+    if (round->has_power) rounding = real_fma((real)(2 * UNIT_ROUNDOFF), round->foot_norm1, rounding);
+    real turned = solid->is_finite ? divide_or(rounding, solid->half_height, (real)(1)) : (real)(0);
     point->curvature = curvature;
-    point->normal_error = (real)(4) * real_fma(at.rounding, curvature, turned);
+    point->normal_error = (real)(4) * real_fma(rounding, curvature, turned);
     if (!(flags & REVOLUTION_CAPPED)) return mask_none();
     real z = vector_dot(round->axis, vector_fma(ray->direction, t, round->start));
     real from_end = real_min(fabs(z - solid->low), fabs(z - solid->high));

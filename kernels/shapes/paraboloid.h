@@ -93,7 +93,7 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
 }
 
 // Returns the surface point. On the cap it is moved along the axis, on the side by two Newton steps along the
-// gradient of rho^2 - 4 f z, which is 2 (rho - 2 f w).
+// gradient of rho^2 - 4 f z, which is 2 (rho - 2 f w), for the unit axis w.
 static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, const Ray *ray, real t)
 {
     ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
@@ -109,6 +109,11 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         real step = real_divide(excess, (real)(2) * vector_dot(gradient, gradient));
         position = vector_fma(gradient, -step, position);
         normal = gradient;
+    }
+    if (has_eye_power(shape->id)) { // to which the foot is near, where the apex may be far
+        Vector from_foot = ray_point_from(ray, vector_of(shape->foot_lift), t);
+        real height = real_divide(vector_dot(from_foot, axis), squared_axis);
+        normal = vector_fma(axis, -(height + half_lift), from_foot);
     }
     real size = vector_norm1(p) + vector_norm1(apex);
     SurfacePoint point = surface_point_make(vector_add(position, apex), vector_normalize(normal), size);

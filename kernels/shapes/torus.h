@@ -62,6 +62,8 @@ static inline real torus_tube_value_at(const TorusTube *tube, const Ray *ray, re
     return value;
 }
 
+enum { TORUS_TUBE_ENDS = 2 * TORUS_BREAKS - 2 };
+
 // Returns the zero along the ray in a bracket, as torus_zero does along a line. The first guess is the ray's
 // start if that is in the bracket, since the bracket's middle is far from it.
 static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real low, real high, mask entering)
@@ -88,7 +90,7 @@ static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ra
                                             real slope_low, real slope_high)
 {
     mask rising = slope_low < (real)(0);
-    for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
+    for (uint i = 0; i < TORUS_ZERO_STEPS + TORUS_ZERO_STEPS; i++) {
         real rise = slope_high - slope_low, slope;
         real part = real_divide(-slope_low, lanes_select(rise == (real)(0), (real)(1), rise));
         real t = real_fma(high - low, i % 2 ? (real)(0.5f) : part, low);
@@ -100,23 +102,34 @@ static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ra
         high = lanes_select(before, high, t);
         slope_high = lanes_select(before, slope_high, slope);
     }
-    return low;
+    return lanes_select(fabs(slope_low) < fabs(slope_high), low, high);
 }
 
-// Finds the first zero beyond the ray's start. The breaks are in s, in parts of `unit`.
+// Returns end number `i` of the intervals in which zeros are searched: the ends of the line, and the breaks
+// in between less and plus `margin`.
+static inline real torus_tube_end(const real breaks[TORUS_BREAKS], uint i, real margin)
+{
+    real end = breaks[(i + 1) / 2];
+    return i == 0 || i == TORUS_TUBE_ENDS - 1 ? end : i % 2 ? end - margin : end + margin;
+}
+
+// Finds the first zero beyond the ray's start. The breaks are in s, in parts of `unit`. They are off by some
+// roundings of the torus' size, or by their root where the quartic's turning points meet, which may exceed a
+// tube. So two zeros may be within a break's margins, and the turning point between them is found by the
+// slope.
 static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
                                   const real breaks[TORUS_BREAKS], real unit, real closest_t, real *t)
 {
     const TorusTube tube = torus_tube(torus);
     mask found = mask_none();
     real slope_low, slope_high, slope;
+    const real margin = (real)(IS_DOUBLE ? 0x1p-25f : 0x1p-11f) * breaks[TORUS_BREAKS - 1];
     real low = real_max(real_fma(breaks[0], unit, closest_t), ray->tmin);
     real before = torus_tube_value_at(&tube, ray, low, &slope_low);
-    for (uint i = 0; i + 1 < TORUS_BREAKS; i++) {
-        real high = real_max(real_fma(breaks[i + 1], unit, closest_t), ray->tmin);
+    for (uint i = 1; i < TORUS_TUBE_ENDS; i++) {
+        real high = real_max(real_fma(torus_tube_end(breaks, i, margin), unit, closest_t), ray->tmin);
         real after = torus_tube_value_at(&tube, ray, high, &slope_high);
         mask entering = before > (real)(0), turns = (slope_low < (real)(0)) != (slope_high < (real)(0));
-        // a break is off by some roundings of the torus' size: two zeros next to it may be on one side
         mask hides =
             hit & !found & turns & (entering == (after > (real)(0))) & (entering == (slope_low < (real)(0)));
         real end = high, value_at_end = after;
