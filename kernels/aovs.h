@@ -23,11 +23,11 @@
 
 // path.cl
 #define PATH_AOV_LIST(LAYER) \
-    LAYER(PATH, path, INTEGER, 1, "signature of all objects met, also by mirrors and glass")
+    LAYER(PATH, path, INTEGER, 1, "signature of all objects met, also in mirrors and through glass")
 
 // coverage.cl
 #define SAMPLED_AOV_LIST(LAYER) \
-    LAYER(COVERAGE, coverage, REAL, 1, "part of the samples that hit an object") \
+    LAYER(COVERAGE, coverage, REAL, 1, "fraction of the samples that hit an object") \
     LAYER(BACKDROP, backdrop, REAL, 3, "the background's part of the color")
 
 // render.cl
@@ -36,7 +36,7 @@
 
 // host/render/repeat.c
 #define HOST_AOV_LIST(LAYER) \
-    LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where re-rendered in double, 2 where undecided, else 0")
+    LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where re-rendered in double, 2 where uncertified, else 0")
 
 #define LAYER_LIST(LAYER) \
     HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) SAMPLED_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)

@@ -10,8 +10,8 @@ static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, glob
     const uint count = scene->header->image.z;
     const real one = (real)(1), zero = (real)(0), divisor = (real)((scalar)count);
     real covered = zero;
-    Vector light = {zero, zero, zero};
-    const Vector black = light;
+    const Vector black = {zero, zero, zero};
+    Vector light = black, lost = black;
     for (uint sample = 0; sample < count; sample++) {
         Ray ray = camera_ray(scene->header, tile->pixels, offsets[2 * sample], offsets[2 * sample + 1],
                              sample, tile->inside);
@@ -20,7 +20,7 @@ static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, glob
         const mask found = hit_found(&hit);
         covered = covered + lanes_select(found, one, zero);
         Vector seen = background_color(scene, ray.direction, ray.active & !found);
-        light = vector_add(light, vector_select(found, black, seen));
+        compensated_add(&light, &lost, vector_select(found, black, seen));
     }
     film_store(coverage, tile, 1, 0, real_divide(covered, divisor));
     film_store_color(backdrop, tile,

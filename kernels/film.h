@@ -228,6 +228,16 @@ static inline void film_note_doubts(global int *doubts, const Tile *tile, mask d
     }
 }
 
+// Adds to a sum, whose rounding error `lost` the next addition compensates (Kahan, Further remarks on
+// reducing truncation errors, CACM 8(1), 1965). A plain sum of a million equal samples would be off by 1 %.
+static inline void compensated_add(Vector *sum, Vector *lost, Vector added)
+{
+    added = vector_subtract(added, *lost);
+    Vector next = vector_add(*sum, added);
+    *lost = vector_subtract(vector_subtract(next, *sum), added);
+    *sum = next;
+}
+
 static inline Vector film_load_color(global const scalar *film, const Tile *tile)
 {
     RealLanes x = {(real)(0)}, y = x, z = x;

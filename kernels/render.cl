@@ -5,10 +5,8 @@
 
 // Adds samples first_sample .. last_sample - 1 of tiles first_tile .. first_tile + PACKETS - 1 to the film.
 // The last launch divides the sum by the number of samples. `offsets` has x and y of each sample in its
-// pixel, -1 to 1. `compensation` is the rounding error of the sum, which the next addition compensates and
-// which is kept between launches (Kahan, Further remarks on reducing truncation errors, CACM 8(1), 1965). A
-// plain sum of a million equal samples would be off by 1 %. The colors of a list also go to `band_film`,
-// unless it is NULL.
+// pixel, -1 to 1. `compensation` keeps the rounding error of the sum between launches. The colors of a list
+// also go to `band_film`, unless it is NULL.
 static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
                                      global scalar *compensation, uint first_sample, uint last_sample,
@@ -45,10 +43,7 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
                 sums[i] = traced;
                 continue;
             }
-            Color3 color = vector_subtract(traced, lost[i]);
-            Color3 next = vector_add(sums[i], color);
-            lost[i] = vector_subtract(vector_subtract(next, sums[i]), color);
-            sums[i] = next;
+            compensated_add(&sums[i], &lost[i], traced);
         }
     }
     if (last_sample < count) film_store_tiles(compensation, tiles, lost);

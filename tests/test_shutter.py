@@ -135,7 +135,7 @@ class Shutter(TestCase):
         self.assertEqual(process.stderr.count("warning"), 1, process.stderr)
 
     def test_refused(self):
-        for options, reason in {"--checkpoint saved": "--checkpoint keeps bands", "--max-error 0.1": "--max-error measures", "--alpha": "--alpha shows"}.items():
+        for options, reason in {"--checkpoint saved": "--checkpoint keeps bands", "--max-error 0.1": "--max-error measures", "--alpha": "--alpha, coverage", "--aov backdrop": "--alpha, coverage"}.items():
             process = self.refuses(f"render moving.yaml {SIZE} {options} -o a.png", f"'moving.yaml': {reason} .* --set shutter=0 closes it", env=POCL)
             self.assertNotIn("wrote", process.stderr)
         self.refuses(f"render - {SIZE}", "standard input is read once", input=MOVING, env=POCL)

@@ -42,15 +42,16 @@ static Color reflected_of(Color (*color_of)(Vector3 direction), Vector3 normal)
     return sum;
 }
 
-// Checks what a white surface reflects of the sky's cells, from points in each, as kernels do, and that no
-// cell has more light than the light's color.
-static void check_cells(const Scene *scene, Color (*color_of)(Vector3 direction), Vector3 normal)
+// Checks what a white surface reflects of the sky's cells, from points in each, as kernels do, that no cell
+// has more light than the light's color, and that the mean of all has more than `evenness` of that.
+static void check_cells(const Scene *scene, Color (*color_of)(Vector3 direction), Vector3 normal,
+                        double evenness)
 {
     enum { COUNT = SKY_CELL_ROWS * SKY_CELL_COLUMNS, SIDE = 16 };
     const Light *light = &scene->lights.items[scene->lights.count - 1];
     const Color expected = reflected_of(color_of, normal);
     Color sum = {0};
-    double brightest = 0;
+    double brightest = 0, total = 0; // of all cells, in parts of the light
     for (size_t i = 0; i < COUNT; i++) {
         const SkyCell *cell = &scene->sky.cells[i];
         const double longitudes = cell->longitude_end - cell->longitude_begin,
@@ -64,6 +65,7 @@ static void check_cells(const Scene *scene, Color (*color_of)(Vector3 direction)
             const Color color =
                 vector_scale(color_of(direction), longitudes * sines * scene->sky.cell_factor);
             brightest = fmax(brightest, vector_largest(color));
+            total += vector_largest(color) / COUNT / SIDE / SIDE;
             // 1 / COUNT of the samples, of a light whose color times the cosine is reflected
             reflected_add(&sum, vector_multiply(light->color, color), direction, normal,
                           M_PI / COUNT / SIDE / SIDE);
@@ -71,6 +73,7 @@ static void check_cells(const Scene *scene, Color (*color_of)(Vector3 direction)
     }
 
     assert_true(brightest <= 1 + 1e-7 && brightest > 0.95);
+    assert_true(total > evenness);
     const double allowed = 4e-3 * vector_largest(expected);
     assert_near(sum.x, expected.x, allowed);
     assert_near(sum.y, expected.y, allowed);
@@ -94,7 +97,7 @@ static void colors_are_a_light(void **state)
     assert_true(vector_is_zero(scene.ambient));
     static const Vector3 normals[] = {{0, 1, 0}, {0, 0, 1}, {-0.8, 0.6, 0}, {0, -1, 0}};
     for (size_t i = 0; i < 4; i++)
-        check_cells(&scene, gradient, normals[i]);
+        check_cells(&scene, gradient, normals[i], 0.9);
     scene_free(&scene);
 
     scene = scene_of_text("s.yaml", HEAD "ambient: 0.25\nbackground: {horizon: 0, zenith: 0, light: true}\n");
@@ -139,7 +142,7 @@ static void an_image_is_a_light(void **state)
         direction_of((SUN_COLUMN + 0.5) / IMAGE_WIDTH - 0.5, cos((SUN_ROW + 0.5) / IMAGE_HEIGHT * M_PI));
     const Vector3 normals[] = {to_sun, {0, 1, 0}, {0, 0, 1}, vector_scale(to_sun, -1)};
     for (size_t i = 0; i < 4; i++)
-        check_cells(&scene, image_color, normals[i]);
+        check_cells(&scene, image_color, normals[i], 0.3);
     free(scene.sky.cells);
 }
 
@@ -167,10 +170,53 @@ static void what_hides_the_sky_casts_a_shadow(void **state)
     scene_free(&scene);
 }
 
+// What a wall is lit by is what the eye sees of the sky, whichever way that is turned.
+static void what_is_seen_shines(void **state)
+{
+    (void)state;
+    enum { ROWS = 32, COLUMNS = 64 };
+    static const char sky[] = "background: {sun: {elevation: 12, azimuth: 70, light: false}, turn: 37, up: "
+                              "[0.3, 1, -0.2], light: true, ground: [0.1, 0.3, 0.2]}\n";
+    char *text = text_format(
+        "camera: {position: [0, 0, 0], look_at: [0, 0, -1], projection: equirectangular}\n%s", sky);
+    Scene scene = scene_of_text("sky.yaml", text);
+    RenderSettings settings = film_settings(COLUMNS, ROWS, PRECISION_STRICT);
+    Film seen = film_render(&probe_compute, &scene, &settings, AOV_RAY);
+    scene_free(&scene);
+    free(text);
+    static const Vector3 normals[] = {{0, 1, 0}, {1, 0, 0}, {0, 0, -1}, {-0.6, 0, 0.8}};
+    for (size_t i = 0; i < sizeof normals / sizeof *normals; i++) {
+        const Vector3 n = normals[i];
+        Color expected = {0};
+        for (size_t pixel = 0; pixel < (size_t)ROWS * COLUMNS; pixel++) {
+            const double *ray = seen.ray + 3 * pixel, *color = seen.color + 3 * pixel;
+            const size_t y = pixel / COLUMNS;
+            const double top = cos(M_PI * (double)y / ROWS), bottom = cos(M_PI * (double)(y + 1) / ROWS);
+            reflected_add(&expected, (Color){color[0], color[1], color[2]}, (Vector3){ray[0], ray[1], ray[2]},
+                          n, 2 * M_PI / COLUMNS * (top - bottom));
+        }
+        text = text_format("camera: {position: [%g, %g, %g], look_at: [0, 0, 0], up: [0.1, 0.2, 1], height: "
+                           "1e-3}\n%sobjects:\n  - plane: {point: [0, 0, 0], normal: [%g, %g, %g]}\n",
+                           n.x, n.y, n.z, sky, n.x, n.y, n.z);
+        scene = scene_of_text("sky.yaml", text);
+        settings = film_settings(1, 1, PRECISION_STRICT);
+        settings.sample_count = 1024;
+        Film film = film_render(&probe_compute, &scene, &settings, 0);
+        const double allowed = 0.02 * vector_largest(expected);
+        assert_near(film.color[0], expected.x, allowed);
+        assert_near(film.color[1], expected.y, allowed);
+        assert_near(film.color[2], expected.z, allowed);
+        film_free(&film);
+        scene_free(&scene);
+        free(text);
+    }
+    film_free(&seen);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(colors_are_a_light),
-                                       cmocka_unit_test(an_image_is_a_light),
-                                       cmocka_unit_test(what_hides_the_sky_casts_a_shadow)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(colors_are_a_light), cmocka_unit_test(an_image_is_a_light),
+        cmocka_unit_test(what_hides_the_sky_casts_a_shadow), cmocka_unit_test(what_is_seen_shines)};
     return cmocka_run_group_tests(tests, probe_open, probe_close);
 }

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOTE_COUNT_MAX = 24 };
+enum { NOTE_COUNT_MAX = 26 };
 
 const char *const tone_names[TONE_COUNT] = {"none", "filmic"};
 
@@ -187,6 +187,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     if (output->options->exposure != 0) NOTE("Exposure", "%g", output->options->exposure);
     if (output->options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[output->options->tone]);
     if (output->options->dither) NOTE("Dither", "ordered");
+    if (output->options->alpha) NOTE("Alpha", "%s", is_exr(output) ? "premultiplied" : "straight");
     NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
     if (output->ranks) NOTE("Ranks", "%zu", output->ranks->count + 1);
     if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
@@ -352,13 +353,13 @@ static const float *colors_without_background(ImageOutput *output, const Film *b
     const float *colors = layer_narrowed(output, band, LAYER_COLOR),
                 *backdrop = layer_narrowed(output, band, LAYER_BACKDROP),
                 *coverage = layer_narrowed(output, band, LAYER_COVERAGE);
-    float *left = scratch_reserve(&output->foreground, 3 * count * sizeof *left);
+    float *foreground = scratch_reserve(&output->foreground, 3 * count * sizeof *foreground);
     for (size_t i = 0; i < count; i++) {
         const float part = is_exr(output) || coverage[i] == 0 ? 1 : coverage[i];
         for (size_t k = 3 * i; k < 3 * i + 3; k++)
-            left[k] = coverage[i] == 0 ? 0 : fmaxf(colors[k] - backdrop[k], 0) / part;
+            foreground[k] = coverage[i] == 0 ? 0 : fmaxf(colors[k] - backdrop[k], 0) / part;
     }
-    return left;
+    return foreground;
 }
 
 static bool band_write(ImageOutput *output)

@@ -20,7 +20,7 @@ typedef struct {
     bool synchronous;   // encodes a band before the next one is rendered, so that times do not overlap
 } ImageOutputOptions;
 
-// Returns the AOVs to render: those that are written, and those that alpha takes.
+// Returns the AOVs to render: those that are written, and those that alpha needs.
 static inline unsigned image_output_aovs(const ImageOutputOptions *options)
 {
     return options->aovs | (options->alpha ? AOVS_OF_SAMPLES : 0U);

@@ -116,7 +116,7 @@ enum {
     "      --perturb SEED[:SCALE]\n"                                                                         \
     "                        inject the rounding error that OpenCL permits, times SCALE (default: 1)\n"
 #define HELP_DRIVER                                                                                          \
-    "      --work-group WxH  work-items of a group (default: 8x8, 1x1 with several lanes on a CPU, or "      \
+    "      --work-group WxH  work-items of a group (default: 8x8, 1x1 for lanes on a CPU, or "               \
     "fewer)\n"                                                                                               \
     "      --build-options OPTIONS\n"                                                                        \
     "                        passed to the driver's compiler, such as \"-cl-opt-disable\"\n"
@@ -125,7 +125,7 @@ enum {
     "                        write the text and the build log of each kernel that is built\n"
 #define HELP_REFERENCE                                                                                       \
     "      --reference-device D\n"                                                                           \
-    "                        renders references, and what certified repeats in double\n"                     \
+    "                        renders references and the pixels that certified re-renders\n"                  \
     "                        (default: the device itself, else one with fp64)\n"
 #define HELP_JSON "      --json            print JSON\n"
 #define HELP_HELP "  -h, --help            print this help\n"

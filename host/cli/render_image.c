@@ -238,10 +238,11 @@ static int time_render(ImageRender *render)
 // Rejects options that need one time. Returns false with a message.
 static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
 {
-    const char *const obstacle = shutter->time_count == 1           ? NULL
-                                 : options->checkpoint              ? "--checkpoint keeps bands of one time"
-                                 : options->budget.limit > 0        ? "--max-error measures one time"
-                                 : options->output.alpha            ? "--alpha shows one time"
+    const char *const obstacle = shutter->time_count == 1    ? NULL
+                                 : options->checkpoint       ? "--checkpoint keeps bands of one time"
+                                 : options->budget.limit > 0 ? "--max-error measures one time"
+                                 : image_output_aovs(&options->output) & AOVS_OF_SAMPLES
+                                     ? "--alpha, coverage and backdrop are of one time"
                                  : strcmp(options->scene, "-") == 0 ? "standard input is read once"
                                                                     : NULL;
     if (obstacle)

@@ -78,13 +78,13 @@ static const char help_text[] =
                     "                        choose the fastest precision within this error in linear light; "
                     "METRIC: rmse,\n"
                     "                        max or flip (default: rmse)\n"
-                    "      --timing[=STYLE]  report the time of every stage and launch: text, json or trace\n"
+                    "      --timing[=STYLE]  report times of stages and launches: text, json or trace\n"
                     "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and "
                     ".dat)\n"
                     "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
                     "      --exposure STOPS  of a PNG or PPM: twice as bright per stop (default: 0)\n"
-                    "      --tone T          curve of a PNG or PPM, none or filmic (default: none: clip at "
-                    "1)\n"
+                    "      --tone T          curve of a PNG or PPM, none or filmic (default: none, which "
+                    "clips at 1)\n"
                     "      --dither          hide the steps of 8 bits in a pattern\n"
                     "      --alpha           transparent background, for PNG and EXR\n"
                     "      --checkpoint FILE\n"
@@ -93,7 +93,7 @@ static const char help_text[] =
                     "number\n"
                     "                        (default: NAME-%04d.png)\n"
                     "      --skip-existing   leave out images that exist\n"
-                    "      --capture FOLDER  write each launch to an empty folder, for glint locate\n"
+                    "      --capture FOLDER  write launches to an empty folder, for glint locate\n"
                     "      --format F        format of --output -: png, ppm or npy\n"
                     "      --quiet           no progress\n" //
     HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER
@@ -206,7 +206,7 @@ static bool display_fits(const ImageOutputOptions *output)
             "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
     else if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
         option_usage_fault("render",
-                           "--alpha is for PNG and EXR; for others --aov coverage,backdrop has its values");
+                           "--alpha is for PNG and EXR; other formats need --aov coverage,backdrop");
     else if (output->dither && output->bits != 8)
         option_usage_fault("render", "--dither is for 8 bits; it cannot be combined with --bits 16");
     else

@@ -28,9 +28,9 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
                                 .kind = {.x = (uint32_t)light->kind, .y = (uint32_t)light->area}};
         if (light->area != AREA_NONE) {
-            const double radius = light->area == AREA_SKY ? scene->sky.cell_factor : light->radius;
+            const double factor = light->area == AREA_SKY ? scene->sky.cell_factor : light->radius;
             const double unit = light->kind == LIGHT_DIRECTIONAL ? 1 / vector_length(light->direction) : 1;
-            lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), radius);
+            lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), factor);
             lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
         }
         lights[i].fading =

@@ -92,7 +92,8 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
 }
 
 // Adds alpha, whose values are linear, behind the bytes of each pixel's color. `bytes` has room for both.
-static void alpha_add(uint8_t *bytes, const float *alpha, const ImageHeader *header, size_t pixel_count)
+static void alpha_interleave(uint8_t *bytes, const float *alpha, const ImageHeader *header,
+                             size_t pixel_count)
 {
     const size_t value_size = header->bits / 8, color_size = header->channels * value_size,
                  pixel_size = color_size + value_size;
@@ -111,7 +112,7 @@ static bool png_rows(ImageWriter *writer, const void *const *arrays, uint32_t ro
                  row_size = display_row_size(header) + alpha_size;
     state->bytes = memory_resize(state->bytes, row_count, row_size);
     display_rows(state->bytes, arrays[0], header, writer->rows_written, row_count);
-    if (alpha_size > 0) alpha_add(state->bytes, arrays[1], header, (size_t)header->width * row_count);
+    if (alpha_size > 0) alpha_interleave(state->bytes, arrays[1], header, (size_t)header->width * row_count);
     if (setjmp(png_jmpbuf(state->png))) return png_write_failed(writer, messages);
     for (uint32_t row = 0; row < row_count; row++)
         png_write_row(state->png, state->bytes + row * row_size);

@@ -278,7 +278,8 @@ typedef struct {
         // Of a sky that is a light, SKY_CELL_ROWS x SKY_CELL_COLUMNS cells of nearly equal light, laid
         // out as its image.
         SkyCell *cells;
-        double cell_factor; // times the sky's color and both ranges of a cell: a part of the light's color
+        // by which the sky's color and both ranges of a cell are multiplied to give a part of the light's
+        double cell_factor;
     } sky;
     struct {
         Light *items;

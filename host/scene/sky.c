@@ -15,6 +15,9 @@
 // The rows of blended colors as an image, which has a column per cell.
 enum { BLENDED_ROWS = 256 };
 
+// A sky whose cells have less light counts as black: its reciprocal would exceed a float.
+static const double FAINT = 1e-30;
+
 // The sky as an image of all directions, laid out as sky.texture's.
 typedef struct {
     const Scene *scene;
@@ -101,9 +104,19 @@ static double row_add(const SkyImage *sky, const SkyRow *row, double *light, dou
     return sum;
 }
 
+// Returns whether an item has about as much light as those next to it.
+static bool is_even(const double *light, size_t length, size_t item)
+{
+    enum { RATIO_MAX = 4 };
+    const double before = light[item > 0 ? item - 1 : item],
+                 after = light[item + 1 < length ? item + 1 : item];
+    return fmax(before, fmax(light[item], after)) <= RATIO_MAX * fmin(before, fmin(light[item], after));
+}
+
 // Divides a line of items into parts of nearly equal light. Part i lies between edges[i] and edges[i + 1], in
-// items. Edges lie within an item only between parts that do so as a whole: in one that reached from a bright
-// item to dark ones, samples would seldom meet the former. `light`: of each item.
+// items. Next to items with another brightness, edges lie within an item only between parts that do so as a
+// whole: a part that spans a bright item and dark ones would seldom be sampled where it is bright. `light`:
+// of each item.
 static void line_divide(const double *light, size_t length, double *edges, size_t part_count)
 {
     double sum = 0, before = 0;
@@ -120,8 +133,9 @@ static void line_divide(const double *light, size_t length, double *edges, size_
     double last = -1; // the item of the edge before
     for (size_t i = 0; i < part_count; i++) {
         const double here = floor(edges[i]);
-        const bool begins = here != last, ends = here != floor(edges[i + 1]);
+        const bool begins = here != last, ends = here != fmin(floor(edges[i + 1]), (double)length - 1);
         last = here;
+        if (is_even(light, length, (size_t)fmin(here, (double)length - 1))) continue;
         if (begins && ends)
             edges[i] = rint(edges[i]);
         else if (begins || ends)
@@ -173,11 +187,10 @@ void scene_add_sky_light(Scene *scene)
     }
     free(light);
     free(brightness);
-    if (most == 0) return;
-    // A white surface of a white sky's cosines, whose mean over all directions is 1/4, is as white as the
-    // sky.
     const double cell_count = SKY_CELL_ROWS * SKY_CELL_COLUMNS,
                  intensity = sky.image ? scene->sky.intensity : 1;
+    if (most * intensity < FAINT) return;
+    // scaled so that a white surface that sees all of a uniform sky has the sky's color
     const Light sky_light = {.kind = LIGHT_DIRECTIONAL,
                              .area = AREA_SKY,
                              .color = vector_all(most * cell_count * intensity / M_PI),

@@ -85,7 +85,9 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
         *tint = sky_texel_color(scene, longitude.all, real_turns(across, sine.all), surface_found(surface));
     else
         *tint = sky_blended_color(header, sine.all);
+    // by rounding the color may be that of a brighter texel next to the cell
     *tint = vector_scale(*tint, longitudes.all * sines.all * (real)(light->across_u.w));
+    *tint = (Color3){real_min(tint->x, one), real_min(tint->y, one), real_min(tint->z, one)};
     Vector level =
         vector_of_turns(vector_of(header->sky_forward), vector_of(header->sky_right), longitude.all);
     return vector_fma(vector_of(header->sky_up), sine.all, vector_scale(level, across));

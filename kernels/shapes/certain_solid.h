@@ -157,8 +157,8 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 // Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the
 // normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 1 over the gradient's
 // length, which is at least rho and k / 2, to which half as much is added, since the point is moved onto the
-// surface. The ray's error only moves the point, so it counts in place_error alone. A vector that is off by e
-// is, once normalized, off by up to 2 e over its length.
+// surface: 1.5 / max(rho, k / 2) <= 3 / max(rho, k). The ray's error only moves the point, so it counts in
+// place_error alone. A vector that is off by e is, once normalized, off by up to 2 e over its length.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {

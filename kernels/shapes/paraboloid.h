@@ -110,7 +110,7 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         position = vector_fma(gradient, -step, position);
         normal = gradient;
     }
-    if (has_eye_power(shape->id)) { // to which the foot is near, where the apex may be far
+    if (has_eye_power(shape->id)) { // the foot is near the eye, the apex may be far
         Vector from_foot = ray_point_from(ray, vector_of(shape->foot_lift), t);
         real height = real_divide(vector_dot(from_foot, axis), squared_axis);
         normal = vector_fma(axis, -(height + half_lift), from_foot);

@@ -113,21 +113,21 @@ static inline real torus_tube_end(const real breaks[TORUS_BREAKS], uint i, real 
     return i == 0 || i == TORUS_TUBE_ENDS - 1 ? end : i % 2 ? end - margin : end + margin;
 }
 
-// Finds the first zero beyond the ray's start. The breaks are in s, in parts of `unit`. They are off by some
-// roundings of the torus' size, or by their root where the quartic's turning points meet, which may exceed a
-// tube. So two zeros may be within a break's margins, and the turning point between them is found by the
-// slope.
+// Finds the first zero beyond the ray's start. The breaks are in s, in parts of `unit`, in which the torus'
+// size is about 1. They are off by some roundings of that, or by its root where the quartic's turning points
+// meet, which may exceed the tube's radius. So two zeros may be within a break's margins, and the turning
+// point between them is found by the slope.
 static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
                                   const real breaks[TORUS_BREAKS], real unit, real closest_t, real *t)
 {
     const TorusTube tube = torus_tube(torus);
     mask found = mask_none();
     real slope_low, slope_high, slope;
-    const real margin = (real)(IS_DOUBLE ? 0x1p-25f : 0x1p-11f) * breaks[TORUS_BREAKS - 1];
+    const real margin = (real)(IS_DOUBLE ? 0x1p-25f : 0x1p-11f);
     real low = real_max(real_fma(breaks[0], unit, closest_t), ray->tmin);
     real before = torus_tube_value_at(&tube, ray, low, &slope_low);
     for (uint i = 1; i < TORUS_TUBE_ENDS; i++) {
-        real high = real_max(real_fma(torus_tube_end(breaks, i, margin), unit, closest_t), ray->tmin);
+        real high = real_max(real_fma(torus_tube_end(breaks, i, margin), unit, closest_t), low);
         real after = torus_tube_value_at(&tube, ray, high, &slope_high);
         mask entering = before > (real)(0), turns = (slope_low < (real)(0)) != (slope_high < (real)(0));
         mask hides =
