@@ -559,13 +559,12 @@ static void plates_far_away(Precision precision)
 // A unit axis, and a unit direction across it.
 static const Vector3 skew_axis = {2 / 7.0, -3 / 7.0, 6 / 7.0}, skew_across = {6 / 7.0, -2 / 7.0, -3 / 7.0};
 
-// Returns a film of an object that is 1 / 100 from the eye, in the direction of -skew_across, and fills the
-// view.
+// Returns a film of an object that lies in the direction of -skew_across and fills the view.
 static Film render_next_to_eye(const char *object, Precision precision)
 {
     Text text = {0};
     text_appendf(&text,
-                 "camera: {position: [0, 0, 0], look_at: [%.17g, %.17g, %.17g], fov: 60}\nobjects:\n  - %s\n",
+                 "camera: {position: [0, 0, 0], look_at: [%.17g, %.17g, %.17g], fov: 40}\nobjects:\n  - %s\n",
                  -skew_across.x, -skew_across.y, -skew_across.z, object);
     Scene scene = scene_of(text_c(&text));
     Film film = render(&scene, 32, 24, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
@@ -609,9 +608,9 @@ static void thin_torus_next_to_eye(Precision precision)
 
 // A paraboloid with the focal length f, seen from outside at the height h = 10^6 above its apex, where its
 // radius is 2 sqrt(f h).
-static void deep_paraboloid_next_to_eye(Precision precision)
+static void check_deep_paraboloid(double distance, Precision precision)
 {
-    const double focal_length = 1e-6, height = 1e6, radius = 2, distance = 0.01,
+    const double focal_length = 1e-6, height = 1e6, radius = 2,
                  u = precision == PRECISION_DOUBLE ? 1e-10 : 0x1p-24;
     const Vector3 foot = vector_scale(skew_across, -(radius + distance)),
                   apex = vector_subtract(foot, vector_scale(skew_axis, height));
@@ -628,6 +627,12 @@ static void deep_paraboloid_next_to_eye(Precision precision)
     }
     film_free(&film);
     free(object);
+}
+
+static void deep_paraboloid_next_to_eye(Precision precision)
+{
+    check_deep_paraboloid(0.01, precision);
+    check_deep_paraboloid(1.5, precision);
 }
 
 int main(void)

@@ -8,7 +8,8 @@
 //
 // With the eye's power C, m = (o - F) x w for the axis' point F nearest to the eye, and
 //     c = C + (o x w) . ((o - 2 F) x w) - k o . w.
-// Next to the surface b^2 - a c then decides.
+// Next to the surface b^2 - a c then decides. Elsewhere, with the moment M = (o - F) x d and F at h w from
+// the apex, E . q = M . q - h q . q and w . E = w . M.
 #ifndef PARABOLOID_H
 #define PARABOLOID_H
 
@@ -43,9 +44,9 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     PairVector d = pair_vector_of(ray->direction), o = pair_vector_of(ray->origin);
     const bool has_power = has_eye_power(shape->id);
     Vector foot = vector_of(shape->foot_lift);
-    PairVector m = pair_vector_cross(has_power ? pair_vector_difference(ray->origin, foot) : f, axis);
-    PairVector q = pair_vector_cross(d, axis);
-    PairVector moment = pair_vector_cross(f, ray->direction);
+    PairVector from_axis = has_power ? pair_vector_difference(ray->origin, foot) : f;
+    PairVector m = pair_vector_cross(from_axis, axis), q = pair_vector_cross(d, axis);
+    PairVector moment = pair_vector_cross(from_axis, ray->direction);
     Pair height = pair_vector_dot_vector(has_power ? o : f, axis), rise = pair_vector_dot_vector(d, axis);
     Pair moment_on_axis = pair_vector_dot_vector(moment, axis), bend = pair_scale(rise, half_k);
     Pair squared_q = pair_vector_dot(q, q), half_b = pair_subtract(pair_vector_dot(m, q), bend);
@@ -59,6 +60,10 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
     real a = squared_q.high, b = half_b.high, c = power.high;
     Pair off =
         pair_add(pair_scale(pair_vector_dot(moment, q), k), pair_multiply(moment_on_axis, moment_on_axis));
+    if (has_power) {
+        real lift = real_divide(k * (real)(shape->foot_lift.w), squared_axis.high);
+        off = pair_subtract(off, pair_scale(squared_q, lift));
+    }
     real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(squared_axis, off)).high;
     if (has_power) {
         real exact = pair_subtract(pair_multiply(half_b, half_b), pair_multiply(squared_q, power)).high;
