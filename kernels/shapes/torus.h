@@ -109,7 +109,7 @@ static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ra
 // in between less and plus `margin`.
 static inline real torus_tube_end(const real breaks[TORUS_BREAKS], uint i, real margin)
 {
-    real end = breaks[(i + 1) / 2];
+    real end = breaks[(i + 1) >> 1];
     return i == 0 || i == TORUS_TUBE_ENDS - 1 ? end : i % 2 ? end - margin : end + margin;
 }
 
