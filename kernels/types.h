@@ -380,8 +380,8 @@ enum {
 
 // One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's image.
 typedef struct {
-    scalar4 place; // x: the least longitude, in turns from sky_forward, y: its range; z, w: of the latitude's
-                   // sine
+    // x: the least longitude, in turns from sky_forward; y: its range; z, w: these of the latitude's sine
+    scalar4 place;
 } SkyCell;
 
 enum { SKY_ROWS = 128, SKY_COLUMNS = 128 };
@@ -397,8 +397,8 @@ typedef struct {
     scalar4 fading;
     // With HAS_AREA_LIGHTS: from the center of a rectangle or an ellipse to the middles of two sides,
     // relative to the direction for directional lights; two sides of a triangle, one of whose vertices is at
-    // position - (across_u + across_v) / 4; across_u.w: a sphere's radius, or for
-    // the sky what its color times both ranges of a cell is multiplied by to be a part of `color`.
+    // position - (across_u + across_v) / 4. across_u.w: a sphere's radius; of the sky, the factor by which
+    // its color and both ranges of a cell are multiplied to give a part of `color`.
     scalar4 across_u, across_v;
     uint4 kind; // x: LIGHT_KIND_…, y: LIGHT_AREA_…
 } Light;

@@ -275,10 +275,10 @@ typedef struct {
         double intensity;
         bool is_ambient; // its mean becomes `ambient` when the image is decoded
         bool is_light;   // becomes one of `lights` when the image is decoded
-        // Of a sky that is a light, SKY_CELL_ROWS x SKY_CELL_COLUMNS cells of nearly equal light, laid
+        // NULL unless the sky is a light: SKY_CELL_ROWS x SKY_CELL_COLUMNS cells of nearly equal light, laid
         // out as its image.
         SkyCell *cells;
-        // by which the sky's color and both ranges of a cell are multiplied to give a part of the light's
+        // The product of the sky's color, both ranges of a cell and this is a part of the light's color.
         double cell_factor;
     } sky;
     struct {

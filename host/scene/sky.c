@@ -15,8 +15,8 @@
 // The rows of blended colors as an image, which has a column per cell.
 enum { BLENDED_ROWS = 256 };
 
-// A sky whose cells have less light counts as black: its reciprocal would exceed a float.
-static const double FAINT = 1e-30;
+// A sky whose cells have less light counts as black, before their reciprocal exceeds a float.
+static const double faint_light = 1e-30;
 
 // The sky as an image of all directions, laid out as sky.texture's.
 typedef struct {
@@ -189,7 +189,7 @@ void scene_add_sky_light(Scene *scene)
     free(brightness);
     const double cell_count = SKY_CELL_ROWS * SKY_CELL_COLUMNS,
                  intensity = sky.image ? scene->sky.intensity : 1;
-    if (most * intensity < FAINT) return;
+    if (most * intensity < faint_light) return;
     // scaled so that a white surface that sees all of a uniform sky has the sky's color
     const Light sky_light = {.kind = LIGHT_DIRECTIONAL,
                              .area = AREA_SKY,

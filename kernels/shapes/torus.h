@@ -62,8 +62,6 @@ static inline real torus_tube_value_at(const TorusTube *tube, const Ray *ray, re
     return value;
 }
 
-enum { TORUS_TUBE_ENDS = 2 * TORUS_BREAKS - 2 };
-
 // Returns the zero along the ray in a bracket, as torus_zero does along a line. The first guess is the ray's
 // start if that is in the bracket, since the bracket's middle is far from it.
 static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real low, real high, mask entering)
@@ -104,6 +102,8 @@ static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ra
     }
     return lanes_select(fabs(slope_low) < fabs(slope_high), low, high);
 }
+
+enum { TORUS_TUBE_ENDS = 2 * TORUS_BREAKS - 2 };
 
 // Returns end number `i` of the intervals in which zeros are searched: the ends of the line, and the breaks
 // in between less and plus `margin`.
