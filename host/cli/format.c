@@ -91,7 +91,8 @@ static const json_t *value_at(const ReportRow *row, const char *path)
 static void value_append(Text *text, const json_t *value)
 {
     char word[JSON_NUMBER_SIZE];
-    switch (value ? json_typeof(value) : JSON_NULL) {
+    json_type type = value ? json_typeof(value) : JSON_NULL;
+    switch (type) {
     case JSON_STRING:
         text_append(text, json_string_value(value), json_string_length(value));
         break;
