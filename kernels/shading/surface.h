@@ -113,12 +113,30 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
 // Marks lanes that are done: larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
 
+// Lowers the bound on the position's error where the surface is flat. The exact hit is where the exact ray,
+// line_error off, meets a plane that the position is `height` above.
+static inline void surface_narrow_place(Surface *surface, mask lanes, Vector normal, real height,
+                                        const Ray *ray)
+{
+    const real one = (real)(1), across = surface->line_error;
+    const real cosine = fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) -
+                        (ray->direction_error + (real)(32 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR));
+    lanes = lanes & (cosine > (real)(0x1p-6f));
+    const real inverse = real_divide(one, lanes_select(lanes, cosine, one)),
+               sine = real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) +
+                                (real)(16 * UNIT_ROUNDOFF));
+    const real along = real_fma(across, sine, height) * inverse;
+    const real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
+    surface->place_error =
+        lanes_select(lanes, real_min(surface->place_error, (real)(1.01f) * both), surface->place_error);
+}
+
 // Returns the surface points of the triangles of one material among the objects hit that are in the range. In
 // a fine mesh each lane hits a different triangle, so vertices are gathered triangle by triangle, then
 // evaluated for all lanes at once.
 static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
                                                              const ObjectRange *range, uint material,
-                                                             const Ray *ray, real t, real place_error)
+                                                             const Ray *ray, real t, Surface *surface)
 {
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
     LaneSurfacePoints hit;
@@ -179,9 +197,14 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         heights = triangle_lift(corners, normals, weights, liftable, &hit.point);
     }
 #if IS_CERTIFIED
-    real slimness = triangle_slimness(corners);
+    const real slimness = triangle_slimness(corners),
+               height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t));
     triangle_set_normal_errors(corners, normals, weights, slimness, &hit.point);
-    if (smooth) triangle_set_lift_error(corners, heights, liftable, slimness, place_error, &hit.point);
+    surface_narrow_place(surface, hit.lanes, hit.point.normal, height, ray);
+    if (smooth)
+        triangle_set_lift_error(corners, heights, liftable, slimness, surface->place_error, &hit.point);
+    else
+        hit.point.height = height;
 #endif
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, uvs);
@@ -361,7 +384,7 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     }
     real cosine = fabs(vector_dot(point->normal, ray->direction)); // times the ray's length
     real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
-    is_open = is_open | (cosine <= cosine_error * ray->length);
+    is_open = is_open | !(cosine > cosine_error * ray->length);
     surface->doubt = surface->doubt | (surface_found(surface) & is_open);
 }
 
@@ -431,8 +454,9 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         uint4 entry = range_entry(scene, &range, object);
         LaneSurfacePoints found;
         if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
+            // a pointer would keep the surface out of registers
             found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t,
-                                            IS_CERTIFIED ? surface.place_error : (real)(0));
+                                            IS_CERTIFIED ? &surface : 0);
         } else {
             found.lanes = pending == (integer)(object);
             found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);

@@ -97,7 +97,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     mask lanes = bounding.perhaps & !ray_left_for_good(ray, disc->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
-    mask crosses = certain_plane(disc_foot(disc), disc->normal, ray, &low, &high);
+    mask crosses = certain_plane_of(disc_foot(disc), disc->normal, ray, &low, &high);
     // nearly parallel to it, the hit is not nearer than the sphere
     if (!lanes_all(crosses)) {
         low = lanes_select(crosses, low, real_max(low, sphere_near(&bounding, ray) - bounding.t_error));
@@ -123,7 +123,9 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 static inline mask disc_set_errors(const Disc *disc, const Ray *ray, real t, real place_error,
                                    SurfacePoint *point)
 {
-    point->height = certain_plane_height(disc_foot(disc), disc->normal, point->position);
+    const real inverse_length = (real)(disc->normal.w);
+    point->height =
+        inverse_length * certain_plane_height(disc_foot(disc), vector_of(disc->normal), 0, point->position);
     return mask_none();
 }
 

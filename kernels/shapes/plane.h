@@ -54,19 +54,23 @@ static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ra
 }
 
 // Returns the lanes where the line crosses a plane, at n . (p - o) / n . d, with *low <= t <= *high. In other
-// lanes it may cross it at or beyond *low.
-static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const Ray *ray, real *low,
-                                 real *high)
+// lanes it may cross it at or beyond *low. `size` is at least |n|. Components of n are rounded; n is also off
+// by up to `normal_error`, an absolute error.
+static inline mask certain_plane(Vector point, Vector normal, real size, scalar normal_error, const Ray *ray,
+                                 real *low, real *high)
 {
-    Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, ray->origin);
+    Vector to_point = vector_subtract(point, ray->origin);
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
-    real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal_and_inverse.w));
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
     real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
                                                  (real)(2) * vector_norm1_along(unsigned_normal, point)) +
                         size * ray->origin_error;
     real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
                        size * (ray->length * ray->direction_error);
+    if (normal_error > 0) {
+        height_error = real_fma((real)(normal_error), vector_norm1(to_point), height_error);
+        along_error = real_fma((real)(normal_error), ray->length, along_error);
+    }
     mask crosses = fabs(along) > (real)(8) * along_error;
     real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
     real t = height * inverse;
@@ -88,30 +92,40 @@ static inline mask certain_plane(Vector point, scalar4 normal_and_inverse, const
     return crosses;
 }
 
+// As certain_plane, of an exact normal but for its rounding, with one over its length as w.
+static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, real *low, real *high)
+{
+    real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal.w));
+    return certain_plane(point, vector_of(normal), size, 0, ray, low, high);
+}
+
 static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
 {
     mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, plane->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
-    mask crosses = certain_plane(vector_of(plane->point), plane->normal, ray, &low, &high);
+    mask crosses = certain_plane_of(vector_of(plane->point), plane->normal, ray, &low, &high);
     return certain_crossing(ray, lanes & crosses, lanes, low, high);
 }
 
-// Returns a bound on the height of a point over a plane.
-static inline real certain_plane_height(Vector point, scalar4 normal_and_inverse, Vector position)
+// Returns a bound on the height of a point over a plane, times the length of the normal, which is as for
+// certain_plane.
+static inline real certain_plane_height(Vector point, Vector normal, scalar normal_error, Vector position)
 {
-    Vector normal = vector_of(normal_and_inverse), to_point = vector_subtract(point, position);
+    Vector to_point = vector_subtract(point, position);
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
     real rounding = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
                                              (real)(2) * vector_norm1_along(unsigned_normal, point));
-    return (fabs(vector_dot(normal, to_point)) + rounding) *
-           (real)((1 + 16 * UNIT_ROUNDOFF) * normal_and_inverse.w);
+    if (normal_error > 0) rounding = real_fma((real)(normal_error), vector_norm1(to_point), rounding);
+    return (fabs(vector_dot(normal, to_point)) + rounding) * (real)(1 + 16 * UNIT_ROUNDOFF);
 }
 
 static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real place_error,
                                     SurfacePoint *point)
 {
-    point->height = certain_plane_height(vector_of(plane->point), plane->normal, point->position);
+    const real inverse_length = (real)(plane->normal.w);
+    point->height = inverse_length * certain_plane_height(vector_of(plane->point), vector_of(plane->normal),
+                                                          0, point->position);
     return mask_none();
 }
 

@@ -353,19 +353,47 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
     return signs;
 }
 
-// Returns the error across the ray of a vertex up to a distance from the ray's start.
-static inline real triangle_place_error(const Ray *ray, real distance, TriangleSizes sizes)
+// Returns the error across the ray of a vertex up to `distance` from the ray's start and `size` from the eye.
+static inline real triangle_place_error(const Ray *ray, real distance, real size)
 {
     return ray_place_error(ray, distance) +
-           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, (real)(sizes.size));
+           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, size);
+}
+
+// Returns the same of the vertices of edge functions, in the ray's frame.
+static inline real triangle_frame_error(const TriangleEdges *edges, const Ray *ray, real size)
+{
+    const real distance = vector_norm1(corners_max_abs((Corners){edges->a, edges->b, edges->c}));
+    return triangle_place_error(ray, distance, size) * ray->across_length;
+}
+
+// At `certified`, how far a triangle's normal may be off but for its rounding
+// (host/compile/shapes/triangle.c).
+#define TRIANGLE_NORMAL_ERROR ((scalar)((IS_DOUBLE ? 64 : 0x1p-4f) * UNIT_ROUNDOFF))
+
+// Narrows the bounds on the t of a triangle that is hit, by where its plane is crossed. They are wide where
+// the triangle is slim, as its weights are then sensitive to errors.
+static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray *ray, mask lanes, real *low,
+                                            real *high, real *t)
+{
+    real plane_low, plane_high;
+    lanes = lanes & certain_plane(vector_of(triangle->a), triangle_normal(triangle), (real)(1.7321f),
+                                  TRIANGLE_NORMAL_ERROR, ray, &plane_low, &plane_high);
+    plane_low = real_max(*low, plane_low);
+    plane_high = real_min(*high, plane_high);
+    lanes = lanes & (plane_low <= plane_high);
+    *low = lanes_select(lanes, plane_low, *low);
+    *high = lanes_select(lanes, plane_high, *high);
+    *t = lanes_select(lanes, (real)(0.5f) * (plane_low + plane_high), *t);
 }
 
 // Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
 // vertices of a triangle that is hit are not farther across the ray than its longest edge and the error.
 // `own` are the lanes that lie ahead for certain.
-static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, const Ray *ray, mask lanes,
-                                                   mask own, TriangleSigns signs, TriangleSizes sizes,
-                                                   real error)
+static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle *triangle,
+                                                                 const TriangleEdges *edges, const Ray *ray,
+                                                                 mask lanes, mask own, TriangleSigns signs,
+                                                                 TriangleSizes sizes, real error)
 {
     mask perhaps = lanes & signs.perhaps, certain = perhaps & signs.certain;
     const Vector along = ray_along(ray);
@@ -373,8 +401,12 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
          c_t = vector_dot(edges->c, along);
     real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
     real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
-    real place = triangle_place_error(ray, distance, sizes);
+    real place = triangle_place_error(ray, distance, (real)(sizes.size));
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
+    // most lie behind the start or beyond the end
+    mask beyond = low - vertex_error > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
+    perhaps = perhaps & (own | !(beyond | (high + vertex_error < ray->tmin)));
+    if (!lanes_any(perhaps)) return certain_miss();
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
     // also if it is uncertain: if it is hit, then where the weights place it
     mask narrows = perhaps & (fabs(edges->determinant) > (real)(8) * edge_error);
@@ -388,6 +420,8 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
     high = high + vertex_error;
     low = lanes_select(narrows, real_max(low, t - t_error), low);
     high = lanes_select(narrows, real_min(high, t + t_error), high);
+    mask slim = perhaps & !(t_error <= (real)(4) * vertex_error);
+    if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &low, &high, &t);
     if (HAS_SMOOTH_NORMALS) {
         low = lanes_select(own, real_max(low, (real)(SMALLEST_RATIO)), low);
         high = real_max(low, high);
@@ -396,17 +430,13 @@ static inline CertainHit triangle_certain_crossing(const TriangleEdges *edges, c
     return certain_select(narrows, certain_at(hit, t), hit);
 }
 
-// Uses the vertices' distances from the ray's start, which may be much less than those from the eye.
-static OUT_OF_LINE CertainHit triangle_certain_hit_near(const TriangleEdges *edges, const Ray *ray,
-                                                        mask lanes, mask own, TriangleSizes sizes, real error)
+// Returns the lanes whose rays pass to one side of all vertices, as seen along an axis of their frame.
+// Edge-on, where all edge functions vanish, no other test tells.
+static inline mask triangle_is_passed(const TriangleEdges *edges, real error)
 {
     real ax = edges->ax, ay = edges->ay, bx = edges->bx, by = edges->by, cx = edges->cx, cy = edges->cy;
-    real distance = vector_norm(corners_max_abs((Corners){edges->a, edges->b, edges->c}));
-    error = real_min(error, triangle_place_error(ray, distance, sizes) * ray->across_length);
-    mask misses = (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
-                  (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
-    TriangleSigns signs = triangle_signs(edges, error);
-    return triangle_certain_crossing(edges, ray, lanes & !misses, own, signs, sizes, error);
+    return (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
+           (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
 }
 
 // Tests first by one error for all edge functions of triangles that are hit (docs/numerics.md).
@@ -414,7 +444,7 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
 {
     TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
     TriangleSizes sizes = triangle_sizes(triangle);
-    real error = real_fma(ray->across_error1, (real)(sizes.size), ray->across_error0);
+    real error = triangle_frame_error(&edges, ray, (real)(sizes.size));
     real edge_error = error * real_fma(error, (real)(24), ray->across_length * (real)(3.5f * sizes.longest));
     real highest = real_max(real_max(edges.u, edges.v), edges.w),
          lowest = real_min(real_min(edges.u, edges.v), edges.w);
@@ -426,11 +456,16 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     lanes = lanes & signs.perhaps & !own;
     if (!lanes_any(lanes)) return certain_miss();
     own = HAS_SMOOTH_NORMALS ? ray_left_for_good(ray, triangle->id.x, true) : mask_none();
-    CertainHit hit = triangle_certain_crossing(&edges, ray, lanes, own, signs, sizes, error);
-    if (RARELY(lanes_any(hit.doubt))) // certain lanes must not depend on uncertain ones
-        hit =
-            certain_select(hit.doubt, triangle_certain_hit_near(&edges, ray, lanes, own, sizes, error), hit);
+    CertainHit hit = triangle_certain_crossing(triangle, &edges, ray, lanes, own, signs, sizes, error);
+    if (RARELY(lanes_any(hit.doubt))) hit.doubt = hit.doubt & !triangle_is_passed(&edges, error);
     return hit;
+}
+
+// Returns a bound on the height of a point over the exact triangle's plane, of which `vertex` is a rounded
+// vertex and `unit` the normal.
+static inline real triangle_height(Vector vertex, Vector unit, Vector position)
+{
+    return certain_plane_height(vertex, unit, 4 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR, position);
 }
 
 // Returns a bound on how much longer than high a triangle is, over its length. A vertex that moves by e turns
@@ -456,7 +491,7 @@ static inline void triangle_set_normal_errors(Corners corners, Corners normals, 
     Vector blend = triangle_blend(weights, normals);
     real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
     point->curvature = (real)(2.5f) * bend * slimness;
-    point->normal_error = vertex_error * (slimness + point->curvature);
+    point->normal_error = real_fma(vertex_error, point->curvature, (real)(2 * TRIANGLE_NORMAL_ERROR));
 }
 
 // Sets the error of the lift in the lanes with a side (docs/numerics.md).
@@ -500,11 +535,9 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
     }
     mask in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
          behind = (sides & (integer)(NEIGHBOR_BEHIND)) != none;
-    Corners corners = corners_of(triangle->a, triangle->b, triangle->c);
     Vector normal = triangle_normal(triangle);
     Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
-    real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
-    real turned = ray->direction_error + vertex_error * triangle_slimness(corners);
+    real turned = ray->direction_error + (real)(2 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
     real moved = real_fma(ray->length, turned, ray->ends_at_light ? ray->origin_error : (real)(0));
     real along = vector_dot(normal, ray->direction);
     real error = (real)(8 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +

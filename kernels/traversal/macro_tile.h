@@ -207,8 +207,8 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     if (IS_CERTIFIED) {
         tile->slack += lanes_largest(mask_all(), bounds->place_error);
         const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
-        // six times the test's error, of sizes that may be 1.4 times the distance: docs/numerics.md
-        const scalar error1 = (scalar)(6 * 1.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
+        // six times the test's error, of 1-norms that may be 2.1 times the distance: docs/numerics.md
+        const scalar error1 = (scalar)(6 * 2.1f) * lanes_largest(mask_all(), bounds->vertex_error1);
         tile->vertex_error0 = 6 * lanes_largest(mask_all(), bounds->vertex_error0) + error1 * origin;
         tile->vertex_error1 = error1 + VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF;
     }

@@ -209,15 +209,17 @@ static inline uint block_triangles_near(global const TriangleBlock *block, uint 
 {
     global const scalar *rows = (global const scalar *)block->rows;
     const Corners corners = {rows_load(rows), rows_load(rows + 3 * LANES), rows_load(rows + 6 * LANES)};
-    Ray one; // only what triangle_edges reads
+    Ray one; // only what the test reads
     one.origin = vector_of_lane(&ray->origin, lane);
     one.across_u = vector_of_lane(&ray->across_u, lane);
     one.across_v = vector_of_lane(&ray->across_v, lane);
     const TriangleEdges edges = triangle_edges(corners, &one);
 #if IS_CERTIFIED
-    const real size = (real)(1 + 64 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners)),
-               error = real_fma(real_of_lane(&ray->across_error1, lane), size,
-                                real_of_lane(&ray->across_error0, lane));
+    one.origin_error = real_of_lane(&ray->origin_error, lane);
+    one.direction_error = real_of_lane(&ray->direction_error, lane);
+    one.across_length = real_of_lane(&ray->across_length, lane);
+    const real slack = (real)(1 + 64 * UNIT_ROUNDOFF), size = slack * vector_norm1(corners_max_abs(corners)),
+               error = slack * triangle_frame_error(&edges, &one, size);
     const mask near = triangle_signs(&edges, error).perhaps;
 #else
     const mask near = triangle_is_crossed(&edges);

@@ -37,11 +37,9 @@ typedef struct {
     mask is_lifted, sinks;
     // of a ray along a chord of the sphere that it leaves, NEVER of others: as of a Chord (shading/chords.h)
     real chord_turn, chord_end_place;
-    real length; // of the direction, not below the exact one, within 48 u
-    // by ray_prepare: a bound on the length of across_u and across_v, and on the error of a triangle's corner
-    // in the frame if it is no farther from the origin than `size`: across_error0 + across_error1 size
-    real across_length, across_error0, across_error1;
-    Vector inverse; // by ray_prepare, for boxes: 1 / direction
+    real length;        // of the direction, not below the exact one, within 48 u
+    real across_length; // by ray_prepare: a bound on the length of across_u and across_v
+    Vector inverse;     // by ray_prepare, for boxes: 1 / direction
     // for triangles: two vectors across the direction, of length O(1) since they are computed from a
     // direction scaled by a power of two
     Vector across_u, across_v;
@@ -169,10 +167,6 @@ static inline void ray_prepare(Ray *ray)
              second = vector_norm1(d) - largest - least;
         ray->across_length =
             (real)(1 + 16 * UNIT_ROUNDOFF) * scale * real_fma((real)(0.42f), second, largest);
-        real per_distance = ray->direction_error + (real)(TRIANGLE_ERROR * UNIT_ROUNDOFF);
-        ray->across_error1 = (per_distance + (real)(UNIT_ROUNDOFF)) * ray->across_length;
-        ray->across_error0 =
-            real_fma(per_distance, vector_norm1(ray->origin), ray->origin_error) * ray->across_length;
     } else {
         frame_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
     }
