@@ -113,19 +113,23 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
 // Marks lanes that are done: larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
 
+// Returns at most the cosine of the exact ray's incidence on a plane, or 0.
+static inline real least_cosine(Vector normal, const Ray *ray)
+{
+    const real error = ray->direction_error + (real)(128 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
+    return real_max(fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) - error, (real)(0));
+}
+
 // Lowers the bound on the position's error where the surface is flat. The exact hit is where the exact ray,
-// line_error off, meets a plane that the position is `height` above.
-static inline void surface_narrow_place(Surface *surface, mask lanes, Vector normal, real height,
-                                        const Ray *ray)
+// line_error off, meets a plane that the position is `height` above; `cosine` is its least_cosine.
+static inline void surface_narrow_place(Surface *surface, mask lanes, real height, real cosine)
 {
     const real one = (real)(1), across = surface->line_error;
-    const real cosine = fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) -
-                        (ray->direction_error + (real)(32 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR));
     lanes = lanes & (cosine > (real)(0x1p-6f));
-    const real inverse = real_divide(one, lanes_select(lanes, cosine, one)),
-               sine = real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) +
-                                (real)(16 * UNIT_ROUNDOFF));
-    const real along = real_fma(across, sine, height) * inverse;
+    const real sine =
+        real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) + (real)(16 * UNIT_ROUNDOFF));
+    const real along = real_divide(real_fma(across, sine, height), lanes_select(lanes, cosine, one));
+    // not less than the root of the sum of squares
     const real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
     surface->place_error =
         lanes_select(lanes, real_min(surface->place_error, (real)(1.01f) * both), surface->place_error);
@@ -197,12 +201,14 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         heights = triangle_lift(corners, normals, weights, liftable, &hit.point);
     }
 #if IS_CERTIFIED
-    const real slimness = triangle_slimness(corners),
-               height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t));
-    triangle_set_normal_errors(corners, normals, weights, slimness, &hit.point);
-    surface_narrow_place(surface, hit.lanes, hit.point.normal, height, ray);
+    const real slimness = triangle_slimness(corners), cosine = least_cosine(hit.point.normal, ray),
+               height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t)),
+               weights_error = triangle_weights_error(corners, ray, cosine);
+    triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);
+    surface_narrow_place(surface, hit.lanes, height, cosine);
     if (smooth)
-        triangle_set_lift_error(corners, heights, liftable, slimness, surface->place_error, &hit.point);
+        triangle_set_lift_error(corners, heights, liftable, slimness, surface->place_error + weights_error,
+                                &hit.point);
     else
         hit.point.height = height;
 #endif
@@ -454,7 +460,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         uint4 entry = range_entry(scene, &range, object);
         LaneSurfacePoints found;
         if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
-            // a pointer would keep the surface out of registers
+            // other precisions pass no pointer, which would keep the surface out of registers
             found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t,
                                             IS_CERTIFIED ? &surface : 0);
         } else {
@@ -471,6 +477,9 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
             surface_set_chord_end(&surface, &sphere, ray, hit, &found);
         }
         at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
+        if (!HAS_TRIANGLES || entry.x != KIND_TRIANGLES)
+            surface_narrow_place(&surface, found.lanes & (found.point.height < NEVER), found.point.height,
+                                 least_cosine(found.point.normal, ray));
 #endif
         Material material = scene->materials[entry.z];
         if (HAS_NORMAL_MAPS) hit_tilt_normals(scene, entry, &material, &found, ray, surface.travelled);

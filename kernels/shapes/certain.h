@@ -40,16 +40,21 @@ static inline mask ray_left_for_good(const Ray *ray, uint id, bool is_flat)
     return is_flat ? left : left & ray->leaves_outward;
 }
 
+// Returns the lanes whose crossing between low and high lies before the ray's start or beyond its end, which
+// for a ray to a light is t = 1, from which tmax differs by rounding.
+static inline mask ray_excludes(const Ray *ray, real low, real high)
+{
+    return (low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF)) | (high < ray->tmin);
+}
+
 // Classifies a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and in
 // no others than `perhaps`, there between low and high.
 static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask perhaps, real low, real high)
 {
     CertainHit hit;
-    // beyond the end, which for a ray to a light is t = 1, from which tmax differs by rounding
-    mask beyond = low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
-    mask before = high < ray->tmin;
+    const mask excluded = ray_excludes(ray, low, high);
     low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers, it may be anywhere
-    perhaps = perhaps & !(beyond | before);
+    perhaps = perhaps & !excluded;
     hit.found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
     hit.doubt = perhaps & !hit.found;
     hit.t = (real)(0.5f) * (low + high);

@@ -92,7 +92,7 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     return crosses;
 }
 
-// As certain_plane, of an exact normal but for its rounding, with one over its length as w.
+// The same of a normal that is exact except for its rounding. Its w is one over its length.
 static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, real *low, real *high)
 {
     real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal.w));

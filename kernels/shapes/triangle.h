@@ -354,20 +354,21 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
 }
 
 // Returns the error across the ray of a vertex up to `distance` from the ray's start and `size` from the eye.
+// Its place before it is rounded may be farther along the ray by u `size`.
 static inline real triangle_place_error(const Ray *ray, real distance, real size)
 {
     return ray_place_error(ray, distance) +
-           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, size);
+           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, (real)(1.05f) * size);
 }
 
-// Returns the same of the vertices of edge functions, in the ray's frame.
+// Returns a bound on the error of the vertices' coordinates in the ray's frame.
 static inline real triangle_frame_error(const TriangleEdges *edges, const Ray *ray, real size)
 {
     const real distance = vector_norm1(corners_max_abs((Corners){edges->a, edges->b, edges->c}));
     return triangle_place_error(ray, distance, size) * ray->across_length;
 }
 
-// At `certified`, how far a triangle's normal may be off but for its rounding
+// At `certified`, the largest error of a stored normal in addition to its rounding
 // (host/compile/shapes/triangle.c).
 #define TRIANGLE_NORMAL_ERROR ((scalar)((IS_DOUBLE ? 64 : 0x1p-4f) * UNIT_ROUNDOFF))
 
@@ -389,7 +390,7 @@ static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray 
 
 // Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
 // vertices of a triangle that is hit are not farther across the ray than its longest edge and the error.
-// `own` are the lanes that lie ahead for certain.
+// `own` marks the lanes whose triangle certainly lies ahead.
 static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle *triangle,
                                                                  const TriangleEdges *edges, const Ray *ray,
                                                                  mask lanes, mask own, TriangleSigns signs,
@@ -403,9 +404,8 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
     real place = triangle_place_error(ray, distance, (real)(sizes.size));
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
-    // most lie behind the start or beyond the end
-    mask beyond = low - vertex_error > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
-    perhaps = perhaps & (own | !(beyond | (high + vertex_error < ray->tmin)));
+    // most triangles that lines hit lie behind the start or beyond the end
+    perhaps = perhaps & (own | !ray_excludes(ray, low - vertex_error, high + vertex_error));
     if (!lanes_any(perhaps)) return certain_miss();
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
     // also if it is uncertain: if it is hit, then where the weights place it
@@ -420,7 +420,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     high = high + vertex_error;
     low = lanes_select(narrows, real_max(low, t - t_error), low);
     high = lanes_select(narrows, real_min(high, t + t_error), high);
-    mask slim = perhaps & !(t_error <= (real)(4) * vertex_error);
+    mask slim = perhaps & !(narrows & (t_error <= (real)(4) * vertex_error));
     if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &low, &high, &t);
     if (HAS_SMOOTH_NORMALS) {
         low = lanes_select(own, real_max(low, (real)(SMALLEST_RATIO)), low);
@@ -480,18 +480,30 @@ static inline real triangle_slimness(Corners corners)
     return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
 }
 
-// Sets the errors of the normals. Each vertex is off by u of its length, and if normals are blended, the
-// weights move with the place.
-static inline void triangle_set_normal_errors(Corners corners, Corners normals, TriangleWeights weights,
-                                              real slimness, SurfacePoint *point)
+// Returns how far the point of the exact weights may be from that of the computed ones, in addition to the
+// error of the position: by the rounding of each vertex, and by the error across the ray of the frame's
+// vertices, over the cosine of incidence.
+static inline real triangle_weights_error(Corners corners, const Ray *ray, real cosine)
 {
-    real vertex_error = (real)(4 * UNIT_ROUNDOFF) * vector_norm1(corners_max_abs(corners));
+    const Corners from_start = {vector_subtract(corners.a, ray->origin),
+                                vector_subtract(corners.b, ray->origin),
+                                vector_subtract(corners.c, ray->origin)};
+    const real size = vector_norm1(corners_max_abs(corners)),
+               distance = vector_norm1(corners_max_abs(from_start));
+    const real across = (real)(UNIT_ROUNDOFF)*real_fma((real)(6), distance, (real)(2) * size);
+    return real_fma((real)(4 * UNIT_ROUNDOFF), size, divide_or(across, cosine, NEVER));
+}
+
+// Sets the errors of the normals. If they are blended, they move with the weights.
+static inline void triangle_set_normal_errors(Corners normals, TriangleWeights weights, real slimness,
+                                              real weights_error, SurfacePoint *point)
+{
     Vector ab = vector_subtract(normals.a, normals.b), bc = vector_subtract(normals.b, normals.c);
     real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
     Vector blend = triangle_blend(weights, normals);
     real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
     point->curvature = (real)(2.5f) * bend * slimness;
-    point->normal_error = real_fma(vertex_error, point->curvature, (real)(2 * TRIANGLE_NORMAL_ERROR));
+    point->normal_error = real_fma(weights_error, point->curvature, (real)(2 * TRIANGLE_NORMAL_ERROR));
 }
 
 // Sets the error of the lift in the lanes with a side (docs/numerics.md).

@@ -124,9 +124,9 @@ static inline real tile_reach(const MacroTile *tile, uint packet)
 typedef struct {
     real u_min[LANES], u_max[LANES], v_min[LANES], v_max[LANES], reach_max[LANES];
     // At `certified`, over all packets: how far the exact rays are from these within the bounds of the BVH,
-    // beyond what tmin allows; and the error of a vertex across them, vertex_error0 + vertex_error1 times the
-    // distance from the eye.
-    real place_error, vertex_error0, vertex_error1;
+    // beyond what tmin allows; the error of their origins; and the error of a vertex across them, over its
+    // distance.
+    real place_error, origin_error, vertex_error1;
 } PacketBounds;
 
 // Adds a packet with active rays, unless one of its slopes is too large.
@@ -157,9 +157,8 @@ static inline void tile_add(MacroTile *tile, PacketBounds *bounds, const Scene *
     if (IS_CERTIFIED) {
         real place_error = bounds_place_error(ray, scene->header->bounds) - ray->length * ray->tmin;
         real vertex_error1 = ray->direction_error + (real)((TRIANGLE_ERROR + 1) * UNIT_ROUNDOFF);
-        real vertex_error0 = real_fma(vertex_error1, vector_norm1(ray->origin), ray->origin_error);
         bounds->place_error = real_max(bounds->place_error, lanes_select(active, place_error, zero));
-        bounds->vertex_error0 = real_max(bounds->vertex_error0, lanes_select(active, vertex_error0, zero));
+        bounds->origin_error = real_max(bounds->origin_error, lanes_select(active, ray->origin_error, zero));
         bounds->vertex_error1 = real_max(bounds->vertex_error1, lanes_select(active, vertex_error1, zero));
     }
     tile->active |= 1u << packet;
@@ -207,9 +206,10 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     if (IS_CERTIFIED) {
         tile->slack += lanes_largest(mask_all(), bounds->place_error);
         const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
-        // six times the test's error, of 1-norms that may be 2.1 times the distance: docs/numerics.md
-        const scalar error1 = (scalar)(6 * 2.1f) * lanes_largest(mask_all(), bounds->vertex_error1);
-        tile->vertex_error0 = 6 * lanes_largest(mask_all(), bounds->vertex_error0) + error1 * origin;
+        // six times the test's error, of 1-norms that may be 2.4 times the distance: docs/numerics.md
+        const scalar error1 = (scalar)(6 * 2.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
+        const scalar origin_error = lanes_largest(mask_all(), bounds->origin_error);
+        tile->vertex_error0 = 6 * (origin_error + (scalar)(2 * UNIT_ROUNDOFF) * origin);
         tile->vertex_error1 = error1 + VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF;
     }
     // at an eighth of the distance (triangle_block.h) a vertex' error moves its slopes by as much

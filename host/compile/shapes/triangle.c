@@ -36,17 +36,18 @@ static Vector3 needle_normal(Vector3 a, Vector3 b, Vector3 c, double least_sine)
     return quad3_rounded(quad3_scale(across, 1 / largest));
 }
 
-// The same, within TRIANGLE_NORMAL_ERROR of kernels/shapes/triangle.h, or 0, which leaves every hit
-// uncertain. At the sine s of the angle between ab and ac its angle is off by less than (3 + 3 / s) 2^-53: by
-// 27 of these down to 1/8, and by a 2^-9th of a float's roundoff down to 2^-18; in quadruple precision by as
-// much of 2^-113.
+// Returns the normal of the corners before they are rounded, within TRIANGLE_NORMAL_ERROR of
+// kernels/shapes/triangle.h, or 0, with which every hit is uncertain. If s is the sine of the angle at `a`,
+// its direction is off by less than (3 + 3 / s) 2^-53: by 27 of these down to 1/8, and by a 2^-9th of a
+// float's roundoff down to 2^-18. In quadruple precision the roundoff is 2^-QUAD_BITS.
 static Vector3 certified_normal(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
 {
     const double least_sine = rounding->is_double ? 0x1p-3 : 0x1p-18;
     const Vector3 ab = axis_scaled(vector_subtract(b, a)), ac = axis_scaled(vector_subtract(c, a)),
                   across = cross_product(ab, ac);
     const double least_squared = least_sine * least_sine * vector_dot(ab, ab) * vector_dot(ac, ac);
-    return vector_dot(across, across) >= least_squared ? across : needle_normal(a, b, c, 0x1p-50);
+    const double least_in_quad = ldexp(1, 50 - QUAD_BITS);
+    return vector_dot(across, across) >= least_squared ? across : needle_normal(a, b, c, least_in_quad);
 }
 
 // One without area shrinks to a point, which no ray meets: the kernels rotate vertices, and what was a line
