@@ -218,10 +218,10 @@ static void slim_triangles_are_seldom_repeated(void **state)
 {
     (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
-    enum { SIDE = 40 };
-    for (unsigned seed = 0; seed < 4; seed++) {
+    enum { SIDE = 20 };
+    for (unsigned seed = 0; seed < 2; seed++) {
         random_state.state = seed;
-        const bool is_mirror = seed % 2 == 0;
+        const bool is_mirror = seed == 0;
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.2);
         array_push(scene.materials, material_default());
         Material *sheet = &scene.materials.items[0], *wall = &scene.materials.items[1];
@@ -245,7 +245,7 @@ static void slim_triangles_are_seldom_repeated(void **state)
         const Answer found = answer(&scene, &reference, &settings);
         print_message("%zu of %u samples repeated\n", (size_t)found.repeated, 3 * SIDE * SIDE);
         assert_int_equal(found.wrong_decided, 0);
-        assert_true(found.repeated < 250);
+        assert_true(found.repeated < 64);
         certify_sample_close(&reference);
         scene_free(&scene);
     }
