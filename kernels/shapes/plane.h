@@ -92,7 +92,7 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     return crosses;
 }
 
-// The same of a normal that is exact except for its rounding. Its w is one over its length.
+// Does so for a normal that is exact except for its rounding. Its w is one over its length.
 static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, real *low, real *high)
 {
     real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal.w));
@@ -108,8 +108,8 @@ static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
     return certain_crossing(ray, lanes & crosses, lanes, low, high);
 }
 
-// Returns a bound on the height of a point over a plane, times the length of the normal, which is as for
-// certain_plane.
+// Returns a bound on the height of a point over a plane, times the length of the normal, which is rounded and
+// off by up to `normal_error`.
 static inline real certain_plane_height(Vector point, Vector normal, scalar normal_error, Vector position)
 {
     Vector to_point = vector_subtract(point, position);

@@ -147,8 +147,8 @@ static inline Vector ray_inverse(const Ray *ray)
     return (Vector){real_inverse_or_huge(d.x), real_inverse_or_huge(d.y), real_inverse_or_huge(d.z)};
 }
 
-// Of a triangle's corner, in u of its distance from the ray's start: the roundings of the difference and of
-// two products.
+// The error of a triangle's corner, in u of its distance from the ray's start, counts the roundings of the
+// difference and of two products.
 enum { TRIANGLE_ERROR = 5 };
 
 // Computes what boxes and triangles need. Lazy and idempotent: called before leaves of the BVH, and boxes and
