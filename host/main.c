@@ -1,5 +1,6 @@
 // glint: the subcommands by name.
 #include "host/api/version.h"
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
@@ -34,7 +35,7 @@ static const struct {
     {"cache", command_cache, "list, check or empty the kernel cache"},
 };
 
-enum { COMMAND_COUNT = sizeof commands / sizeof *commands };
+enum { COMMAND_COUNT = COUNT_OF(commands) };
 
 static void help(FILE *stream)
 {

@@ -4,14 +4,10 @@
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
 #include "host/verify/certify.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 static Random random_state;
 

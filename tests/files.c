@@ -1,19 +1,16 @@
 #include "tests/files.h"
+#include "tests/check.h"
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include <dirent.h>
 #include <ftw.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 static char *folder_make(void)
 {

@@ -1,14 +1,11 @@
 #include "tests/film.h"
+#include "tests/check.h"
 
 #include "host/base/memory.h"
 #include "host/render/arithmetic.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 bool tests_are_long(void)
 {

@@ -94,7 +94,7 @@ static void edit_replace_by_word(Text *text)
                                         "true",   "\xef\xbb\xbf",
                                         "...",    "\xe2\x80\xa8",
                                         "<<: *a"};
-    const char *word = words[random_below(sizeof words / sizeof *words)];
+    const char *word = words[random_below(COUNT_OF(words))];
     size_t start = random_below(text->count + 1);
     size_t removed = random_below(4);
     if (removed > text->count - start) removed = text->count - start;
@@ -145,8 +145,8 @@ static void text_damage(Text *text, const Seeds *seeds)
                                      edit_replace_by_word, edit_remove,    edit_random_bytes,
                                      edit_repeat_line};
     for (size_t left = 1 + random_below(EDITS_MAX); left; left--) {
-        size_t edit = random_below(sizeof edits / sizeof *edits + 1);
-        if (edit < sizeof edits / sizeof *edits)
+        size_t edit = random_below(COUNT_OF(edits) + 1);
+        if (edit < COUNT_OF(edits))
             edits[edit](text);
         else
             edit_splice(text, &seeds->items[random_below(seeds->count)]);

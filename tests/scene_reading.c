@@ -1,12 +1,9 @@
 #include "tests/scene_reading.h"
 #include "host/import/load.h"
+#include "tests/check.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 bool scene_read_text(Scene *scene, const char *name, const Text *text, bool lenient, MessageList *messages)
 {

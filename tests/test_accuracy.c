@@ -3,16 +3,13 @@
 // independent implementation.
 #include "host/base/memory.h"
 #include "host/measure/accuracy.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 enum { WIDTH = 12, HEIGHT = 8, PIXELS = WIDTH * HEIGHT, LIGHTS = 2, NOTHING_FROM = 10 };
 
@@ -50,9 +47,8 @@ static AccuracyErrors compare(const Film *reference, const Film *variant)
     return errors;
 }
 
-static void test_edges(void **state)
+TEST(test_edges)
 {
-    (void)state;
     Film film = film_make();
     AccuracyEdges edges;
     accuracy_edges_find(&edges, &film);
@@ -80,9 +76,8 @@ static void test_edges(void **state)
     film_free(&film);
 }
 
-static void test_equal(void **state)
+TEST(test_equal)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     AccuracyErrors errors = compare(&reference, &variant);
     assert_int_equal(accuracy_faults(&errors), 0);
@@ -97,9 +92,8 @@ static void test_equal(void **state)
     film_free(&variant);
 }
 
-static void test_wrong_objects(void **state)
+TEST(test_wrong_objects)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     variant.object[at(5, 0)] = 1;
     variant.object[at(7, 6)] = UINT32_MAX;
@@ -134,9 +128,8 @@ static void test_wrong_objects(void **state)
     film_free(&variant);
 }
 
-static void test_wrong_shadows(void **state)
+TEST(test_wrong_shadows)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     variant.shadow[LIGHTS * at(0, 3)] = 1; // at light 0's edge
     variant.color[3 * at(0, 3)] = 0;
@@ -160,9 +153,8 @@ static void test_wrong_shadows(void **state)
     film_free(&variant);
 }
 
-static void test_wrong_paths(void **state)
+TEST(test_wrong_paths)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     variant.path[at(6, 1)] = 1;
     variant.path[at(1, 1)] = 2;
@@ -178,9 +170,8 @@ static void test_wrong_paths(void **state)
     film_free(&variant);
 }
 
-static void test_shading(void **state)
+TEST(test_shading)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     variant.color[3 * at(0, 0)] += 0.25;
     variant.color[3 * at(3, 4) + 2] -= 0.125;
@@ -200,9 +191,8 @@ static void test_shading(void **state)
     film_free(&variant);
 }
 
-static void test_distances_and_normals(void **state)
+TEST(test_distances_and_normals)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     variant.t[at(2, 2)] = 8 + 3 * 8 * (double)FLT_EPSILON;
     // 10 degrees about y, and a tiny angle that the cosine cannot show
@@ -231,9 +221,8 @@ static void test_distances_and_normals(void **state)
     film_free(&variant);
 }
 
-static void test_unsound_pixels(void **state)
+TEST(test_unsound_pixels)
 {
-    (void)state;
     Film reference = film_make(), variant = film_make();
     variant.color[3 * at(3, 3)] = (double)NAN;
     variant.color[3 * at(3, 3) + 1] = -1; // counts for both
@@ -250,9 +239,8 @@ static void test_unsound_pixels(void **state)
     film_free(&variant);
 }
 
-static void test_colors_only(void **state)
+TEST(test_colors_only)
 {
-    (void)state;
     Film variant = film_make(), source = film_make();
     Film reference = {.width = WIDTH, .height = HEIGHT, .color = source.color};
     variant.color[3 * at(3, 3)] = 0.75;
@@ -268,9 +256,8 @@ static void test_colors_only(void **state)
 
 enum { VARIANTS = 5 };
 
-static void test_judgement(void **state)
+TEST(test_judgement)
 {
-    (void)state;
     // time of a frame, RMSE of the shading, leaks
     static const struct {
         double seconds, rmse;

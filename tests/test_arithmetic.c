@@ -3,11 +3,7 @@
 #include "host/compile/random_shape.h"
 #include "host/image/srgb.h"
 #include "host/scene/portable.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
+#include "tests/check.h"
 
 #ifdef __x86_64__
 #define WITH_FMA __attribute__((target("fma"), noinline))
@@ -21,9 +17,8 @@ WITH_FMA static double multiply_add(double a, double b, double c)
     return a * b + c;
 }
 
-static void test_rounds_each_operation(void **state)
+TEST(test_rounds_each_operation)
 {
-    (void)state;
     assert_int_equal(FLT_EVAL_METHOD, 0);
     const volatile double large = 0x1p53, one = 1, near_one = 1 + 0x1p-30;
     assert_true(large + one - large == 0);
@@ -35,9 +30,8 @@ static void test_rounds_each_operation(void **state)
 }
 
 // Arguments at which glibc's function of doubles is off by one on x86-64, and the nearest doubles, by mpmath.
-static void test_functions_are_rounded_correctly(void **state)
+TEST(test_functions_are_rounded_correctly)
 {
-    (void)state;
     static const struct {
         double (*function)(double);
         double argument, value;
@@ -53,7 +47,7 @@ static void test_functions_are_rounded_correctly(void **state)
         {portable_log2, 0x1p-1074, -1074},
         {portable_log2, 1, 0},
     };
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    for (size_t i = 0; i < COUNT_OF(rows); i++) {
         const volatile double argument = rows[i].argument; // calculated now, not by the compiler
         const double value = rows[i].function(argument);
         if (value != rows[i].value) fail_msg("row %zu: %a, not %a", i, value, rows[i].value);
@@ -66,9 +60,8 @@ static void check_length(Vector3 v, double exact)
         fail_msg("length of %a %a %a: %a, not %a", v.x, v.y, v.z, vector_length(v), exact);
 }
 
-static void test_lengths_neither_overflow_nor_underflow(void **state)
+TEST(test_lengths_neither_overflow_nor_underflow)
 {
-    (void)state;
     for (int exponent = -1070; exponent <= 1020; exponent++)
         check_length((Vector3){ldexp(2, exponent), ldexp(-3, exponent), ldexp(6, exponent)},
                      ldexp(7, exponent));
@@ -76,9 +69,8 @@ static void test_lengths_neither_overflow_nor_underflow(void **state)
     assert_true(vector_length((Vector3){0}) == 0);
 }
 
-static void test_quad_has_its_bits(void **state)
+TEST(test_quad_has_its_bits)
 {
-    (void)state;
     Quad last = 1;
     for (int bit = 1; bit < QUAD_BITS; bit++)
         last /= 2;
@@ -90,9 +82,8 @@ static void test_quad_has_its_bits(void **state)
 }
 
 // Squares of integers have exact roots, also far outside the range of a double.
-static void test_quad_roots(void **state)
+TEST(test_quad_roots)
 {
-    (void)state;
     Random random = {.state = 1};
     Quad scale = 1;
     for (int i = 0; i < 16000; i++) {
@@ -113,9 +104,8 @@ static void test_quad_roots(void **state)
 }
 
 // An image's texel is the same float whatever the last bits of the C library's pow.
-static void test_decoded_texels_do_not_depend_on_pow(void **state)
+TEST(test_decoded_texels_do_not_depend_on_pow)
 {
-    (void)state;
     for (uint32_t maximum = 255; maximum <= 65535; maximum += 65280) {
         for (uint32_t k = 0; k <= maximum; k++) {
             const double linear = srgb_decode((double)((float)k / (float)maximum));

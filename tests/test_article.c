@@ -4,13 +4,9 @@
 //
 // run_tests: sanitize-long-only
 #include "host/verify/reference_color.h"
+#include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define MATERIAL "\tcolor 200 100 50\n\tdiffuse 0.5 0.5 0.5\n\tspecular 1\n}\n"
 #define CAMERA   "=>camera :\n{\n\tposition 0 0 0\n\tlook_at 0 0 1\n}\n"
@@ -92,9 +88,8 @@ static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
     return expected;
 }
 
-static void sees_a_sphere_from_inside(void **state)
+TEST(sees_a_sphere_from_inside)
 {
-    (void)state;
     Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 2\n\tcenter 0 0 0.5\n" MATERIAL);
     Vector3 eye = scene.camera.position, forward = {0, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, forward);
@@ -103,9 +98,8 @@ static void sees_a_sphere_from_inside(void **state)
     scene_free(&scene);
 }
 
-static void sees_a_cylinder_from_inside(void **state)
+TEST(sees_a_cylinder_from_inside)
 {
-    (void)state;
     Scene scene = read_scene(CAMERA "=>cylinder :\n{\n\tradius 2\n\tcenter 0 0 0\n\tnormal 0 1 0\n" MATERIAL);
     Vector3 eye = {0, 5, 0.5}, forward = {0, 0, 1};
     ReferenceHit hit = hit_of_both(&scene, eye, forward);
@@ -115,9 +109,8 @@ static void sees_a_cylinder_from_inside(void **state)
     scene_free(&scene);
 }
 
-static void looks_along_a_cylinder(void **state)
+TEST(looks_along_a_cylinder)
 {
-    (void)state;
     Scene scene = read_scene(CAMERA "=>cylinder :\n{\n\tradius 2\n\tcenter 0 0 0\n\tnormal 0 0 1\n" MATERIAL
                                     "=>plane :\n{\n\tposition 0 0 7\n\tnormal 0 0 1\n" MATERIAL);
     Vector3 eye = {0.5, 0, 0}, forward = {0, 0, 1};
@@ -136,9 +129,8 @@ static void looks_along_a_cylinder(void **state)
     scene_free(&scene);
 }
 
-static void looks_along_a_cone(void **state)
+TEST(looks_along_a_cone)
 {
-    (void)state;
     // Half the angle between the axes: the side runs along (-1, 0, 1).
     Scene scene = read_scene(
         CAMERA "=>cone :\n{\n\tangle 0.78539816339744831\n\tcenter 0 0 0\n\tnormal 0 0 1\n" MATERIAL);
@@ -150,9 +142,8 @@ static void looks_along_a_cone(void **state)
     scene_free(&scene);
 }
 
-static void turns_a_cones_normal_by_its_tangent(void **state)
+TEST(turns_a_cones_normal_by_its_tangent)
 {
-    (void)state;
     const float angle = 1;
     Scene scene = read_scene(CAMERA "=>cone :\n{\n\tangle 1\n\tcenter 0 0 0\n\tnormal 0 1 0\n" MATERIAL);
     Vector3 eye = {0.25, 1, -5}, forward = {0, 0, 1};
@@ -173,9 +164,8 @@ static double cut(double value)
     return floor(fmin(fmax(value, 0), 255));
 }
 
-static void adds_light_before_it_cuts(void **state)
+TEST(adds_light_before_it_cuts)
 {
-    (void)state;
     Scene scene = read_scene(CAMERA "=>plane :\n{\n\tposition 0 0 4\n\tnormal 0 0 -1\n"
                                     "\tcolor 109 59 19\n\tdiffuse 0.33 0.33 0.33\n\tspecular 0.4\n}\n"
                                     "=>light :\n{\n\tposition 1 0 0\n\tintensity 0.7 0.7 0.7\n}\n");
@@ -195,9 +185,8 @@ static void adds_light_before_it_cuts(void **state)
     scene_free(&scene);
 }
 
-static void sees_far_and_near(void **state)
+TEST(sees_far_and_near)
 {
-    (void)state;
     Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 10\n\tcenter 0 0 1000\n" MATERIAL
                                     "=>sphere :\n{\n\tradius 1e-7\n\tcenter 0 0 -4e-7\n" MATERIAL);
     Vector3 eye = scene.camera.position, far = {0, 0, 1}, near = {0, 0, -1};
@@ -217,9 +206,8 @@ typedef struct {
 
 enum { WIDTH = 128, HEIGHT = 72 };
 
-static void keeps_a_sphere_round(void **state)
+TEST(keeps_a_sphere_round)
 {
-    (void)state;
     Scene scene = read_scene(CAMERA "=>sphere :\n{\n\tradius 1\n\tcenter 0 0 9\n" MATERIAL);
     static float image[HEIGHT][WIDTH][3];
     assert_true(probe_render(&scene, WIDTH, HEIGHT, PRECISION_SINGLE, &image[0][0][0]));

@@ -8,14 +8,13 @@
 #include "host/base/output.h"
 #include "host/base/stage.h"
 #include "host/base/text.h"
+#include "tests/check.h"
 #include "tests/files.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,8 +22,6 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 static char *printed(const MessageList *messages)
 {
@@ -48,9 +45,8 @@ static void check_message(const char *bytes, size_t offset, const char *expected
     message_list_free(&messages);
 }
 
-static void test_message_place(void **state)
+TEST(test_message_place)
 {
-    (void)state;
     check_message("one\ntwo three\n", 8, "a.yaml:2:5: error: bad word\ntwo three\n    ^\n");
     check_message("one", 0, "a.yaml:1:1: error: bad word\none\n^\n");
     check_message("one", 99, "a.yaml:1:4: error: bad word\none\n   ^\n");
@@ -61,18 +57,16 @@ static void test_message_place(void **state)
     check_message("\xEF\xBB\xBFone", 4, "a.yaml:1:2: error: bad word\none\n ^\n");
 }
 
-static void test_message_characters(void **state)
+TEST(test_message_characters)
 {
-    (void)state;
     check_message("\ta\tb", 3, "a.yaml:1:4: error: bad word\n\ta\tb\n\t \t^\n");
     check_message("\xC3\xA9\xE2\x98\x83x", 5, "a.yaml:1:3: error: bad word\n\xC3\xA9\xE2\x98\x83x\n  ^\n");
     check_message("\x1B[1m\xFF\xC2\x9Bx", 7, "a.yaml:1:7: error: bad word\n?[1m??x\n      ^\n");
     check_message("\xED\xA0\x80\xC0\xAF.", 5, "a.yaml:1:6: error: bad word\n?????.\n     ^\n");
 }
 
-static void test_message_long_line(void **state)
+TEST(test_message_long_line)
 {
-    (void)state;
     char line[1001];
     memset(line, 'a', 1000);
     line[1000] = '\0';
@@ -82,9 +76,8 @@ static void test_message_long_line(void **state)
     check_message(line, 0, expected);
 }
 
-static void test_message_without_place(void **state)
+TEST(test_message_without_place)
 {
-    (void)state;
     MessageList messages = {0};
     message_warning(&messages, "one\n%d\x1B", 2);
     message_error(&messages, "three");
@@ -97,9 +90,8 @@ static void test_message_without_place(void **state)
     assert_int_equal(messages.count, 0);
 }
 
-static void test_text(void **state)
+TEST(test_text)
 {
-    (void)state;
     Text text = {0};
     assert_string_equal(text_c(&text), "");
     text_append(&text, "ab\0c", 4);
@@ -112,9 +104,8 @@ static void test_text(void **state)
     assert_null(text.items);
 }
 
-static void test_text_quantities(void **state)
+TEST(test_text_quantities)
 {
-    (void)state;
     static const struct {
         double value;
         const char *size, *duration;
@@ -125,7 +116,7 @@ static void test_text_quantities(void **state)
         {7200, "7.0 KiB", "2 hours"},         {196e3, "191.4 KiB", "2 days"},
         {0x1p42, "4.0 TiB", "50903316 days"}, {0x1p80, "1099511627776.0 TiB", "1000000000 days"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         assert_string_equal(text_size(cases[i].value).text, cases[i].size);
         assert_string_equal(text_duration(cases[i].value).text, cases[i].duration);
     }
@@ -133,9 +124,8 @@ static void test_text_quantities(void **state)
     assert_string_equal(text_plural(1), "");
 }
 
-static void test_text_character_size(void **state)
+TEST(test_text_character_size)
 {
-    (void)state;
     assert_int_equal(text_character_size("a", 1), 1);
     assert_int_equal(text_character_size("\xC3\xA9", 2), 2);
     assert_int_equal(text_character_size("\xC3\xA9", 1), 0);
@@ -146,11 +136,10 @@ static void test_text_character_size(void **state)
     assert_int_equal(text_character_size("", 0), 0);
 }
 
-static void test_text_nearest(void **state)
+TEST(test_text_nearest)
 {
-    (void)state;
     const char *const known[] = {"radius", "center", "material", "color", "up", "angle"};
-    const size_t count = sizeof known / sizeof *known;
+    const size_t count = COUNT_OF(known);
     assert_string_equal(text_nearest("radios", known, count), "radius");
     assert_string_equal(text_nearest("centre", known, count), "center");
     assert_string_equal(text_nearest("colour", known, count), "color");
@@ -165,9 +154,8 @@ static void test_text_nearest(void **state)
     assert_null(text_nearest("radius", known, 0));
 }
 
-static void test_array(void **state)
+TEST(test_array)
 {
-    (void)state;
     struct {
         uint64_t *items;
         size_t count, capacity;
@@ -188,9 +176,8 @@ static void check_only_message(MessageList *messages, const char *expected)
     message_list_free(messages);
 }
 
-static void test_read_failures(void **state)
+TEST(test_read_failures)
 {
-    (void)state;
     MessageList messages = {0};
     Text text = {0};
     assert_false(text_read_file(&text, "nothing", &messages));
@@ -237,9 +224,8 @@ int fsync(int descriptor) // NOLINT(readability-inconsistent-declaration-paramet
     return -1;
 }
 
-static void test_output_commit(void **state)
+TEST(test_output_commit)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     mode_t mask = umask(027);
@@ -263,9 +249,8 @@ static void output_write_new(OutputFile *output, const char *path, MessageList *
     assert_true(output_write(output, "new", 3, messages));
 }
 
-static void test_output_replaces_what_a_link_leads_to(void **state)
+TEST(test_output_replaces_what_a_link_leads_to)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     file_write("real", "old");
@@ -284,9 +269,8 @@ static void test_output_replaces_what_a_link_leads_to(void **state)
 }
 
 // Relative to the folder of each link on the way.
-static void test_output_makes_what_a_link_leads_to(void **state)
+TEST(test_output_makes_what_a_link_leads_to)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     assert_int_equal(mkdir("folder", 0700), 0);
@@ -311,9 +295,8 @@ static void test_output_makes_what_a_link_leads_to(void **state)
     rmdir("folder");
 }
 
-static void test_output_where_there_are_no_modes(void **state)
+TEST(test_output_where_there_are_no_modes)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     file_write("new", "old");
@@ -327,9 +310,8 @@ static void test_output_where_there_are_no_modes(void **state)
     unlink("new");
 }
 
-static void test_output_finish(void **state)
+TEST(test_output_finish)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     file_write("kept", "old");
@@ -351,9 +333,8 @@ static void test_output_finish(void **state)
     unlink("kept");
 }
 
-static void test_output_failures(void **state)
+TEST(test_output_failures)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     assert_false(output_open(&output, "nowhere/new", &messages));
@@ -372,9 +353,8 @@ static void test_output_failures(void **state)
     assert_true(output_commit(&output, &messages));
 }
 
-static void test_output_abandon(void **state)
+TEST(test_output_abandon)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile output;
     file_write("kept", "old");
@@ -414,9 +394,8 @@ static void output_in_killed_process(KilledWhile killed_while)
 
 // A process that is killed while it writes leaves nothing if files need no name. Otherwise the next process
 // removes what it left, but not the files of a living process.
-static void test_output_of_killed_processes(void **state)
+TEST(test_output_of_killed_processes)
 {
-    (void)state;
     MessageList messages = {0};
     OutputFile living, output;
     file_write("kept", "old");
@@ -444,9 +423,8 @@ static void test_output_of_killed_processes(void **state)
 
 // A process that faults with a file half written exits with status 2, leaves the old file whole, and leaves
 // nothing next to it (otherwise the folder could not be removed at the end).
-static void test_fault_removes_the_temporary(void **state)
+TEST(test_fault_removes_the_temporary)
 {
-    (void)state;
     file_write("kept", "old");
     pid_t child = fork();
     assert_true(child >= 0);
@@ -465,9 +443,8 @@ static void test_fault_removes_the_temporary(void **state)
 }
 
 // A product that wraps would make an allocation that is too small.
-static void test_products_do_not_wrap(void **state)
+TEST(test_products_do_not_wrap)
 {
-    (void)state;
     assert_int_equal(memory_product(3, 5), 15);
     assert_int_equal(memory_product(0, SIZE_MAX), 0);
     assert_true(memory_product(SIZE_MAX / 2, 2) == SIZE_MAX - 1);
@@ -485,9 +462,8 @@ static void test_products_do_not_wrap(void **state)
 }
 
 // Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".
-static void test_hash(void **state)
+TEST(test_hash)
 {
-    (void)state;
     assert_true(hash_bytes(HASH_START, "", 0) == UINT64_C(0xcbf29ce484222325));
     assert_true(hash_bytes(HASH_START, "a", 1) == UINT64_C(0xaf63dc4c8601ec8c));
     assert_true(hash_bytes(HASH_START, "foobar", 6) == UINT64_C(0x85944171f73967e8));
@@ -495,9 +471,8 @@ static void test_hash(void **state)
 }
 
 // RFC 4648, section 10.
-static void test_base64(void **state)
+TEST(test_base64)
 {
-    (void)state;
     static const char *const cases[][2] = {
         {"", ""},
         {"f", "Zg=="},
@@ -508,7 +483,7 @@ static void test_base64(void **state)
         {"foobar", "Zm9vYmFy"},
         {"\xFB\xFF", "+/8="},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Text text = {0};
         base64_append(&text, (const uint8_t *)cases[i][0], strlen(cases[i][0]));
         Text bytes = {0};
@@ -530,9 +505,8 @@ static void stage_check(Stage *stage, const char *expected)
     text_free(&text);
 }
 
-static void test_stage(void **state)
+TEST(test_stage)
 {
-    (void)state;
     Stage *stage = stage_open(true);
     stage_check(stage, "");
     stage_begin(stage, "reading", "folder/a.obj", 200);

@@ -1,17 +1,14 @@
 // Tests that every text and number of written JSON reads back as it was, with its type.
 #include "host/base/fault.h"
 #include "host/base/json.h"
+#include "tests/check.h"
 #include "tests/child.h"
 
 #include <float.h>
 #include <jansson.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static char *json_printed(Json *json)
 {
@@ -46,9 +43,8 @@ static void check_key(const char *key, const char *expected)
     free(printed);
 }
 
-static void test_text_that_looks_like_something_else(void **state)
+TEST(test_text_that_looks_like_something_else)
 {
-    (void)state;
     check_text("yes", "\"yes\"");
     check_text("123", "\"123\"");
     check_text("-1.5e7", "\"-1.5e7\"");
@@ -66,9 +62,8 @@ static void test_text_that_looks_like_something_else(void **state)
     check_text("'a'", "\"'a'\"");
 }
 
-static void test_keys(void **state)
+TEST(test_keys)
 {
-    (void)state;
     check_key("123", "\"123\"");
     check_key("true", "\"true\"");
     check_key("", "\"\"");
@@ -77,18 +72,16 @@ static void test_keys(void **state)
     check_key("\xC3\xA9", "\"\xC3\xA9\"");
 }
 
-static void test_spaces(void **state)
+TEST(test_spaces)
 {
-    (void)state;
     check_text(" ", "\" \"");
     check_text("  a  b   ", "\"  a  b   \"");
     check_text(" 12 ", "\" 12 \"");
     check_text(" \"a", "\" \\\"a\"");
 }
 
-static void test_escapes(void **state)
+TEST(test_escapes)
 {
-    (void)state;
     check_text("a\"b\\c/", "\"a\\\"b\\\\c/\"");
     check_text("\n\t\r", "\"\\n\\t\\r\"");
     check_text("a\nb\n\n c\n", "\"a\\nb\\n\\n c\\n\"");
@@ -99,9 +92,8 @@ static void test_escapes(void **state)
 
 #define REPLACED "\xEF\xBF\xBD" // U+FFFD
 
-static void test_utf8(void **state)
+TEST(test_utf8)
 {
-    (void)state;
     check_text("\xC3\xA9\xE2\x98\x83", "\"\xC3\xA9\xE2\x98\x83\"");
     check_text("\xF0\x9F\x98\x80", "\"\xF0\x9F\x98\x80\"");
     check_text("\xEF\xB7\x90\xEF\xBF\xBF", "\"\xEF\xB7\x90\xEF\xBF\xBF\""); // noncharacters
@@ -112,9 +104,8 @@ static void test_utf8(void **state)
     check_text(" \xFF ", "\" " REPLACED " \"");
 }
 
-static void test_long_text_stays_on_its_line(void **state)
+TEST(test_long_text_stays_on_its_line)
 {
-    (void)state;
     char value[4001], expected[4003];
     for (size_t i = 0; i < 4000; i++)
         value[i] = i % 7 == 3 ? ' ' : 'a';
@@ -137,19 +128,17 @@ static double number_back(double value)
     return back;
 }
 
-static void test_numbers_read_back(void **state)
+TEST(test_numbers_read_back)
 {
-    (void)state;
     const double values[] = {0,    1,       0.1,     1.0 / 3,      1e20, 1e300, 123456789012345678.0,
                              1e-7, DBL_MAX, DBL_MIN, DBL_TRUE_MIN, -2.5, 5e-5,  16777217};
-    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
+    for (size_t i = 0; i < COUNT_OF(values); i++)
         assert_true(number_back(values[i]) == values[i]);
     assert_true(signbit(number_back(-0.0)));
 }
 
-static void test_number_words(void **state)
+TEST(test_number_words)
 {
-    (void)state;
     Json *json = json_open();
     json_begin_array(json, "all");
     json_number(json, NULL, 0.1);
@@ -187,9 +176,8 @@ static void test_number_words(void **state)
     free(printed);
 }
 
-static void test_nesting(void **state)
+TEST(test_nesting)
 {
-    (void)state;
     Json *json = json_open();
     json_begin_object(json, "empty");
     json_end(json);
@@ -225,9 +213,8 @@ static void test_nesting(void **state)
     free(printed);
 }
 
-static void test_deep_nesting(void **state)
+TEST(test_deep_nesting)
 {
-    (void)state;
     enum { DEPTH = 1000 };
     Json *json = json_open();
     json_begin_array(json, "deep");
@@ -262,9 +249,8 @@ static void text_write(void *left)
     *(long *)left = allocations_left;
 }
 
-static void test_without_memory(void **state)
+TEST(test_without_memory)
 {
-    (void)state;
     long left = 0, failed = 0;
     ChildEnd end = child_run(text_write, &left, sizeof left);
     for (; end.status != 0; failed++) {

@@ -3,23 +3,19 @@
 #include "host/base/fault.h"
 #include "host/measure/baseline.h"
 #include "host/measure/bench.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include <cmocka.h>
-
-static void test_quantiles(void **state)
+TEST(test_quantiles)
 {
-    (void)state;
     Series series = {0};
     assert_int_equal(series_summarize(&series).count, 0);
     const double values[] = {5, 1, 4, 2, 30};
@@ -62,9 +58,8 @@ static BenchTimes times_make(size_t runs, double rate)
     return times;
 }
 
-static void test_events_that_agree(void **state)
+TEST(test_events_that_agree)
 {
-    (void)state;
     BenchTimes times = times_make(30, 1.001);
     assert_null(bench_doubt(&times));
     assert_near(bench_kernel(&times).median, 0.030 * 1.001, 1e-12);
@@ -75,9 +70,8 @@ static void test_events_that_agree(void **state)
     bench_times_free(&times);
 }
 
-static void test_clock_that_drifts(void **state)
+TEST(test_clock_that_drifts)
 {
-    (void)state;
     BenchTimes times = times_make(30, 1.02);
     assert_non_null(bench_doubt(&times));
     assert_near(bench_kernel(&times).median, 0.030, 1e-12);
@@ -91,13 +85,12 @@ static void test_clock_that_drifts(void **state)
 }
 
 // The device's clock is not blamed if the host learns late of a launch. A clock that drifts is.
-static void test_stalled_launches(void **state)
+TEST(test_stalled_launches)
 {
-    (void)state;
     enum { LAUNCHES = 20 };
     static const double rates[] = {1, 1.009, 0.991, 1.02, 0.98};
     for (unsigned stalled = 0; stalled < 1u << 4; stalled++)
-        for (size_t i = 0; i < sizeof rates / sizeof *rates; i++) {
+        for (size_t i = 0; i < COUNT_OF(rates); i++) {
             BenchTimes times = {0};
             for (unsigned k = 0; k < LAUNCHES; k++) {
                 LaunchTime launch = launch_at(5 + 0.1 * k, 0.010, rates[i]);
@@ -111,9 +104,8 @@ static void test_stalled_launches(void **state)
 }
 
 // One event that cannot be trusted makes the whole row use the host's clock.
-static void test_event_without_times(void **state)
+TEST(test_event_without_times)
 {
-    (void)state;
     BenchTimes times = times_make(30, 1);
     LaunchTime zeros = {.host_seconds = 0.030, .host_start_seconds = 9};
     bench_add_launch(&times, &zeros);
@@ -140,9 +132,8 @@ static Verdict drift_verdict(bool is_cpu, int run_count, double part, double lau
     return drift.verdict;
 }
 
-static void test_drift(void **state)
+TEST(test_drift)
 {
-    (void)state;
     enum { RUNS = 90, FEW = 20 };
     for (int percent = 20; percent <= 80; percent += 20) {
         assert_int_equal(drift_verdict(false, RUNS, percent / 100.0, 1.2, 1), VERDICT_SLOWER);
@@ -155,9 +146,8 @@ static void test_drift(void **state)
     assert_int_equal(bench_drift(&(BenchTimes){0}, true, 1).verdict, VERDICT_UNDECIDED);
 }
 
-static void test_runs_that_scatter(void **state)
+TEST(test_runs_that_scatter)
 {
-    (void)state;
     BenchTimes times = {0};
     for (int i = 0; i < 40; i++) {
         LaunchTime launch = launch_at(i, i % 2 ? 0.010 : 0.011, 1);
@@ -178,9 +168,8 @@ static BenchRow row_make(void)
     return row;
 }
 
-static void test_figures(void **state)
+TEST(test_figures)
 {
-    (void)state;
     BenchRow row = row_make();
     assert_near(bench_rays_per_second(&row), (1200 + 100 + 200 + 1500) / 0.030, 1e-3);
     bench_row_free(&row);
@@ -228,9 +217,8 @@ static Baseline *baseline_of(const char *text, size_t *error_count)
 // The start of a report.
 #define BASELINE_HEAD "{\"schema\": 6, \"calibration\": {\"rounds\": 1048576}, "
 
-static void test_baseline(void **state)
+TEST(test_baseline)
 {
-    (void)state;
     size_t errors;
     Baseline *baseline =
         baseline_of("{\"schema\": 6, \"device\": {\"name\": \"d\"}, \"host\": {\"name\": \"h\"}, "
@@ -273,9 +261,8 @@ static void check_refused(const char *text)
     assert_int_equal(errors, 1);
 }
 
-static void test_broken_baselines(void **state)
+TEST(test_broken_baselines)
 {
-    (void)state;
     BenchRow row = row_make();
     const char *refused[] = {"",
                              "no json: [",
@@ -300,7 +287,7 @@ static void test_broken_baselines(void **state)
                              "{\"schema\": 6, \"runs\": [\"\n\"]}",
                              "{\"schema\": 6, \"runs\": [\"\\u0000\"]}",
                              "{\"schema\": 6, \"runs\": [\"\\uD800\"]}"};
-    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+    for (size_t i = 0; i < COUNT_OF(refused); i++)
         check_refused(refused[i]);
     // cut short anywhere
     char whole[] = BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1.5e0, 2]") "]}";
@@ -320,7 +307,7 @@ static void test_broken_baselines(void **state)
                            BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, -1e308]") "]}",
                            BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, \"2\"]") "]}",
                            BASELINE_HEAD "\"runs\": [" BASELINE_ROW(ROW_HASH, "[1, null]") "]}"};
-    for (size_t i = 0; i < sizeof empty / sizeof *empty; i++) {
+    for (size_t i = 0; i < COUNT_OF(empty); i++) {
         size_t errors;
         ReportTimes wall, processor;
         Baseline *baseline = baseline_of(empty[i], &errors);
@@ -340,9 +327,8 @@ static void baseline_read(void *left)
     *(long *)left = allocations_left;
 }
 
-static void test_baseline_without_memory(void **state)
+TEST(test_baseline_without_memory)
 {
-    (void)state;
     long left = 0, failed = 0;
     ChildEnd end = child_run(baseline_read, &left, sizeof left);
     for (; end.status != 0; failed++) {

@@ -1,15 +1,11 @@
 // Reflection, refraction, total reflection and light through glass: small images against the reference.
 // run_tests: sanitize-long-only
 #include "host/verify/reference_color.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { PIXELS_MAX = 64 * 48, BLURRED_COUNT = 12, OPEN_AT_MOST = 10 };
 
@@ -130,7 +126,7 @@ static Trial trials[] = {
            "  - sphere: {center: [0.5, 0.5, -4], radius: 0.75, material: red}\n",
      8},
 };
-enum { TRIAL_COUNT = sizeof trials / sizeof *trials };
+enum { TRIAL_COUNT = COUNT_OF(trials) };
 
 static double unit_roundoff(Precision precision)
 {

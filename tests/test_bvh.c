@@ -6,15 +6,11 @@
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 static Random random_state;
 
@@ -133,9 +129,8 @@ static void rays_fill(TraceRay *rays, size_t count, const Scene *scene)
     }
 }
 
-static void no_hit_depends_on_the_tree(void **state)
+TEST(no_hit_depends_on_the_tree)
 {
-    (void)state;
     static const struct {
         Precision precision;
         size_t few, many;
@@ -149,7 +144,7 @@ static void no_hit_depends_on_the_tree(void **state)
     TraceRay *rays = memory_allocate(most, sizeof *rays);
     TraceHit *on = memory_allocate(most, sizeof *on), *off = memory_allocate(most, sizeof *off);
     rays_fill(rays, most, &scene);
-    for (size_t run = 0; run < sizeof runs / sizeof *runs; run++) {
+    for (size_t run = 0; run < COUNT_OF(runs); run++) {
         if (!probe_has(runs[run].precision)) continue;
         size_t count = few_or_many(runs[run].few, runs[run].many), hit_count = 0, different = 0;
         trace(&scene, runs[run].precision, BVH_ON, rays, count, on);
@@ -198,7 +193,7 @@ static void rays_behind_fill(TraceRay *rays, const Scene *scene)
             if (goes_along) direction = vector_add(ahead, vector_scale(direction, 0.03));
             TraceRay *ray = &rays[packet * PACKET + lane];
             *ray = ray_of(vector_add(origin, random_cube_point(&random_state, 0.1)), direction);
-            ray->tmin = nears[random_bits(&random_state) % (looks_behind ? 3 : sizeof nears / sizeof *nears)];
+            ray->tmin = nears[random_bits(&random_state) % (looks_behind ? 3 : COUNT_OF(nears))];
             if (random_coin(&random_state)) ray->tmax = ray->tmin + random_between(&random_state, 1, 20);
         }
     }
@@ -221,9 +216,8 @@ static size_t hits_differ(const TraceRay *rays, const TraceHit *hits, const Trac
     return different;
 }
 
-static void rays_may_look_behind_their_start(void **state)
+TEST(rays_may_look_behind_their_start)
 {
-    (void)state;
     random_state.state = 7;
     Scene scene = random_scene(4000);
     const uint32_t plane = (uint32_t)scene.objects.count - 1;
@@ -235,7 +229,7 @@ static void rays_may_look_behind_their_start(void **state)
     const Precision precisions[] = {probe_same_bits_from(), PRECISION_DOUBLE};
     if (!probe_has(precisions[0])) skip();
     size_t different = 0, behind = 0, dimmed = 0;
-    for (size_t k = 0; k < sizeof precisions / sizeof *precisions; k++) {
+    for (size_t k = 0; k < COUNT_OF(precisions); k++) {
         if (!probe_has(precisions[k])) continue;
         trace(&scene, precisions[k], BVH_OFF, rays, COUNT, expected);
         for (size_t i = 0; i < COUNT; i++) {
@@ -348,9 +342,8 @@ static void rays_at_seams(TraceRay *rays, size_t count, const Mesh *mesh, Vector
     }
 }
 
-static void closed_meshes_do_not_leak(void **state)
+TEST(closed_meshes_do_not_leak)
 {
-    (void)state;
     static const Vector3 centers[] = {{0, 0, 0}, {148376, 1234, -223423}};
     static const double radii[] = {1, 2};
     random_state.state = 31;

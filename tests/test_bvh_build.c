@@ -5,15 +5,11 @@
 #include "host/compile/bvh_widen.h"
 #include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
+#include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 static Random random_state;
 
@@ -133,7 +129,7 @@ static void trees_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
 {
     static const BvhLeaves leaves[] = {{8, 0, false}, {4, 0, false},  {8, 4, false},
                                        {8, 4, true},  {8, 16, false}, {8, 16, true}};
-    for (size_t i = 0; i < sizeof leaves / sizeof *leaves; i++)
+    for (size_t i = 0; i < COUNT_OF(leaves); i++)
         tree_check(boxes, kinds, count, leaves[i]);
 }
 
@@ -173,9 +169,8 @@ static Bounds box_of_set(int set, size_t index, size_t count)
     }
 }
 
-static void any_boxes_make_a_tree(void **state)
+TEST(any_boxes_make_a_tree)
 {
-    (void)state;
     static const size_t counts[SET_COUNT] = {65536, 65536, 100001, 50000, 50000, 20000, 20000, 50000};
     for (int set = 0; set < SET_COUNT; set++) {
         size_t count = counts[set];
@@ -192,9 +187,8 @@ static void any_boxes_make_a_tree(void **state)
     }
 }
 
-static void few_boxes_make_a_tree(void **state)
+TEST(few_boxes_make_a_tree)
 {
-    (void)state;
     Bounds boxes[20];
     uint8_t kinds[20];
     for (size_t count = 1; count <= 20; count++) {
@@ -228,9 +222,8 @@ static CylinderLeaves cylinder_leaves(const Bounds *boxes, const uint8_t *kinds,
 }
 
 // Blocks of spheres barely change the leaves of the cylinders among them.
-static void blocks_keep_other_leaves(void **state)
+TEST(blocks_keep_other_leaves)
 {
-    (void)state;
     enum { COUNT = 8000 };
     static Bounds boxes[COUNT];
     static uint8_t kinds[COUNT];
@@ -251,15 +244,14 @@ static void blocks_keep_other_leaves(void **state)
 }
 
 // Next to a town of size 2, the slack of its boxes must not be that of a planet.
-static void planets_stay_outside_the_tree(void **state)
+TEST(planets_stay_outside_the_tree)
 {
-    (void)state;
     static const struct {
         double radii[2]; // of planets
         uint32_t in_tree;
     } skies[] = {{{0.5, 15.9}, 2}, {{0.5, 16.1}, 1}, {{17, 18}, 2}, {{17, 600}, 0}};
     enum { HOUSES = 30 };
-    for (size_t i = 0; i < sizeof skies / sizeof *skies; i++) {
+    for (size_t i = 0; i < COUNT_OF(skies); i++) {
         Text text = {0};
         text_appendf(&text, "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\nobjects:\n");
         for (size_t k = 0; k < 2; k++)
@@ -286,9 +278,8 @@ static void planets_stay_outside_the_tree(void **state)
 }
 
 // Triangles without area are points; here all are the same. They stay in the tree, and the planet out of it.
-static void points_make_a_tree(void **state)
+TEST(points_make_a_tree)
 {
-    (void)state;
     enum { POINTS = 100000 };
     Scene scene = scene_of_text("points.yaml", "camera: {position: [0, 1, -9], look_at: [0, 0, 0]}\n"
                                                "objects:\n"

@@ -5,12 +5,10 @@
 #include "host/view/camera_moves.h"
 #include "host/view/camera_yaml.h"
 #include "host/view/preview.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 static const ImageSize size = {640, 360};
 
@@ -42,9 +40,8 @@ static double distance_to(const Camera *camera, Vector3 point)
     return vector_length(vector_subtract(point, camera->position));
 }
 
-static void grabbed_point_stays_under_the_cursor(void **state)
+TEST(grabbed_point_stays_under_the_cursor)
 {
-    (void)state;
     static const double from[2] = {100, 50}, to[2] = {420, 333};
     for (int i = 0; i < 5; i++) {
         Camera start = camera_make((FieldAxis)(i % 2));
@@ -74,9 +71,8 @@ static void grabbed_point_stays_under_the_cursor(void **state)
     }
 }
 
-static void view_does_not_turn_over(void **state)
+TEST(view_does_not_turn_over)
 {
-    (void)state;
     const double one_degree = M_PI / 180;
     Camera camera = camera_make(FIELD_VERTICAL);
     Vector3 pivot = {1, 1, 1};
@@ -90,11 +86,10 @@ static void view_does_not_turn_over(void **state)
 }
 
 // A scene may look straight down, or have no `up`.
-static void useless_up_is_replaced(void **state)
+TEST(useless_up_is_replaced)
 {
-    (void)state;
     static const Vector3 ups[] = {{0, 0, 0}, {0, 1, 0}, {0, -3, 0}};
-    for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
+    for (size_t i = 0; i < COUNT_OF(ups); i++) {
         Camera camera = {.position = {0, 5, 0}, .up = ups[i], .half_tangent = 1};
         camera_orbit(&camera, camera.look_at, 0, -0.2);
         assert_number(vector_length(camera.position), 5);
@@ -102,9 +97,8 @@ static void useless_up_is_replaced(void **state)
     }
 }
 
-static void camera_turns_and_flies(void **state)
+TEST(camera_turns_and_flies)
 {
-    (void)state;
     Camera camera = {.look_at = {0, 0, 1}, .up = {0, 1, 0}, .half_tangent = 1};
     camera_fly(&camera, 2, 0, 0);
     assert_vector(camera.position, 0, 0, 2);
@@ -145,9 +139,8 @@ static void check_yaml(const Camera *camera)
     text_free(&text);
 }
 
-static void yaml_gives_the_same_camera(void **state)
+TEST(yaml_gives_the_same_camera)
 {
-    (void)state;
     Camera camera = camera_make(FIELD_HORIZONTAL);
     check_yaml(&camera);
     camera.field_axis = FIELD_VERTICAL;
@@ -219,9 +212,8 @@ static void check_recorded(const char *text, const char *expected)
     check_written(text, &(uint32_t){12}, expected);
 }
 
-static void camera_is_written_into_the_file(void **state)
+TEST(camera_is_written_into_the_file)
 {
-    (void)state;
     check_replaced(
         "# a scene\ncamera: {position: [9, 9, 9], fov: 30, look_at: [0,0,0] , up: [0, 1, 0]} # eye\n" REST,
         "# a scene\ncamera: {position: [1, 2.5, 3], fov: 30, look_at: [0, 0, 0.001] , "
@@ -251,9 +243,8 @@ static void camera_is_written_into_the_file(void **state)
     check_replaced("camera: {position: [1, 2, 3]\n", NULL);
 }
 
-static void camera_is_recorded_in_the_file(void **state)
+TEST(camera_is_recorded_in_the_file)
 {
-    (void)state;
     check_recorded( // its first keys; what stays constant stays
         "camera: {position: [9, 9, 9], fov: 30, look_at: [0, 0, 0], up: [0, 0, 1], turn: 0} # eye\n" REST,
         "camera: {position: {keys: {12: [1, 2.5, 3]}}, fov: 30, look_at: {keys: {12: [0, 0, 0.001]}}, "
@@ -302,9 +293,8 @@ static void check_pace(double move_seconds, double seconds_of_pixel, uint32_t ex
     assert_int_equal(divisor, expected);
 }
 
-static void coarse_frames_are_in_time(void **state)
+TEST(coarse_frames_are_in_time)
 {
-    (void)state;
     check_pace(0.0001, 1e-9, 1);
     check_pace(0.001, 1e-7, 2);
     check_pace(0.001, 1e-6, 4);
@@ -313,9 +303,8 @@ static void coarse_frames_are_in_time(void **state)
     check_pace(0.1, 1e-7, 16);
 }
 
-static void one_slow_frame_changes_nothing(void **state)
+TEST(one_slow_frame_changes_nothing)
 {
-    (void)state;
     Preview preview = {0};
     const uint32_t divisor = 2;
     const double pixels = (double)size.width / divisor * size.height / divisor;

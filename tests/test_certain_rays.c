@@ -1,17 +1,13 @@
 // Explicit rays at `certified`: what is certain agrees with exact arithmetic on the same doubles, whatever
 // the ray hits and wherever it starts.
 #include "host/verify/reference_scene.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/random_scene.h"
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 typedef struct {
     size_t certain, in_double, uncertain, hits;
@@ -57,9 +53,8 @@ static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
 }
 
 // From within the scene and from far away, in all directions, of any length.
-static void every_shape_is_certain(void **state)
+TEST(every_shape_is_certain)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { RAYS = 3000 };
     TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
@@ -89,9 +84,8 @@ static void every_shape_is_certain(void **state)
 
 // A bumpy sheet of triangles. Rays aim at its vertices, at its edges and, along the sheet, at its
 // silhouettes.
-static void mesh_edges_are_certain(void **state)
+TEST(mesh_edges_are_certain)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { SIDE = 12, RAYS = 4000 };
     Random random = {3};
@@ -128,9 +122,8 @@ static void mesh_edges_are_certain(void **state)
 
 // A plane through the origin and one across it. Rays start next to the origin, down to the least numbers, and
 // have directions of every length and ends next to their hits.
-static void least_and_largest_numbers(void **state)
+TEST(least_and_largest_numbers)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {.normal = {0, 1, 0}}},
                         {.kind = SHAPE_PLANE, .as.plane = {.normal = {1, 0, 0}}},
@@ -170,9 +163,8 @@ static void least_and_largest_numbers(void **state)
 
 // A sphere's tangent, a start on a sphere, and two coincident spheres are uncertain. Rays whose targets lie
 // behind them, and tiny directions, are certain.
-static void open_questions_are_uncertain(void **state)
+TEST(open_questions_are_uncertain)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     Object objects[] = {
         {.kind = SHAPE_SPHERE, .as.sphere = {.center = {0, 0, 5}, .radius = 1}},
@@ -191,7 +183,7 @@ static void open_questions_are_uncertain(void **state)
         {{0, 0, 0}, {0, 0, 0x1p-30}, true},   {{0, 0, -0x1p30}, {0, 0, 1}, true},
         {{0, 0, -0x1p230}, {0, 0, 1}, false}, {{1 + 1e-9, 0, 0}, {0, 0, 1}, true},
     };
-    enum { COUNT = sizeof questions / sizeof *questions };
+    enum { COUNT = COUNT_OF(questions) };
     TraceRay rays[COUNT];
     TraceHit hits[COUNT];
     for (size_t i = 0; i < COUNT; i++)

@@ -5,6 +5,7 @@
 // same holds for the images of the hard cases. The program takes a pattern of its tests' names.
 // run_tests: sanitize-long-only
 // run_tests: first
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "host/scene/object_transform.h"
@@ -351,36 +352,31 @@ static void check_family(Family family)
     assert_true(undecided_share < undecided_max[family]);
 }
 
-static void flat_shapes_are_decided(void **state)
+TEST(flat_shapes_are_decided)
 {
-    (void)state;
     check_family(FLAT);
 }
 
-static void round_shapes_are_decided(void **state)
+TEST(round_shapes_are_decided)
 {
-    (void)state;
     check_family(ROUND);
 }
 
-static void ovals_are_decided(void **state)
+TEST(ovals_are_decided)
 {
-    (void)state;
     check_family(OVALS);
 }
 
-static void planets_are_decided(void **state)
+TEST(planets_are_decided)
 {
-    (void)state;
     if (!tests_are_long()) skip(); // for its kernels' builds
     check_family(PLANETS);
 }
 
 // Planets and infinite cylinders in views so narrow that every ray skims their horizon, on devices whose
 // quotients and roots err as much as OpenCL permits.
-static void horizons_are_decided(void **state)
+TEST(horizons_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int count = tests_are_long() ? 1000 : 100;
     RenderSettings settings = small_settings(0);
@@ -409,9 +405,8 @@ static void horizons_are_decided(void **state)
     assert_int_equal(undecided, 0);
 }
 
-static void mirrors_glass_and_spots_are_decided(void **state)
+TEST(mirrors_glass_and_spots_are_decided)
 {
-    (void)state;
     if (!tests_are_long()) skip(); // its kernels also take long to build
     check_family(OPTICS);
 }
@@ -430,7 +425,7 @@ static Object oval_before_eye(Scene *scene, unsigned seed)
          .as.paraboloid = {.apex = from, .axis = axis, .focal_length = 0.2, .height = 1, .finite = true}},
         {.kind = SHAPE_TORUS, .as.torus = {.center = center, .axis = axis, .major = 0.7, .minor = 0.3}},
     };
-    Object object = objects[seed % (sizeof objects / sizeof *objects)];
+    Object object = objects[seed % COUNT_OF(objects)];
     const Vector3 n = random_unit_vector(&random_state),
                   w = vector_add(vector_scale(n, random_between(&random_state, -0.9, -0.5)),
                                  vector_scale(random_unit_vector(&random_state), 0.2));
@@ -441,9 +436,8 @@ static Object oval_before_eye(Scene *scene, unsigned seed)
 }
 
 // Lights in the tangent planes of what pixels see, off them by 10^-8 to 10^-5.5 of their distance.
-static void terminators_of_ovals_are_decided(void **state)
+TEST(terminators_of_ovals_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { LIGHTS = 16, TRIES = 1000 };
     size_t single_wrong = 0;
@@ -524,9 +518,8 @@ static bool case_print(void *context, const VerifyResult *result)
     return true;
 }
 
-static void hard_cases_are_decided(void **state)
+TEST(hard_cases_are_decided)
 {
-    (void)state;
     if (!tests_are_long() || !probe_has(PRECISION_CERTIFIED)) skip();
     Pictures pictures = {0};
     const VerifySettings settings = {
@@ -541,9 +534,8 @@ static void hard_cases_are_decided(void **state)
 
 // Bumps and hollows with smooth normals, lit from low and from behind: rays to lights start above some of
 // their triangles and pass over their edges.
-static void smooth_meshes_are_decided(void **state)
+TEST(smooth_meshes_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     size_t undecided = 0;
     const unsigned count = tests_are_long() ? 300 : 12;

@@ -4,6 +4,7 @@
 // names.
 //
 // run_tests: sanitize-long-only
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/scene/mesh.h"
 #include "tests/certified.h"
@@ -12,13 +13,12 @@
 
 // Lights that lie on a wall but for less than its distance is rounded by, and so far away that their squared
 // distance overflows; and a bright one that all but grazes the wall.
-static void lights_on_surfaces_are_decided(void **state)
+TEST(lights_on_surfaces_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const Object wall = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 0, 1}}};
     const double heights[] = {1e-5, 1e-7, 1e-9, 1e-12, 1e-15, 1e-20, 1e-30};
-    for (size_t i = 0; i < sizeof heights / sizeof *heights; i++) {
+    for (size_t i = 0; i < COUNT_OF(heights); i++) {
         Scene scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
         array_push(scene.objects, wall);
         point_light_add(&scene, (Vector3){0, 0, heights[i]}, 1);
@@ -41,9 +41,8 @@ static void lights_on_surfaces_are_decided(void **state)
 }
 
 // Checkers around an eye far from the origin, for their size: on walls, level and tilted, and on a box.
-static void checkers_far_out_are_decided(void **state)
+TEST(checkers_far_out_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     for (int digits = 3; digits < 13; digits += 2)
         for (unsigned form = 0; form < 3; form++) {
@@ -72,12 +71,11 @@ static void checkers_far_out_are_decided(void **state)
 
 // Mirrors and glass that leave so little of the light that a product of their parts underflows: no path ends
 // before it has all its bounces, and no shadow is full.
-static void faint_paths_are_decided(void **state)
+TEST(faint_paths_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const double parts[] = {0.5, 1e-3, 1e-20, 1e-50};
-    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+    for (size_t i = 0; i < COUNT_OF(parts); i++) {
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         scene.materials.items[0].reflection = parts[i];
         for (int side = -1; side <= 1; side += 2)
@@ -99,9 +97,8 @@ static void faint_paths_are_decided(void **state)
 
 // A plane whose normal is not a float, seen at angles that float cannot tell from 0: the horizon, and the way
 // on to another plane behind it, are double's.
-static void skimming_rays_are_decided(void **state)
+TEST(skimming_rays_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     for (int digits = 7; digits < 13; digits++) {
         const Vector3 normal = {0.1, 0.7, 0};
@@ -114,9 +111,8 @@ static void skimming_rays_are_decided(void **state)
 // Bubbles with walls of glass, some of them thinner than the distance at which rays through them start off a
 // surface, except at certified. `single` (in long tests also `strict`) shows walls above the bound that
 // docs/numerics.md states.
-static void thin_walls_are_decided(void **state)
+TEST(thin_walls_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const Vector3 center = {0.3, 0.2, -5};
     const double stated = 3 * 0x1p-24 * (16 * (1 + 5.5) + 4 * 6);
@@ -148,9 +144,8 @@ static void thin_walls_are_decided(void **state)
 
 // Triangles whose edges round to one line, though they have an area: strips across the view from corners far
 // away, and needles.
-static void needles_have_an_area(void **state)
+TEST(needles_have_an_area)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     for (int digits = 3; digits < 31; digits += 3) {
         const double far = pow(10, digits);
@@ -214,9 +209,8 @@ static Mesh ribbons_in_view(void)
 
 // Mirrors and glass of ribbons, and a checkered wall. As floats the vertices have other planes, which would
 // show other squares. An image and its AOVs take three samples per pixel.
-static void slim_triangles_are_seldom_repeated(void **state)
+TEST(slim_triangles_are_seldom_repeated)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { SIDE = 20 };
     for (unsigned seed = 0; seed < 2; seed++) {
@@ -253,9 +247,8 @@ static void slim_triangles_are_seldom_repeated(void **state)
 
 // A ball of 40,000 smooth triangles, with waves on it: single certifies most pixels, although rays to lights
 // start close to other triangles.
-static void fine_meshes_are_seldom_repeated(void **state)
+TEST(fine_meshes_are_seldom_repeated)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { AROUND = 200, DOWN = 100 };
     Mesh mesh = {.vertices = memory_allocate(AROUND * (DOWN + 1), sizeof *mesh.vertices),
@@ -317,9 +310,8 @@ static Object shape_of_size(unsigned form, double size)
 enum { FORMS = 8 };
 
 // Shapes from 1e-29 to 1e29 as seen from close by, alone and with one of another size in the same scene.
-static void mixed_sizes_are_decided(void **state)
+TEST(mixed_sizes_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int steps = tests_are_long() ? 10 : 2; // on either side of 1
     size_t undecided = 0, count = 0;

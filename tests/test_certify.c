@@ -1,14 +1,10 @@
 // Whole scenes as glint certify judges them: double and certified decide as the reference does, and the
 // reference raises no false alarms. tests/test_certify.py has the command. run_tests: sanitize-long-only
 #include "host/verify/certify.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { WIDTH = 96, HEIGHT = 64, PIXELS = WIDTH * HEIGHT };
 
@@ -42,9 +38,8 @@ static size_t wrong_pixels(const CertifyErrors *errors)
 }
 
 // Scenes of every shape, light and kind of bounce. The largest error of double is 3e-12.
-static void the_best_precision_is_right(void **state)
+TEST(the_best_precision_is_right)
 {
-    (void)state;
     const bool has_double = probe_has(PRECISION_DOUBLE);
     const char *const paths[] = {"scenes/demo.yaml", "scenes/mirror-glass.yaml", "scenes/paraboloids.yaml",
                                  "scenes/triangles.yaml"};
@@ -60,9 +55,8 @@ static void the_best_precision_is_right(void **state)
 }
 
 // By a smooth triangle's normals the reflected ray would run through it, and a light behind it shine on it.
-static void tilted_normals_are_decided(void **state)
+TEST(tilted_normals_are_decided)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
     Scene scene = scene_of_text(
         "tilted.yaml",
@@ -81,9 +75,8 @@ static void tilted_normals_are_decided(void **state)
 }
 
 // Spheres around the zenith, the nadir and the seam, and shapes in all directions.
-static void panoramas_are_right(void **state)
+TEST(panoramas_are_right)
 {
-    (void)state;
     const bool has_double = probe_has(PRECISION_DOUBLE);
     Scene scene = scene_of_text(
         "panorama.yaml",
@@ -106,9 +99,8 @@ static void panoramas_are_right(void **state)
 }
 
 // The reference knows the ambient light that is the mean of a sky's image.
-static void skies_light_the_reference(void **state)
+TEST(skies_light_the_reference)
 {
-    (void)state;
     Scene scene = scene_of_text("sky.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
                                             "background: {image: scenes/images/globe.png, intensity: 0.7}\n"
                                             "lights: [{directional: {direction: [1, -1, 2]}}]\n"
@@ -129,9 +121,8 @@ static void colors_compare(const Scene *scene, uint32_t scale)
 }
 
 // They are as exact as those of single, even at the edges of round shapes.
-static void colors_of_certified_are_exact(void **state)
+TEST(colors_of_certified_are_exact)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
     Scene scene = scene_of_file("scenes/article.yaml");
     if (tests_are_long()) colors_compare(&scene, 6);
@@ -144,9 +135,8 @@ static void colors_of_certified_are_exact(void **state)
 // A camera whose vectors rounding turns by a ten-thousandth, a blocker just before a light, and glass just
 // above a floor. The reference starts from the vectors of double, and neither skips nor joins surfaces that
 // are close to each other.
-static void there_are_no_false_alarms(void **state)
+TEST(there_are_no_false_alarms)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
     Scene scene = scene_of_text(
         "near.yaml",

@@ -4,15 +4,11 @@
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/render/renderer.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/film.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 enum { COLUMN = 7, ROW = 5 };
 
@@ -67,7 +63,7 @@ static void certify(void *context)
         wrong.change < THE_CHECKER ? "scenes/spheres16.yaml" : "tests/scenes/mirrored-floor.yaml";
     const char *const texts[] = {"certify", scene,         "--size",        "12x8",  "--pixels",
                                  "96",      "--precision", wrong.precision, "--json"};
-    enum { COUNT = sizeof texts / sizeof *texts };
+    enum { COUNT = COUNT_OF(texts) };
     char *arguments[COUNT + 1] = {NULL};
     for (int i = 0; i < COUNT; i++)
         arguments[i] = memory_copy_text(texts[i]);
@@ -77,9 +73,8 @@ static void certify(void *context)
     exit(status);
 }
 
-static void test_status(void **state)
+TEST(test_status)
 {
-    (void)state;
     const Case fails[] = {{"single,certified", AN_OBJECT, 0}, {"certified", A_COLOR, 0}};
     const Case mirrored[] = {{"certified", THE_CHECKER, 0}, {"certified", A_SHADOW, 0}};
     const Case passing[] = {{"certified", AN_OBJECT, DOUBT_UNDECIDED}, // it says so itself
@@ -92,20 +87,20 @@ static void test_status(void **state)
         print_message("%s", first.errors);
         skip();
     }
-    for (size_t i = 0; i < sizeof fails / sizeof *fails; i++) {
+    for (size_t i = 0; i < COUNT_OF(fails); i++) {
         one = fails[i];
         const ChildEnd end = child_run(certify, &one, sizeof one);
         assert_int_equal(end.status, EXIT_CHECK);
         assert_non_null(strstr(end.errors, "glint certify: certified is wrong at 1 "));
         assert_non_null(strstr(end.errors, " at 7,5:"));
     }
-    for (size_t i = 0; i < sizeof mirrored / sizeof *mirrored; i++) {
+    for (size_t i = 0; i < COUNT_OF(mirrored); i++) {
         one = mirrored[i];
         const ChildEnd end = child_run(certify, &one, sizeof one);
         assert_int_equal(end.status, EXIT_CHECK);
         assert_non_null(strstr(end.errors, "glint certify: certified is wrong at "));
     }
-    for (size_t i = 0; i < sizeof passing / sizeof *passing; i++) {
+    for (size_t i = 0; i < COUNT_OF(passing); i++) {
         one = passing[i];
         assert_int_equal(child_run(certify, &one, sizeof one).status, EXIT_DONE);
     }

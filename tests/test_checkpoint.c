@@ -3,15 +3,13 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/render/scheduler.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include <errno.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 enum { WIDTH = 5, ROWS = 12, BAND_ROWS = 4, BANDS = ROWS / BAND_ROWS, COLOR_VALUES = BAND_ROWS * WIDTH * 3 };
 static const char key[] = "size: 5x12\nscene: 1234\n";
@@ -118,9 +116,8 @@ static size_t file_size(void)
     return (size_t)status.st_size;
 }
 
-static void test_bands_are_read_again(void **state)
+TEST(test_bands_are_read_again)
 {
-    (void)state;
     Text bytes = file_make();
     Checkpoint *checkpoint = open_checked();
     assert_int_equal(band_count(checkpoint), BANDS);
@@ -132,9 +129,8 @@ static void test_bands_are_read_again(void **state)
 }
 
 // If the file is cut off at any byte, it has the bands before that byte, and a render resumes from them.
-static void test_torn_writes(void **state)
+TEST(test_torn_writes)
 {
-    (void)state;
     Text bytes = file_make();
     size_t header_size, kept = 0;
     unlink(path);
@@ -159,9 +155,8 @@ static void test_torn_writes(void **state)
 }
 
 // A wrong byte ends the bands that are used.
-static void test_wrong_bytes(void **state)
+TEST(test_wrong_bytes)
 {
-    (void)state;
     Text bytes = file_make();
     unlink(path);
     close_checked(open_checked(), false);
@@ -185,9 +180,8 @@ static void append_film(const Film *band)
 }
 
 // Whole records that do not fit the image are not used.
-static void test_other_sizes(void **state)
+TEST(test_other_sizes)
 {
-    (void)state;
     Values values;
     const Film right = band_make(&values, ROWS - BAND_ROWS);
     for (int i = 0; i < 8; i++) {
@@ -233,9 +227,8 @@ static void refused(const char *other_key, const char *reason)
     text_free(&after);
 }
 
-static void test_refusals(void **state)
+TEST(test_refusals)
 {
-    (void)state;
     Text bytes = file_make();
     unlink(path);
     close_checked(open_checked(), false);
@@ -268,9 +261,8 @@ static void test_refusals(void **state)
 }
 
 // A symbolic link stays. The file behind it is removed, and the next render creates it.
-static void test_symbolic_links(void **state)
+TEST(test_symbolic_links)
 {
-    (void)state;
     char file[80];
     snprintf(file, sizeof file, "%s-file", path);
     unlink(path);
@@ -298,9 +290,8 @@ int __wrap_unlink(const char *name)
     return removal_fails ? -1 : __real_unlink(name);
 }
 
-static void test_a_file_that_stays(void **state)
+TEST(test_a_file_that_stays)
 {
-    (void)state;
     Checkpoint *checkpoint = open_checked();
     MessageList messages = {0};
     removal_fails = true;
@@ -325,9 +316,8 @@ int __wrap_flock(int descriptor, int operation)
     return __real_flock(descriptor, operation);
 }
 
-static void test_a_file_removed_before_the_lock(void **state)
+TEST(test_a_file_removed_before_the_lock)
 {
-    (void)state;
     unlink(path);
     file_is_removed = true;
     Checkpoint *checkpoint = open_checked();
@@ -357,9 +347,8 @@ static bool band_sink(void *context, const Film *band, double fraction_done)
 }
 
 // Only missing bands are handed out; all reach the sink in order.
-static void test_a_render_resumes(void **state)
+TEST(test_a_render_resumes)
 {
-    (void)state;
     for (unsigned done = 0; done < 1 << BANDS; done++) {
         unlink(path);
         Checkpoint *checkpoint = open_checked();

@@ -3,18 +3,15 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/failing/calls.h"
 #include "tests/files.h"
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 typedef struct {
     int (*run)(int argument_count, char **arguments);
@@ -60,9 +57,8 @@ static void assert_prints(const ChildEnd *end, const char *expected)
     assert_non_null(strstr(end->errors, expected));
 }
 
-static void test_commands(void **state)
+TEST(test_commands)
 {
-    (void)state;
     static const Command commands[] = {
         {command_render, {"render", "scenes/spheres16.yaml", "--size", "8x8", "-o", "/dev/null/none.png"}},
         {command_trace, {"trace", "scenes/spheres16.yaml", "--rays", "/dev/null"}},
@@ -71,8 +67,8 @@ static void test_commands(void **state)
         {command_verify, {"verify", "P1"}},
     };
     static const char *const calls[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer"};
-    for (size_t i = 0; i < sizeof commands / sizeof *commands; i++)
-        for (size_t k = 0; k < sizeof calls / sizeof *calls; k++) {
+    for (size_t i = 0; i < COUNT_OF(commands); i++)
+        for (size_t k = 0; k < COUNT_OF(calls); k++) {
             Command command = commands[i];
             failing_call = calls[k];
             ChildEnd end = child_run(command_fail, &command, sizeof command);
@@ -97,9 +93,8 @@ static void assert_same_bytes(const char *one, const char *other)
 
 // If one of two devices fails, or the scene does not fit it, there is a warning and the same image. If both
 // fail, or the scene does not fit a device that was named, there is an error.
-static void test_several_devices(void **state)
+TEST(test_several_devices)
 {
-    (void)state;
     static const char pocl[] = "/etc/OpenCL/vendors/pocl.icd";
     if (access(pocl, R_OK) != 0) skip();
     char one[] = "/tmp/glint-test-XXXXXX.npy", other[] = "/tmp/glint-test-XXXXXX.npy";
@@ -122,7 +117,7 @@ static void test_several_devices(void **state)
          "\nglint: ", "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES (-5) on ", EXIT_MACHINE, false},
         {NULL, 0, "0,1", "/dev/null/none.npy", "glint: error: ", "the scene needs ", EXIT_USER, true}};
     driver_folder = pocl;
-    for (size_t i = 0; i < sizeof runs / sizeof *runs; i++) {
+    for (size_t i = 0; i < COUNT_OF(runs); i++) {
         Command command = {command_render,
                            {"render", "scenes/spheres16.yaml", "--size", "64x48", "--device", runs[i].devices,
                             "-o", runs[i].file}};
@@ -144,9 +139,8 @@ static void test_several_devices(void **state)
 }
 
 // An image that is complete is written whatever a release says.
-static void test_release_after_the_output(void **state)
+TEST(test_release_after_the_output)
 {
-    (void)state;
     char path[] = "/tmp/glint-test-XXXXXX.png";
     assert_true(close(mkstemps(path, 4)) == 0);
     Command command = {command_render,
@@ -162,9 +156,8 @@ static void test_release_after_the_output(void **state)
 }
 
 // A driver that crashes is named with its call; when the output is complete it is a warning.
-static void test_crashes(void **state)
+TEST(test_crashes)
 {
-    (void)state;
 #ifdef __SANITIZE_ADDRESS__
     skip(); // sanitizers handle crashes
 #else
@@ -174,8 +167,8 @@ static void test_crashes(void **state)
     char folder[] = "/tmp/glint-test-XXXXXX";
     assert_non_null(mkdtemp(folder));
     crash_folder = folder; // an empty cache: no program comes from it
-    for (size_t i = 0; i < sizeof calls / sizeof *calls; i++)
-        for (size_t k = 0; k < sizeof crashes / sizeof *crashes; k++) {
+    for (size_t i = 0; i < COUNT_OF(calls); i++)
+        for (size_t k = 0; k < COUNT_OF(crashes); k++) {
             bool is_complete = i == 3;
             char path[] = "/tmp/glint-test-XXXXXX.png", expected[80];
             assert_true(close(mkstemps(path, 4)) == 0);

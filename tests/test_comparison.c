@@ -3,14 +3,11 @@
 // run is the same.
 #include "host/compile/random_shape.h"
 #include "host/measure/comparison.h"
+#include "tests/check.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
-
-#include <cmocka.h>
 
 static Random generator;
 
@@ -114,9 +111,8 @@ static Verdict reports_simulate(Machine old_machine, Machine new_machine, double
 }
 
 // The estimate of a report with few runs is that of their medians, and undecided.
-static void test_reports_of_few_runs(void **state)
+TEST(test_reports_of_few_runs)
 {
-    (void)state;
     Series old_frame = {0}, new_frame = {0}, calibration = {0};
     for (int i = 0; i < 5; i++) {
         series_add(&old_frame, 0.010 + 0.001 * i);
@@ -181,9 +177,8 @@ static void counts_print(const char *what, Counts counts)
 enum { TRIES = 1000 };
 
 // False alarms are at most 1 % whatever the machine.
-static void test_same_build_against_itself(void **state)
+TEST(test_same_build_against_itself)
 {
-    (void)state;
     const Machine *machines[] = {&quiet, &busy, &hopeless};
     for (int i = 0; i < 3; i++) {
         Counts counts = against_count(*machines[i], 1, TRIES);
@@ -194,9 +189,8 @@ static void test_same_build_against_itself(void **state)
     }
 }
 
-static void test_slower_build_is_found(void **state)
+TEST(test_slower_build_is_found)
 {
-    (void)state;
     Counts slower = against_count(quiet, 1.05, TRIES), faster = against_count(quiet, 1 / 1.05, TRIES),
            noisy = against_count(busy, 1.05, TRIES);
     counts_print("5 % slower, quiet", slower);
@@ -209,9 +203,8 @@ static void test_slower_build_is_found(void **state)
 }
 
 // One report on a quiet machine, one on a busy or slower one: no false alarm, but no claim either.
-static void test_reports_of_one_build(void **state)
+TEST(test_reports_of_one_build)
 {
-    (void)state;
     Machine slow = quiet, thermal = quiet;
     slow.speed = log(1.4);
     thermal.drift = 0.002;
@@ -223,7 +216,7 @@ static void test_reports_of_one_build(void **state)
         {"reports: busy, quiet", &busy, &quiet},        {"reports: busy, busy", &busy, &busy},
         {"reports: quiet, 1.4 as slow", &quiet, &slow}, {"reports: drift, drift", &thermal, &thermal},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Counts counts = reports_count(*cases[i].old, *cases[i].new, 1, TRIES);
         counts_print(cases[i].what, counts);
         assert_true(counts.of[VERDICT_SLOWER] + counts.of[VERDICT_FASTER] <= TRIES / 100);
@@ -231,18 +224,16 @@ static void test_reports_of_one_build(void **state)
     }
 }
 
-static void test_reports_of_a_slower_build(void **state)
+TEST(test_reports_of_a_slower_build)
 {
-    (void)state;
     Counts counts = reports_count(quiet, quiet, 1.2, TRIES);
     counts_print("reports: quiet, 20 % slower", counts);
     assert_true(counts.of[VERDICT_SLOWER] >= TRIES * 99 / 100);
 }
 
 // Rows of one process tie unless one is slower, and no few runs tell.
-static void test_rows_of_one_process(void **state)
+TEST(test_rows_of_one_process)
 {
-    (void)state;
     const struct {
         const char *what;
         const Machine *machine;
@@ -258,7 +249,7 @@ static void test_rows_of_one_process(void **state)
         {"rows: twice as slow, 7 rounds", &quiet, 2, 7, 0, 0},
         {"rows: twice as slow, 8 rounds", &quiet, 2, 8, TRIES * 99 / 100, TRIES},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Counts counts = {{0}};
         generator.state = 1;
         for (int k = 0; k < TRIES; k++)
@@ -271,9 +262,8 @@ static void test_rows_of_one_process(void **state)
 }
 
 // Worked out by hand: the ends are the order statistics that the binomial distribution gives.
-static void test_rows(void **state)
+TEST(test_rows)
 {
-    (void)state;
     static const struct {
         Verdict frame, processor, row;
     } rows[] = {
@@ -288,13 +278,12 @@ static void test_rows(void **state)
         {VERDICT_FASTER, VERDICT_UNDECIDED, VERDICT_UNDECIDED},
         {VERDICT_SAME, VERDICT_UNDECIDED, VERDICT_SAME},
     };
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++)
+    for (size_t i = 0; i < COUNT_OF(rows); i++)
         assert_int_equal(verdict_of_row(rows[i].frame, rows[i].processor), rows[i].row);
 }
 
-static void test_intervals(void **state)
+TEST(test_intervals)
 {
-    (void)state;
     // 2 / 2^9 <= 0.01 / 2 < 2 / 2^8, and each further look takes twice as many
     assert_int_equal(comparison_pairs_at_look(0, 1), 9);
     assert_int_equal(comparison_pairs_at_look(2, 1), 36);

@@ -2,14 +2,10 @@
 // tested for an opaque surface at the same point, so the box must contain all such points and should contain
 // little else.
 #include "host/compile/compile.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define STAGE                                                                                                \
     "camera: {position: [0, 0, 0], look_at: [0, 0, -1]}\n"                                                   \
@@ -97,7 +93,7 @@ static Trial trials[] = {
      {-1, -1, -5},
      {1, 1, -3}},
 };
-enum { TRIAL_COUNT = sizeof trials / sizeof *trials };
+enum { TRIAL_COUNT = COUNT_OF(trials) };
 
 static Bounds contact_of(const Scene *scene)
 {
@@ -143,9 +139,8 @@ static void holds_where_they_touch(void **state)
 }
 
 // With enough pairs, all opaque objects count as one box, and if many are unbounded, as everywhere.
-static void many_pairs_hold_as_much(void **state)
+TEST(many_pairs_hold_as_much)
 {
-    (void)state;
     enum { SPHERE_COUNT = 1500 };
     for (int unbounded = 0; unbounded <= 1; unbounded++) {
         Text text = {0};

@@ -4,14 +4,10 @@
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/stages.h"
+#include "tests/check.h"
 #include "tests/probe.h"
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { SPHERES_PER_ORIGIN = 4096, ORIGIN_COUNT = 64, SPHERE_COUNT = SPHERES_PER_ORIGIN * ORIGIN_COUNT };
 

@@ -2,19 +2,14 @@
 #include "host/base/hash.h"
 #include "host/scene/daylight.h"
 #include "host/scene/portable.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 
-#include <cmocka.h>
-
-static void test_days(void **state)
+TEST(test_days)
 {
-    (void)state;
     assert_true(days_from_epoch(2000, 1, 1) == -0.5);
     // Meeus, Astronomical algorithms, 1998, chapter 7: Julian days of examples
     assert_true(days_from_epoch(1957, 10, 4) == 2436115.5 - 2451545);
@@ -31,9 +26,8 @@ static void check_sun(double latitude, double longitude, double days, double ele
 }
 
 // Published places of the sun, with refraction.
-static void test_sun_position(void **state)
+TEST(test_sun_position)
 {
-    (void)state;
     // Reda, Andreas, Solar position algorithm for solar radiation applications, NREL/TP-560-34302, 2008, A.5
     const double reda = days_from_epoch(2003, 10, 17) + (19 + 30.5 / 60) / 24;
     check_sun(39.742476, -105.1786, reda, 90 - 50.11162, 194.34024);
@@ -45,9 +39,8 @@ static void test_sun_position(void **state)
     assert_near(pole.elevation, 29 / 60.0, 0.03);
 }
 
-static void test_exponential(void **state)
+TEST(test_exponential)
 {
-    (void)state;
     for (int i = -2000; i <= 2000; i++) {
         const double value = i * 0.35;
         const long double exact = expl((long double)value);
@@ -56,9 +49,8 @@ static void test_exponential(void **state)
     assert_true(portable_exponential(0) == 1 && portable_exponential(-1e9) == 0);
 }
 
-static void test_sun_color(void **state)
+TEST(test_sun_color)
 {
-    (void)state;
     Color before = sun_color(90, 3);
     assert_true(vector_largest(before) > 1 && vector_largest(before) < 1.3);
     for (int elevation = 89; elevation >= 0; elevation--) {
@@ -77,9 +69,8 @@ static const float *texel_at(const Image *image, uint32_t x, uint32_t y)
     return image->values + 3 * ((size_t)y * image->width + x);
 }
 
-static void test_sky(void **state)
+TEST(test_sky)
 {
-    (void)state;
     uint64_t hash = HASH_START;
     static const double elevations[] = {90, 20, 3, -6};
     for (int turbidity = (int)TURBIDITY_MIN; turbidity <= (int)TURBIDITY_MAX; turbidity += 8)
@@ -109,9 +100,8 @@ static void check_texel(const Image *image, uint32_t x, uint32_t y, double red, 
 }
 
 // Expected is what the model's formulas give in numpy.
-static void test_sky_values(void **state)
+TEST(test_sky_values)
 {
-    (void)state;
     Image noon = daylight_image(60, 4.5, vector_all(0)), evening = daylight_image(3, 4.5, vector_all(0));
     check_texel(&noon, 255, 0, 0.369279, 0.532920, 0.907717);
     check_texel(&noon, 300, 60, 0.546172, 0.690949, 1.037275);
@@ -122,9 +112,8 @@ static void test_sky_values(void **state)
 }
 
 // The brightest texel above the horizon is the sun's, or the one next to it.
-static void test_sky_is_brightest_at_the_sun(void **state)
+TEST(test_sky_is_brightest_at_the_sun)
 {
-    (void)state;
     static const double elevations[] = {60, 20, 3};
     for (size_t i = 0; i < 3; i++) {
         Image image = daylight_image(elevations[i], 3, vector_all(0));
@@ -147,9 +136,8 @@ static double redness(double elevation, uint32_t degrees)
     return red;
 }
 
-static void test_sky_colors(void **state)
+TEST(test_sky_colors)
 {
-    (void)state;
     assert_true(redness(3, 1) > 3 && redness(3, 1) > 2 * redness(20, 1) && redness(20, 1) > redness(60, 1));
     assert_true(redness(60, 45) < 0.8); // blue at noon
     // a sun that sets and dusk are continuous, and night is dark
@@ -174,9 +162,8 @@ static Scene scene_of_background(const char *background)
 }
 
 // What the file says reaches the light, the image and the ambient light.
-static void test_scene(void **state)
+TEST(test_scene)
 {
-    (void)state;
     Scene scene = scene_of_background("{sun: {elevation: 30, azimuth: 90}, intensity: 2, turbidity: 5}");
     assert_int_equal(scene.lights.count, 1);
     const Color color = vector_scale(sun_color(30, 5), 2);
@@ -213,9 +200,8 @@ static void test_scene(void **state)
 }
 
 // Seen from above, with north at the top, the shadow of a post points away from the sun.
-static void test_shadow(void **state)
+TEST(test_shadow)
 {
-    (void)state;
     Scene scene = scene_of_text(
         "post.yaml", "camera: {position: [0, 40, 0], look_at: [0, 0, 0], up: [0, 0, -1], fov: 12}\n"
                      "background: {sun: {elevation: 30, azimuth: 60}}\n"

@@ -1,16 +1,13 @@
 // Two devices render one image, and one or both fail, at each call of the first band in turn. The image is
 // whole if one device is left, and the failure is reported.
 // run_tests: sanitized
+#include "tests/check.h"
 #include "tests/failing/calls.h"
 #include "tests/failing/work.h"
 #include <pthread.h>
 #include <semaphore.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 // Two renderers, as on two devices, of which the second renders in a thread. Each waits until the other has
 // taken a band, or the second has failed.
@@ -77,9 +74,8 @@ static void pair_close(Compute computes[2])
 }
 
 // One of two devices fails, at each call of its first band in turn. The other renders the whole image.
-static void test_one_of_two_devices(void **state)
+TEST(test_one_of_two_devices)
 {
-    (void)state;
     static const char *const needed[] = {
         "clCreateBuffer",     "clSetKernelArg", "clEnqueueWriteBuffer",   "clEnqueueReadBuffer",
         "clEnqueueMapBuffer", "clGetEventInfo", "clEnqueueNDRangeKernel", "clWaitForEvents"};
@@ -94,7 +90,7 @@ static void test_one_of_two_devices(void **state)
     pair_close(computes);
     CallCount all[CALL_COUNTS];
     memcpy(all, call_counts, sizeof all);
-    for (size_t i = 0; i < sizeof needed / sizeof *needed; i++) {
+    for (size_t i = 0; i < COUNT_OF(needed); i++) {
         size_t count = 0;
         for (size_t k = 0; all[k].call; k++)
             if (strcmp(all[k].call, needed[i]) == 0) count = all[k].count;
@@ -117,9 +113,8 @@ static void test_one_of_two_devices(void **state)
 }
 
 // The second device gets no thread: the first renders the whole image.
-static void test_a_device_without_a_thread(void **state)
+TEST(test_a_device_without_a_thread)
 {
-    (void)state;
     Compute computes[2];
     Answer answer;
     injected.call = "pthread_create";
@@ -134,9 +129,8 @@ static void test_a_device_without_a_thread(void **state)
     pair_close(computes);
 }
 
-static void test_both_of_two_devices(void **state)
+TEST(test_both_of_two_devices)
 {
-    (void)state;
     Compute computes[2];
     Answer answer;
     injected.call = "clEnqueueNDRangeKernel";

@@ -1,13 +1,12 @@
 // Writes and reads images: every format's round trip, notes, and failures that leave the old file unchanged.
 #include "host/base/text.h"
 #include "host/image/image.h"
+#include "tests/check.h"
 #include "tests/files.h"
 
 #include <math.h>
 #include <openexr.h>
 #include <png.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,8 +14,6 @@
 #include <sys/stat.h>
 #include <turbojpeg.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 static const ImageNote notes[] = {{"Software", "glint 1"}, {"Scene", "caf\xC3\xA9.yaml"}, {NULL, NULL}};
 
@@ -82,9 +79,8 @@ static void check_display_round_trip(const char *path, uint32_t channels, Transf
     free(values);
 }
 
-static void test_display_formats(void **state)
+TEST(test_display_formats)
 {
-    (void)state;
     const char *const paths[] = {"a.png", "a.ppm"};
     for (size_t i = 0; i < 2; i++) {
         for (uint32_t channels = 1; channels <= 3; channels += 2) {
@@ -115,9 +111,8 @@ static void check_float_round_trip(const char *path, uint32_t channels)
     free(values);
 }
 
-static void test_float_formats(void **state)
+TEST(test_float_formats)
 {
-    (void)state;
     check_float_round_trip("a.exr", 1);
     check_float_round_trip("a.exr", 3);
     check_float_round_trip("a.npy", 1);
@@ -126,9 +121,8 @@ static void test_float_formats(void **state)
 }
 
 // The library reads ahead of a header, so a file shorter than that must be read as whole.
-static void test_small_exr(void **state)
+TEST(test_small_exr)
 {
-    (void)state;
     const float value = 0.375F;
     ImageHeader header = {IMAGE_EXR, 1, 1, 1, TRANSFER_SRGB, 8, 'f', NULL};
     image_write_file("small.exr", &header, &value, sizeof value);
@@ -137,9 +131,8 @@ static void test_small_exr(void **state)
     image_free(&image);
 }
 
-static void test_npy_types(void **state)
+TEST(test_npy_types)
 {
-    (void)state;
     const uint32_t integers[] = {0, 1, 7, 16777217, 4294967295U, 5};
     ImageHeader header = {IMAGE_NPY, 3, 2, 1, TRANSFER_NONE, 8, 'u', NULL};
     image_write_file("u.npy", &header, integers, sizeof *integers);
@@ -158,9 +151,8 @@ static void test_npy_types(void **state)
     image_free(&image);
 }
 
-static void test_doubles_keep_their_bits(void **state)
+TEST(test_doubles_keep_their_bits)
 {
-    (void)state;
     const double doubles[] = {1.0 / 3, 1 + 1e-15, 5e-324};
     const float floats[] = {1.0F / 3, 1, 0.5F};
     ImageHeader header = {IMAGE_NPY, 3, 1, 1, TRANSFER_NONE, 8, 'd', notes};
@@ -175,9 +167,8 @@ static void test_doubles_keep_their_bits(void **state)
     }
 }
 
-static void test_npy_bytes(void **state)
+TEST(test_npy_bytes)
 {
-    (void)state;
     const float value = 1.5F;
     ImageHeader header = {IMAGE_NPY, 1, 1, 1, TRANSFER_NONE, 8, 'f', NULL};
     image_write_file("b.npy", &header, &value, sizeof value);
@@ -194,9 +185,8 @@ static void test_npy_bytes(void **state)
 }
 
 // The chunks in front of the pixels, as libpng sees them.
-static void test_png_notes(void **state)
+TEST(test_png_notes)
 {
-    (void)state;
     ImageHeader header = {IMAGE_PNG, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
     float *values = values_make(60);
     image_write_file("notes.png", &header, values, sizeof *values);
@@ -221,9 +211,8 @@ static void test_png_notes(void **state)
     fclose(file);
 }
 
-static void test_exr_notes(void **state)
+TEST(test_exr_notes)
 {
-    (void)state;
     ImageHeader header = {IMAGE_EXR, 5, 4, 3, TRANSFER_SRGB, 8, 'f', notes};
     float *values = values_make(60);
     image_write_file("notes.exr", &header, values, sizeof *values);
@@ -259,9 +248,8 @@ static ImageWriter *writer_of_8_by_40(const char *path, MessageList *messages)
     return writer;
 }
 
-static void test_abandoned_leaves_the_old_file(void **state)
+TEST(test_abandoned_leaves_the_old_file)
 {
-    (void)state;
     float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
         char path[16];
@@ -279,9 +267,8 @@ static void test_abandoned_leaves_the_old_file(void **state)
 }
 
 // Every write to /dev/full fails as on a full disk; enough rows that no buffer holds them all.
-static void test_disk_full(void **state)
+TEST(test_disk_full)
 {
-    (void)state;
     enum { SIDE = 256 };
     float *values = values_make(SIDE * SIDE * 3);
     for (size_t i = 0; i < 4; i++) {
@@ -301,9 +288,8 @@ static void test_disk_full(void **state)
     free(values);
 }
 
-static void test_finished_is_yet_to_be_renamed(void **state)
+TEST(test_finished_is_yet_to_be_renamed)
 {
-    (void)state;
     float *values = values_make(8 * 40 * 3);
     for (size_t i = 0; i < 4; i++) {
         char path[16];
@@ -389,9 +375,8 @@ static void check_layer(const char *layer, const void *expected, uint32_t channe
     image_free(&image);
 }
 
-static void test_exr_layers(void **state)
+TEST(test_exr_layers)
 {
-    (void)state;
     enum { PIXELS = 4 * 33 };
     float *color = values_make(3 * PIXELS), *vectors = values_make(3 * PIXELS), *alpha = values_make(PIXELS);
     uint32_t numbers[PIXELS], masks[2 * PIXELS];
@@ -408,7 +393,7 @@ static void test_exr_layers(void **state)
                                  {"mask.0,mask.1", 2, 'u'}};
     ImageHeader header = {IMAGE_EXR, 4, 33, 3, TRANSFER_NONE, 8, 'f', NULL};
     header.layers = layers;
-    header.layer_count = sizeof layers / sizeof *layers;
+    header.layer_count = COUNT_OF(layers);
     MessageList messages = {0};
     ImageWriter *writer = image_writer_open("layers.exr", &header, &messages);
     assert_non_null(writer);
@@ -431,9 +416,8 @@ static void test_exr_layers(void **state)
     free(alpha);
 }
 
-static void test_png_of_other_colors(void **state)
+TEST(test_png_of_other_colors)
 {
-    (void)state;
     static const double rec_709[] = {0.3127, 0.329, 0.64, 0.33, 0.3, 0.6, 0.15, 0.06};
     static const double adobe[] = {0.3127, 0.329, 0.64, 0.33, 0.21, 0.71, 0.15, 0.06};
     colors_write(NULL, 1 / 2.2, rec_709, false);
@@ -477,9 +461,8 @@ static void jpeg_write(const char *path, const char *segments, size_t length, in
     tjDestroy(encoder);
 }
 
-static void test_jpeg_is_turned_upright(void **state)
+TEST(test_jpeg_is_turned_upright)
 {
-    (void)state;
     // quarters in reading order, as the orientation's place of row 0 and column 0 has them
     static const int quarters[9][4] = {{0},          {0, 1, 2, 3}, {1, 0, 3, 2}, {3, 2, 1, 0}, {2, 3, 0, 1},
                                        {0, 2, 1, 3}, {2, 0, 3, 1}, {3, 1, 2, 0}, {1, 3, 0, 2}};
@@ -505,9 +488,8 @@ static void test_jpeg_is_turned_upright(void **state)
     }
 }
 
-static void test_jpeg_of_other_colors(void **state)
+TEST(test_jpeg_of_other_colors)
 {
-    (void)state;
     static const char p3[] = "\xFF\xE2\0\x1A"
                              "ICC_PROFILE\0\1\1Display P3",
                       srgb[] = "\xFF\xE2\0\x14"
@@ -526,9 +508,8 @@ static void test_jpeg_of_other_colors(void **state)
     message_list_free(&messages);
 }
 
-static void test_folder_that_is_not_there(void **state)
+TEST(test_folder_that_is_not_there)
 {
-    (void)state;
     MessageList messages = {0};
     ImageHeader header = {IMAGE_PNG, 8, 8, 3, TRANSFER_SRGB, 8, 'f', NULL};
     assert_null(image_writer_open("nowhere/a.png", &header, &messages));
@@ -537,9 +518,8 @@ static void test_folder_that_is_not_there(void **state)
     message_list_free(&messages);
 }
 
-static void test_format_by_ending(void **state)
+TEST(test_format_by_ending)
 {
-    (void)state;
     assert_int_equal(image_format_of("a.b/c.PNG"), IMAGE_PNG);
     assert_int_equal(image_format_of("c.ppm"), IMAGE_PPM);
     assert_int_equal(image_format_of("c.Exr"), IMAGE_EXR);
@@ -564,9 +544,8 @@ static void check_refused(const char *bytes, size_t length, const char *reason)
 
 #define CHECK_REFUSED(bytes, reason) check_refused(bytes, sizeof(bytes) - 1, reason)
 
-static void test_bad_files(void **state)
+TEST(test_bad_files)
 {
-    (void)state;
     CHECK_REFUSED("", "neither PNG, JPEG, PPM, EXR nor NPY");
     CHECK_REFUSED("hello", "neither PNG, JPEG, PPM, EXR nor NPY");
     CHECK_REFUSED("P6\n1 x\n255\n", "PPM: the header is damaged");
@@ -599,9 +578,8 @@ static long peak_kibibytes(void)
 
 // The file is refused before anything of the declared size is allocated. One of its rows alone would be 300
 // MB.
-static void test_png_that_declares_too_much(void **state)
+TEST(test_png_that_declares_too_much)
 {
-    (void)state;
     long before = peak_kibibytes();
     CHECK_REFUSED("\x89PNG\r\n\x1A\n\0\0\0\x0D"
                   "\x49\x48\x44\x52\x02\xFA\xF0\x80\x7F\xFF\xFF\xFF\x10\x02\x00\x00\x00"
@@ -612,9 +590,8 @@ static void test_png_that_declares_too_much(void **state)
 }
 
 // Nothing of the size that a note declares, here 1.8 GB, is allocated.
-static void test_png_with_a_large_note(void **state)
+TEST(test_png_with_a_large_note)
 {
-    (void)state;
     long before = peak_kibibytes();
     CHECK_REFUSED("\x89PNG\r\n\x1A\n\0\0\0\x0D"
                   "IHDR\0\0\0\1\0\0\0\1\x08\x02\0\0\0"
@@ -625,9 +602,8 @@ static void test_png_with_a_large_note(void **state)
 }
 
 // 2 x 2 pixels are fewer than 5, 3 x 2 are not.
-static void test_pixels_are_limited(void **state)
+TEST(test_pixels_are_limited)
 {
-    (void)state;
     image_limit_pixels(5);
     file_write_bytes("small.ppm", "P6 2 2 255 123456789abc", 23);
     Image image = image_read_file("small.ppm");
@@ -646,9 +622,8 @@ static void test_pixels_are_limited(void **state)
     unlink("large.ppm");
 }
 
-static void test_text_pixmap(void **state)
+TEST(test_text_pixmap)
 {
-    (void)state;
     const char bytes[] = "P3 # colors\n# more\n2 1\n4\n0 1 2\n3 4 # last\n1";
     file_write_bytes("text.ppm", bytes, sizeof bytes - 1);
     Image image = image_read_file("text.ppm");

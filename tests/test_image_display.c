@@ -1,14 +1,11 @@
 // Exposure, the tone curve and dither of PNG and PPM.
 #include "host/base/text.h"
 #include "host/image/display.h"
+#include "tests/check.h"
 #include "tests/files.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 enum { SIDE = 8 };
 
@@ -23,9 +20,8 @@ static uint8_t shown(float value, const ImageHeader *settings)
 }
 
 // The curve's values are those of Python's fractions, rounded to 10 digits.
-static void test_filmic_curve(void **state)
+TEST(test_filmic_curve)
 {
-    (void)state;
     static const double points[][2] = {{0, 0},
                                        {0.01, 0.0037702798},
                                        {0.18, 0.2668989204},
@@ -34,7 +30,7 @@ static void test_filmic_curve(void **state)
                                        {7.25, 1},
                                        {1e30, 1},
                                        {-3, 0}};
-    for (size_t i = 0; i < sizeof points / sizeof *points; i++)
+    for (size_t i = 0; i < COUNT_OF(points); i++)
         assert_true(fabs(tone_apply(points[i][0], TONE_FILMIC) - points[i][1]) < 1e-10);
     assert_true(tone_apply(INFINITY, TONE_FILMIC) == 1);
     assert_true(tone_apply(NAN, TONE_FILMIC) == 0);
@@ -43,9 +39,8 @@ static void test_filmic_curve(void **state)
 }
 
 // A stop doubles the light before the curve.
-static void test_exposure(void **state)
+TEST(test_exposure)
 {
-    (void)state;
     for (int tone = TONE_NONE; tone < TONE_COUNT; tone++)
         for (int i = 0; i < 400; i++) {
             const float value = 0.01F * (float)i;
@@ -71,9 +66,8 @@ static void block_show(uint8_t bytes[SIDE * SIDE], float value, Transfer transfe
 
 // A block's mean is the exact display value to 1/64 of a step, or half a step of 16 bits, and it has two
 // neighboring values at most.
-static void test_dither_keeps_the_mean(void **state)
+TEST(test_dither_keeps_the_mean)
 {
-    (void)state;
     uint8_t bytes[SIDE * SIDE];
     for (int k = 0; k <= 1400; k++) {
         const float value = (float)k / 1400;
@@ -89,9 +83,8 @@ static void test_dither_keeps_the_mean(void **state)
     }
 }
 
-static void test_dither_keeps_exact_values(void **state)
+TEST(test_dither_keeps_exact_values)
 {
-    (void)state;
     uint8_t bytes[SIDE * SIDE];
     for (int k = 0; k <= 255; k++) {
         block_show(bytes, (float)k / 255, TRANSFER_NONE, true);
@@ -105,9 +98,8 @@ static void test_dither_keeps_exact_values(void **state)
 }
 
 // The pixels of half a step form a checkerboard, and those of a quarter every other one of its dark fields.
-static void test_dither_spreads(void **state)
+TEST(test_dither_spreads)
 {
-    (void)state;
     uint8_t half[SIDE * SIDE], quarter[SIDE * SIDE];
     block_show(half, 100.5F / 255, TRANSFER_NONE, true);
     block_show(quarter, 100.25F / 255, TRANSFER_NONE, true);
@@ -154,9 +146,8 @@ static Text file_text(const char *path)
 }
 
 // The pattern lies in the whole image, so that a region, and bands, have the bits of the whole.
-static void test_regions_and_bands(void **state)
+TEST(test_regions_and_bands)
 {
-    (void)state;
     part_write("whole.ppm", 0, 0, 32, 32);
     part_write("part.ppm", 5, 11, 20, 9);
     Text whole = file_text("whole.ppm"), part = file_text("part.ppm");
@@ -169,12 +160,11 @@ static void test_regions_and_bands(void **state)
 }
 
 // Many rows at once, which threads share, have the bytes of each by itself.
-static void test_rows_at_once(void **state)
+TEST(test_rows_at_once)
 {
-    (void)state;
     enum { ROWS = 300, COLUMNS = 700 };
     static float values[ROWS * COLUMNS * 3];
-    static uint8_t together[2 * sizeof values / sizeof *values], alone[sizeof together];
+    static uint8_t together[2 * COUNT_OF(values)], alone[sizeof together];
     for (size_t i = 0; i < ROWS * COLUMNS * 3; i++)
         values[i] = (float)(i % 1021) / 1000;
     for (unsigned bits = 8; bits <= 16; bits += 8) {

@@ -2,16 +2,13 @@
 // three.
 #include "host/base/text.h"
 #include "host/image/image.h"
+#include "tests/check.h"
 #include "tests/files.h"
 
 #include <openexr.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 enum { WIDTH = 23, HEIGHT = 37, TILE = 8, CHANNELS = 6 }; // at most
 
@@ -164,12 +161,11 @@ static void check_refused(const char *layer, const char *reason)
     message_list_free(&messages);
 }
 
-static void test_compressions(void **state)
+TEST(test_compressions)
 {
-    (void)state;
     const exr_compression_t compressions[] = {EXR_COMPRESSION_NONE, EXR_COMPRESSION_RLE, EXR_COMPRESSION_ZIPS,
                                               EXR_COMPRESSION_ZIP, EXR_COMPRESSION_PIZ};
-    for (size_t i = 0; i < sizeof compressions / sizeof *compressions; i++) {
+    for (size_t i = 0; i < COUNT_OF(compressions); i++) {
         for (int is_tiled = 0; is_tiled < 2; is_tiled++) {
             check_read("A,B,G,R", "321", (Kind){compressions[i], EXR_PIXEL_HALF, is_tiled});
             check_read("A,B,G,R", "321", (Kind){compressions[i], EXR_PIXEL_FLOAT, is_tiled});
@@ -178,9 +174,8 @@ static void test_compressions(void **state)
 }
 
 // Every number of channels, of which some are not wanted.
-static void test_choice_of_channels(void **state)
+TEST(test_choice_of_channels)
 {
-    (void)state;
     static const char *const files[][2] = {
         {"Y", "0"},
         {"A,Y", "1"},
@@ -198,7 +193,7 @@ static void test_choice_of_channels(void **state)
         {"B,G,R,diffuse.B,diffuse.G,diffuse.R", "210"},
         {"Z,albedo.B,albedo.G,albedo.R", "321"},
     };
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+    for (size_t i = 0; i < COUNT_OF(files); i++) {
         for (int is_tiled = 0; is_tiled < 2; is_tiled++) {
             check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_ZIPS, EXR_PIXEL_HALF, is_tiled});
             check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_NONE, EXR_PIXEL_HALF, is_tiled});
@@ -208,9 +203,8 @@ static void test_choice_of_channels(void **state)
     }
 }
 
-static void test_layers_by_name(void **state)
+TEST(test_layers_by_name)
 {
-    (void)state;
     exr_write("a.B,a.G,a.R,b.c.X,b.c.Y,b.c.Z", plain);
     check_values("a", "210", "a");
     check_values("b.c", "345", "b.c");
@@ -229,9 +223,8 @@ static void test_layers_by_name(void **state)
 }
 
 // value_at is below 1 everywhere, and only a layer's own alpha counts.
-static void test_alpha_is_read(void **state)
+TEST(test_alpha_is_read)
 {
-    (void)state;
     enum { NONE = CHANNELS };
     static const struct {
         const char *names, *layer;
@@ -241,7 +234,7 @@ static void test_alpha_is_read(void **state)
         {"A,a.B,a.G,a.R", "a", NONE},  {"a.A,a.B,a.G,a.R", "a", 0}, {"A,depth.Z", "depth", NONE},
         {"A,a.A,a.B,a.G,a.R", "a", 1},
     };
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+    for (size_t i = 0; i < COUNT_OF(files); i++) {
         exr_write(files[i].names, plain);
         MessageList messages = {0};
         Image image;
@@ -255,9 +248,8 @@ static void test_alpha_is_read(void **state)
     }
 }
 
-static void test_parts_are_layers(void **state)
+TEST(test_parts_are_layers)
 {
-    (void)state;
     static const char *const parts[] = {"depth:Z", "beauty:B,G,R", "other:B,G,R,a.X,a.Y,a.Z"};
     exr_close(exr_open(parts, 2, plain), 2, plain);
     check_values(NULL, "876", "the only part with colors");
@@ -268,11 +260,10 @@ static void test_parts_are_layers(void **state)
 }
 
 // Where the file has no pixels the image is black, and pixels outside of the image are not read.
-static void test_windows(void **state)
+TEST(test_windows)
 {
-    (void)state;
     static const int shifts[][2] = {{3, 5}, {-4, -2}, {-30, 1}};
-    for (size_t i = 0; i < sizeof shifts / sizeof *shifts; i++) {
+    for (size_t i = 0; i < COUNT_OF(shifts); i++) {
         const int left = shifts[i][0], top = shifts[i][1];
         const char *names = "Y";
         exr_context_t context = exr_open(&names, 1, plain);
@@ -299,9 +290,8 @@ static void test_windows(void **state)
 
 // A color of luminance and chroma at half the resolution, as OpenEXR stores it: of (0.8, 0.2, 0.1) Y is
 // 0.2126 R + 0.7152 G + 0.0722 B.
-static void test_luminance_and_chroma(void **state)
+TEST(test_luminance_and_chroma)
 {
-    (void)state;
     enum { SIDE = 4 };
     const float y = 0.32034F;
     exr_context_t context;
@@ -334,9 +324,8 @@ static void test_luminance_and_chroma(void **state)
     image_free(&image);
 }
 
-static void test_other_primaries_are_named(void **state)
+TEST(test_other_primaries_are_named)
 {
-    (void)state;
     const char *names = "B,G,R";
     for (int is_wide = 0; is_wide < 2; is_wide++) {
         exr_context_t context = exr_open(&names, 1, plain);
@@ -358,9 +347,8 @@ static void test_other_primaries_are_named(void **state)
 
 // Among blocks of every size and compressibility are some whose compressed size is their full size; glint
 // must not spoil those.
-static void test_blocks_as_large_as_compressed(void **state)
+TEST(test_blocks_as_large_as_compressed)
 {
-    (void)state;
     uint32_t random = 1;
     for (uint32_t width = 8; width < 48; width++) {
         for (uint32_t kept_bits = 0; kept_bits < 24; kept_bits++) {
@@ -384,9 +372,8 @@ static void test_blocks_as_large_as_compressed(void **state)
 }
 
 // The file is the same however many rows come at once: parts of blocks, many blocks, or both.
-static void test_rows_in_any_number(void **state)
+TEST(test_rows_in_any_number)
 {
-    (void)state;
     enum { ROWS = 611, COLUMNS = 7, LAYERS = 3 };
     const ImageLayer layers[] = {{"object", 1, 'u'}, {"position.X,position.Y", 2, 'f'}};
     const ImageHeader header = {.format = IMAGE_EXR,
@@ -403,7 +390,7 @@ static void test_rows_in_any_number(void **state)
             values[i][k] = (float)(k * (k + i) % 1009);
     static const uint32_t steps[] = {ROWS, 1, 5, 15, 16, 17, 32, 100, 600};
     Text whole = {0};
-    for (size_t k = 0; k < sizeof steps / sizeof *steps; k++) {
+    for (size_t k = 0; k < COUNT_OF(steps); k++) {
         MessageList messages = {0};
         ImageWriter *writer = image_writer_open(path, &header, &messages);
         for (uint32_t row = 0; row < ROWS; row += steps[k]) {
@@ -430,9 +417,8 @@ static void test_rows_in_any_number(void **state)
     image_free(&image);
 }
 
-static void test_integer_channels_are_refused(void **state)
+TEST(test_integer_channels_are_refused)
 {
-    (void)state;
     exr_context_t context;
     int part;
     must(exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, NULL));

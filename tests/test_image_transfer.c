@@ -1,13 +1,10 @@
 // The display values against the formulas of IEC 61966-2-1:1999, worked out in long double.
 #include "host/image/image.h"
 #include "host/image/transfer.h"
+#include "tests/check.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 static uint32_t expected_quantized(float value, Transfer transfer, unsigned bits)
 {
@@ -38,13 +35,12 @@ static void check_all(float value)
     }
 }
 
-static void test_special_values(void **state)
+TEST(test_special_values)
 {
-    (void)state;
     const float values[] = {0,           -0.0F,   -1,       1,          0.5F,     1.0000001F,
                             0.99999994F, NAN,     INFINITY, -INFINITY,  1e-45F,   1.17549435e-38F,
                             3e38F,       -1e-45F, -NAN,     0.0031308F, 0.00313F, 0.00314F};
-    for (size_t i = 0; i < sizeof values / sizeof *values; i++)
+    for (size_t i = 0; i < COUNT_OF(values); i++)
         check_all(values[i]);
     assert_int_equal(image_quantize(INFINITY, TRANSFER_SRGB, 8), 255);
     assert_int_equal(image_quantize(NAN, TRANSFER_SRGB, 16), 0);
@@ -71,18 +67,16 @@ static void check_thresholds(Transfer transfer, unsigned bits)
     }
 }
 
-static void test_thresholds(void **state)
+TEST(test_thresholds)
 {
-    (void)state;
     check_thresholds(TRANSFER_SRGB, 8);
     check_thresholds(TRANSFER_NONE, 8);
     check_thresholds(TRANSFER_SRGB, 16);
     check_thresholds(TRANSFER_NONE, 16);
 }
 
-static void test_many_values(void **state)
+TEST(test_many_values)
 {
-    (void)state;
     uint32_t random = 12345;
     for (int i = 0; i < 200000; i++) {
         random = random * 1664525U + 1013904223U;

@@ -4,16 +4,13 @@
 #include "host/base/array.h"
 #include "host/compile/compile.h"
 #include "host/compile/instances.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-
-#include <cmocka.h>
 
 enum { WIDTH = 83, HEIGHT = 47, SIDE = 24, TRIANGLES = 2 * SIDE * SIDE };
 
@@ -210,12 +207,11 @@ static bool is_tested(Precision precision)
     return precision == probe_same_bits_from() || (tests_are_long() && probe_has(precision));
 }
 
-static void shared_meshes_look_as_copies(void **state)
+TEST(shared_meshes_look_as_copies)
 {
-    (void)state;
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!is_tested(precision)) continue;
-        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        for (size_t i = 0; i < COUNT_OF(cases); i++) {
             Scene scene = scene_with(cases[i].size, cases[i].place, cases[i].objects);
             RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
             Film copied = render(&scene, &settings, INSTANCES_COPIED);
@@ -246,12 +242,11 @@ static void check_lanes(Precision precision, size_t i)
     scene_free(&scene);
 }
 
-static void lanes_agree(void **state)
+TEST(lanes_agree)
 {
-    (void)state;
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         if (!is_tested(precision)) continue;
-        for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+        for (size_t i = 0; i < COUNT_OF(cases); i++)
             check_lanes(precision, i);
     }
 }
@@ -275,9 +270,8 @@ static Scene many_make(size_t count)
     return scene;
 }
 
-static void many_instances_look_as_copies(void **state)
+TEST(many_instances_look_as_copies)
 {
-    (void)state;
     Scene scene = many_make(80);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_DOUBLE; precision++) {
         if (!is_tested(precision)) continue;
@@ -304,9 +298,8 @@ static void many_instances_look_as_copies(void **state)
     scene_free(&scene);
 }
 
-static void the_feature_alone_and_all_together_agree(void **state)
+TEST(the_feature_alone_and_all_together_agree)
 {
-    (void)state;
     Scene scene = many_make(30);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     settings.instances = INSTANCES_SHARED;
@@ -320,9 +313,8 @@ static void the_feature_alone_and_all_together_agree(void **state)
     scene_free(&scene);
 }
 
-static void a_moved_camera_sees_what_a_new_one_sees(void **state)
+TEST(a_moved_camera_sees_what_a_new_one_sees)
 {
-    (void)state;
     for (int few = 0; few < 2; few++) {
         Scene scene = many_make(few ? 3 : 30);
         RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
@@ -372,9 +364,8 @@ static size_t instance_count(const Scene *scene, const CompileSettings *settings
 }
 
 // Copies of more than 2^18 triangles are not made.
-static void meshes_are_shared_where_copies_are_large(void **state)
+TEST(meshes_are_shared_where_copies_are_large)
 {
-    (void)state;
     enum { MOST = (1 << 18) / TRIANGLES };
     Scene scenes[2] = {many_make(MOST), many_make(MOST + 1)};
     CompileSettings settings = plain_settings;
@@ -386,9 +377,8 @@ static void meshes_are_shared_where_copies_are_large(void **state)
     scene_free(&scenes[1]);
 }
 
-static void an_uneven_transform_makes_a_copy(void **state)
+TEST(an_uneven_transform_makes_a_copy)
 {
-    (void)state;
     // across a diagonal, and along the mesh's axes, where no digit is lost
     Scene scene =
         scene_with(1, (Vector3){0, 0, 0},
@@ -404,9 +394,8 @@ static void an_uneven_transform_makes_a_copy(void **state)
 }
 
 // A material with an image makes separate texture coordinates, other materials do not.
-static void materials_share_geometry(void **state)
+TEST(materials_share_geometry)
 {
-    (void)state;
     Scene scene =
         scene_with(1, (Vector3){0, 0, 0},
                    INSTANCE("flat", "{scale: 1}")
@@ -442,9 +431,8 @@ static void object_repeat(Scene *scene, size_t count)
     }
 }
 
-static void too_many_are_refused(void **state)
+TEST(too_many_are_refused)
 {
-    (void)state;
     Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
     object_repeat(&scene, (1 << 24) / TRIANGLES);
     CompileSettings settings = plain_settings;
@@ -461,9 +449,8 @@ static void too_many_are_refused(void **state)
 }
 
 // The arrays of 10,000 instances of 20,000 triangles: those of one mesh and of the instances.
-static void instances_take_little_memory(void **state)
+TEST(instances_take_little_memory)
 {
-    (void)state;
     Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));
     const Mesh small = scene.meshes.items[scene.objects.items[1].as.mesh.index];
     Mesh *mesh = &scene.meshes.items[scene.objects.items[1].as.mesh.index];

@@ -4,15 +4,11 @@
 //
 // run_tests: sanitize-long-only
 #include "host/compile/transform.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_scene.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum {
     SEEDS = 5, // the first two where tests are short
@@ -105,7 +101,7 @@ static void lanes_change_nothing(const Case *c)
 static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
 {
     static const int exponents[] = {-90, -60, -10, 3, 10, 60, 90};
-    for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
+    for (size_t i = 0; i < COUNT_OF(exponents); i++) {
         Scene scene = optical_scene(seed);
         scene_scale(&scene, ldexp(1, exponents[i]));
         Film film = render(&scene, &c->settings);
@@ -226,9 +222,8 @@ static void precision_holds(void **state)
 
 // Without BVH, mirrors and glass up to 32 objects are culled for several packets at once. With one lane there
 // are no packets.
-static void culls_of_several_packets_change_nothing(void **state)
+TEST(culls_of_several_packets_change_nothing)
 {
-    (void)state;
     static const size_t counts[] = {3, 9, 31, 32, 33, 34, OBJECTS};
     Scene scene = random_scene(1, 2 * OBJECTS);
     for (size_t i = 0; i < OBJECTS; i++) // all bounded
@@ -240,7 +235,7 @@ static void culls_of_several_packets_change_nothing(void **state)
     settings.extra_features = features_of(&scene);
     assert_int_equal(settings.extra_features & (FEATURE_REFLECTION | FEATURE_TRANSMISSION), 0);
     settings.bvh = BVH_OFF;
-    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+    for (size_t i = 0; i < COUNT_OF(counts); i++) {
         scene.objects.count = counts[i];
         Case c = {.scene = &scene, .settings = settings, .name = "without mirrors and glass"};
         c.settings.lanes = 1;

@@ -1,12 +1,8 @@
 // Every kernel's arguments fit small devices: at most 8 buffers, which is V3D's limit, and 256 bytes in
 // total, which is the least CL_DEVICE_MAX_PARAMETER_SIZE that OpenCL's embedded profile permits.
 #include "host/compile/compiled_scene.h"
+#include "tests/check.h"
 #include "tests/probe.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { BUFFERS_MAX = 8, BYTES_MAX = 256, POINTER_BYTES = 8, KERNELS_MIN = 5 };
 
@@ -34,7 +30,7 @@ static void bytes_add(Arguments *arguments, size_t size, size_t alignment)
 
 static void value_add(Arguments *arguments, const char *type, const char *kernel)
 {
-    for (size_t i = 0; i < sizeof value_types / sizeof *value_types; i++) {
+    for (size_t i = 0; i < COUNT_OF(value_types); i++) {
         if (strcmp(type, value_types[i].name) != 0) continue;
         bytes_add(arguments, value_types[i].size, value_types[i].alignment);
         return;
@@ -73,9 +69,9 @@ static cl_program program_with_arguments(const char *text)
     static const char *const zeros[] = {"IS_STRICT",      "IS_DOUBLE",   "IS_CERTIFIED", "IS_PIXEL_LIST",
                                         "REPAIRS_DIVIDE", "IS_COUNTING", "PERTURB",      "PERTURB_SEED"};
     static const char *const ones[] = {"LANES", "HAS_FMA", "PENDING_MAX", "PERTURB_SCALE"};
-    for (size_t i = 0; i < sizeof zeros / sizeof *zeros; i++)
+    for (size_t i = 0; i < COUNT_OF(zeros); i++)
         text_appendf(&prelude, "#define %s 0\n", zeros[i]);
-    for (size_t i = 0; i < sizeof ones / sizeof *ones; i++)
+    for (size_t i = 0; i < COUNT_OF(ones); i++)
         text_appendf(&prelude, "#define %s 1\n", ones[i]);
     text_appendf(&prelude, "#define STACK_CAPACITY 40\n");
     features_write_prelude(&prelude, FEATURE_ALL);
@@ -85,9 +81,8 @@ static cl_program program_with_arguments(const char *text)
 }
 
 // The kernel of this test has arguments of known sizes.
-static void arguments_are_counted(void **state)
+TEST(arguments_are_counted)
 {
-    (void)state;
     cl_program program = program_with_arguments(
         "kernel void many(global int *a, global float *b, constant float *c, uint d, uint4 e, "
         "global const int *f, uint g)\n{\n    if (d + e.x + g > 0) *a = *f + (int)*b + (int)*c;\n}\n");
@@ -123,9 +118,8 @@ static size_t file_check(const char *file)
     return count;
 }
 
-static void every_kernel_has_few(void **state)
+TEST(every_kernel_has_few)
 {
-    (void)state;
     size_t count = 0;
     for (const EmbeddedFile *file = kernel_files; file->name; file++)
         if (strcmp(file->name + strlen(file->name) - 3, ".cl") == 0) count += file_check(file->name);

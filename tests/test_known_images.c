@@ -3,16 +3,12 @@
 // run_tests: sanitize-long-only
 #include "host/base/text.h"
 #include "host/compile/camera_basis.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 static Scene scene_of(const char *text)
 {
@@ -238,7 +234,7 @@ static void highlight(Precision precision)
         "objects: [{sphere: {center: [0, 0, 0], radius: 1, material: {diffuse: 0, specular: 1}}}]\n");
     scene.camera.look_at =
         vector_normalize(vector_add(scene.camera.position, scene.lights.items[0].position));
-    for (size_t e = 0; e < sizeof exponents / sizeof *exponents; e++) {
+    for (size_t e = 0; e < COUNT_OF(exponents); e++) {
         snprintf(place, sizeof place, "%s, shininess %g", precision_names[precision], exponents[e]);
         scene.camera.half_tangent = fmin(0.3, 0.6 / sqrt(fmax(exponents[e], 1)));
         scene.materials.items[scene.objects.items[0].material].shininess = exponents[e];
@@ -276,14 +272,14 @@ static void tilted_plane(Precision precision)
         scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\n"
                  "lights: [{directional: {direction: [0, 0, 1]}}]\n"
                  "objects: [{plane: {point: [0, 0, 0], normal: [1, 2, 3], material: {diffuse: 0.75}}}]\n");
-    for (size_t i = 0; i < sizeof pairs / sizeof *pairs; i++) {
+    for (size_t i = 0; i < COUNT_OF(pairs); i++) {
         double size = pairs[i][0], offset = pairs[i][1];
         Vector3 p = {0.3 * size + offset, -0.2 * size - 2 * offset, 0.5 * size + 0.5 * offset};
         scene.objects.items[0].as.plane.point = p;
         scene.camera.look_at = p;
         scene.camera.position =
             vector_add(p, vector_add(vector_scale(n, 3 * size), vector_scale(e, 0.5 * size)));
-        for (size_t k = 0; k < sizeof elevations / sizeof *elevations; k++) {
+        for (size_t k = 0; k < COUNT_OF(elevations); k++) {
             snprintf(place, sizeof place, "%s, S %g, O %g, sun at %g degrees", precision_names[precision],
                      size, offset, elevations[k]);
             double angle = elevations[k] * M_PI / 180;
@@ -314,7 +310,7 @@ static void inside(Precision precision)
         "cone: {from: [0, -2, 0], to: [0.1, 3, 0.2], radius: [2, 0]}",
         "cone: {from: [0, -2, 0], to: [0.1, 3, 0.2], radius: [2, 1.5]}",
     };
-    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+    for (size_t i = 0; i < COUNT_OF(shapes); i++) {
         snprintf(place, sizeof place, "%s, inside %s", precision_names[precision], shapes[i]);
         Text text = {0};
         text_appendf(&text,
@@ -359,7 +355,7 @@ static void ground_horizon(Precision precision)
          -0.25},
     };
     const uint32_t side = 256;
-    for (size_t k = 0; k < sizeof grounds / sizeof *grounds; k++) {
+    for (size_t k = 0; k < COUNT_OF(grounds); k++) {
         Scene scene = scene_of(grounds[k].view);
         Film film = render(&scene, side, side, precision, AOV_OBJECT | AOV_RAY);
         for (uint32_t column = 0; column < side; column++) {
@@ -434,9 +430,8 @@ static void depth_of_facing_panes(Precision precision)
     check(panes_render(false, precision, 0, 5) == panes_render(false, precision, 0, BOUNCES_MAX));
 }
 
-static void facing_panes(void **state)
+TEST(facing_panes)
 {
-    (void)state;
     if (tests_are_long())
         at_each_precision(depth_of_facing_panes);
     else
@@ -444,9 +439,8 @@ static void facing_panes(void **state)
 }
 
 // R8: cameras that leave the basis open, or nearly so, still have one, and the same on every device.
-static void degenerate_cameras(void **state)
+TEST(degenerate_cameras)
 {
-    (void)state;
     static const struct {
         const char *name;
         Vector3 look_at, up;
@@ -462,7 +456,7 @@ static void degenerate_cameras(void **state)
         {"tiny up", {0, 0, 3}, {0, 1e-300, 0}},
     };
     Film unrolled = {0};
-    for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
+    for (size_t i = 0; i < COUNT_OF(cameras); i++) {
         snprintf(place, sizeof place, "%s", cameras[i].name);
         Scene scene =
             scene_of("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 60}\nambient: [1, 1, 1]\n"
@@ -486,9 +480,8 @@ static void degenerate_cameras(void **state)
 }
 
 // R8: a single pixel looks along the view; extreme fields of view stay finite.
-static void single_pixel_and_extreme_fields(void **state)
+TEST(single_pixel_and_extreme_fields)
 {
-    (void)state;
     Scene scene = scene_of("camera: {position: [1, 2, -7], look_at: [0, 0, 0], fov: 50}\n"
                            "ambient: [1, 1, 1]\nobjects: [{sphere: {center: [0, 0, 0], radius: 0.001}}]\n");
     static const double fields[] = {1e-3, 50, 179.9};
@@ -508,9 +501,8 @@ static void single_pixel_and_extreme_fields(void **state)
 }
 
 // The eye is the origin: the same scene 2^23 away has the same bits.
-static void distance_from_origin_changes_nothing(void **state)
+TEST(distance_from_origin_changes_nothing)
 {
-    (void)state;
     Film films[2];
     for (size_t i = 0; i < 2; i++) {
         double far = i == 0 ? 0 : 0x1p23;
@@ -540,7 +532,7 @@ static void plates_far_away(Precision precision)
                                   "cone: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: [1e6, 9e5]}",
                                   ("cylinder: {from: [0, -2e7, -2e7], to: [0, -20000000.5, -20000000.5], "
                                    "radius: 1e6}")};
-    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+    for (size_t i = 0; i < COUNT_OF(shapes); i++) {
         Text text = {0};
         text_appendf(&text,
                      "camera: {position: [0, 0, 0], look_at: [0, %d, -1], fov: 10}\nbackground: [0.25, 0.25, "

@@ -3,13 +3,9 @@
 // narrowing.
 #include "host/base/memory.h"
 #include "host/compile/compile.h"
+#include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 // The widths of nodes and blocks are their kernel's: these are those of one lane.
 typedef struct {
@@ -132,7 +128,7 @@ typedef struct {
 #define SHAPE_ENTRY(feature, Type, name, names)                                                              \
     INTEGERS_ENTRY(FLAT_FIRST_SHAPE + KIND_##feature, Type, Type, id)
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY) PRIMITIVE_LIST(SHAPE_ENTRY)};
-enum { MEMBER_COUNT = sizeof members / sizeof *members };
+enum { MEMBER_COUNT = COUNT_OF(members) };
 
 // One object of every shape and a texture, so that the compiled scene has every struct's layout.
 static const char scene_text[] = "camera: {position: [0, 0, -5], look_at: [0, 0, 0], fov: 40}\n"
@@ -344,9 +340,8 @@ static void values_check(void **state)
 }
 
 // The list above misses no member: together they fill their struct. In a shape's struct the id is last.
-static void list_is_complete(void **state)
+TEST(list_is_complete)
 {
-    (void)state;
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
     // between the ends

@@ -2,15 +2,13 @@
 // driver allocates; and blames glint for nothing that the driver keeps.
 #include "host/base/memory.h"
 #include "host/opencl/compute.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 #ifdef __SANITIZE_ADDRESS__
 #include <sanitizer/lsan_interface.h>

@@ -4,14 +4,10 @@
 // run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/compile/random_shape.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 static Random random_state;
 
@@ -55,7 +51,7 @@ static Vector3 vector_nudge(Vector3 v)
 
 // The common origins: the eye, one light above all, one among the objects, one at the height of the floor.
 static const Vector3 origins[] = {{0, 0, 0}, {2, 9, 1}, {0.25, -0.5, -6}, {-7, -3, -5}};
-enum { ORIGINS = sizeof origins / sizeof *origins };
+enum { ORIGINS = COUNT_OF(origins) };
 
 // Returns a point on the ray of a pixel, or on the way from what it sees to a light, at any distance from
 // there.
@@ -200,9 +196,8 @@ static bool is_tested(Precision precision)
     return precision == from || (tests_are_long() && precision > from && probe_has(precision));
 }
 
-static void no_pixel_depends_on_the_bvh(void **state)
+TEST(no_pixel_depends_on_the_bvh)
 {
-    (void)state;
     static const double scales[] = {1, 0x1p-30, 0x1p26}; // beyond, the scene's unit changes
     const size_t scene_count = tests_are_long() ? 60 : 12;
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++)
@@ -233,9 +228,8 @@ static void sheet_add(Scene *scene, double z, bool has_holes)
 
 // Light of a lamp that is so far off that a vertex seen from there is rounded by more than two sheets of
 // triangles are apart, the nearer with holes.
-static void no_shadow_of_a_far_lamp_depends_on_the_bvh(void **state)
+TEST(no_shadow_of_a_far_lamp_depends_on_the_bvh)
 {
-    (void)state;
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!is_tested(precision)) continue;
         random_state.state = 1;

@@ -4,16 +4,12 @@
 #include "host/compile/compile.h"
 #include "host/compile/scene_bounds.h"
 #include "host/import/mesh/mesh_import.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #define CAMERA_AND_LIGHT                                                                                     \
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"                                                   \
@@ -45,9 +41,8 @@ static Scene scene_of_objects(const char *objects)
 
 static const char square[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 
-static void vertices_are_joined(void **state)
+TEST(vertices_are_joined)
 {
-    (void)state;
     file_write("a.obj", square);
     Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
     assert_int_equal(scene.objects.count, 1);
@@ -70,9 +65,8 @@ static Vector3 only_corner(const Scene *scene, int corner)
     return mesh->vertices[mesh->triangles[0][corner]];
 }
 
-static void transforms_scale_then_turn_then_move(void **state)
+TEST(transforms_scale_then_turn_then_move)
 {
-    (void)state;
     file_write("a.obj", "v 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n");
     Scene scene =
         scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [2, 3, 4], rotate: [90, 0, 90], "
@@ -84,9 +78,8 @@ static void transforms_scale_then_turn_then_move(void **state)
 }
 
 // The outer side is where the corners are seen counterclockwise; a mirror keeps it outside.
-static void mirrored_mesh_keeps_its_outer_side(void **state)
+TEST(mirrored_mesh_keeps_its_outer_side)
 {
-    (void)state;
     file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     Scene scene = scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [-1, 1, 1]}}\n");
     Vector3 a = only_corner(&scene, 0), b = only_corner(&scene, 1), c = only_corner(&scene, 2);
@@ -98,9 +91,8 @@ static void mirrored_mesh_keeps_its_outer_side(void **state)
 static const char octahedron[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
                                  "f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n";
 
-static void normals_come_from_the_triangles(void **state)
+TEST(normals_come_from_the_triangles)
 {
-    (void)state;
     file_write("a.obj", octahedron);
     Scene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true, transform: {scale: [3, 3, -3]}}\n");
     const Mesh *mesh = &scene.meshes.items[0];
@@ -115,9 +107,8 @@ static void normals_come_from_the_triangles(void **state)
 
 // Four corners of one square, whose two triangles together weigh as much as each of the others' single
 // triangle.
-static void normals_do_not_see_the_cut_of_a_polygon(void **state)
+TEST(normals_do_not_see_the_cut_of_a_polygon)
 {
-    (void)state;
     file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nf 1 4 3 2\nf 1 2 5\nf 1 5 4\n");
     Scene scene = scene_of_objects("  - mesh: {file: a.obj, smooth: true}\n");
     const Mesh *mesh = &scene.meshes.items[0];
@@ -127,9 +118,8 @@ static void normals_do_not_see_the_cut_of_a_polygon(void **state)
     scene_free(&scene);
 }
 
-static void normals_of_the_file_are_taken(void **state)
+TEST(normals_of_the_file_are_taken)
 {
-    (void)state;
     file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 3 4\nf 1//1 2//1 3//1\n");
     Scene scene = scene_of_objects("  - mesh: {file: a.obj, transform: {scale: [1, 2, 1]}}\n");
     assert_non_null(scene.meshes.items[0].normals);
@@ -147,9 +137,8 @@ static const Material *material_of_triangle(const Scene *scene, size_t triangle)
     return &scene->materials.items[scene->meshes.items[0].materials[triangle]];
 }
 
-static void materials_come_from_the_file(void **state)
+TEST(materials_come_from_the_file)
 {
-    (void)state;
     file_write(
         "a.mtl",
         "newmtl red\nKd 0.75 0.25 0\nKs 0.5 0.5 0.5\nNs 40\nillum 2\nnewmtl glass\nKd 0 0 0\nd 0.25\n");
@@ -194,9 +183,8 @@ static void materials_come_from_the_file(void **state)
     "AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}\n"
 static const char gltf[] = "{" GLTF_MEMBERS;
 
-static void every_format_is_read(void **state)
+TEST(every_format_is_read)
 {
-    (void)state;
     file_write("a.ply", PLY_OF("1", "2"));
     file_write("a.stl", STL_OF("1"));
     file_write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
@@ -220,9 +208,8 @@ static void every_format_is_read(void **state)
     scene_free(&scene);
 }
 
-static void faces_without_corners_are_left_out(void **state)
+TEST(faces_without_corners_are_left_out)
 {
-    (void)state;
     file_write("a.ply", PLY_OF_FACES("0", "4 0 1 3 2"));
     Scene scene = scene_of_objects("  - mesh: {file: a.ply}\n");
     assert_int_equal(scene.meshes.items[0].triangle_count, 2);
@@ -230,9 +217,8 @@ static void faces_without_corners_are_left_out(void **state)
 }
 
 // Vertices and texture coordinates that no triangle has are neither refused nor in the mesh.
-static void what_no_face_uses_does_not_count(void **state)
+TEST(what_no_face_uses_does_not_count)
 {
-    (void)state;
     static const struct {
         const char *name, *text;
     } cases[] = {
@@ -242,7 +228,7 @@ static void what_no_face_uses_does_not_count(void **state)
                              "2") "end_header\n0 0 nan 0 0\n0 0 0 0 0\n0 0 1 0 0\n0 0 0 1 0\ninf 0 9 9 9\n"
                                   "3 1 2 3\n2 0 4\n"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, cases[i].text);
         Text objects = {0};
         text_appendf(&objects, "  - mesh: {file: %s}\n", cases[i].name);
@@ -274,9 +260,8 @@ static double area_of(const Mesh *mesh)
 }
 
 // A comb with more teeth than assimp cuts out in full.
-static void concave_polygon_is_cut_in_full(void **state)
+TEST(concave_polygon_is_cut_in_full)
 {
-    (void)state;
     enum { TEETH = 100 };
     Text text = {0}, face = {0};
     text_appendf(&text, "v 0 0 0\nv %d 0 0\n", TEETH);
@@ -297,9 +282,8 @@ static void concave_polygon_is_cut_in_full(void **state)
     text_free(&face);
 }
 
-static void polygons_that_cannot_be_filled_are_reported(void **state)
+TEST(polygons_that_cannot_be_filled_are_reported)
 {
-    (void)state;
     file_write("a.obj", "v 0 0 0\nv 2 0 0\nv 0 1 0\nv 3 3 0\nv 3 0 0\nv 4 0 0\nf 1 2 3 4\nf 1 2 5 6\n");
     Text got = scene_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: {file: a.obj}\n", false);
     assert_string_equal(
@@ -310,9 +294,8 @@ static void polygons_that_cannot_be_filled_are_reported(void **state)
     text_free(&got);
 }
 
-static void faults_name_file_and_vertex(void **state)
+TEST(faults_name_file_and_vertex)
 {
-    (void)state;
     static const struct {
         const char *name, *text, *message;
     } cases[] = {
@@ -336,7 +319,7 @@ static void faults_name_file_and_vertex(void **state)
         {"a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n",
          "4:18: error: a.off: vertex 2 (from 0) is not finite or too large"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, cases[i].text);
         Text scene = {0}, expected = {0};
         text_appendf(&scene, CAMERA_AND_LIGHT "objects:\n  - mesh: {file: %s}\n", cases[i].name);
@@ -357,11 +340,10 @@ static void assert_file_refused(const char *name, const char *reason)
     text_free(&expected);
 }
 
-static void other_formats_are_read(void **state)
+TEST(other_formats_are_read)
 {
-    (void)state;
     static const char *const endings[] = {"fbx", "dae", "3ds", "off"};
-    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++) {
+    for (size_t i = 0; i < COUNT_OF(endings); i++) {
         Text object = {0};
         text_appendf(&object, "  - mesh: {file: %s/triangle.%s}\n", corpus, endings[i]);
         Scene scene = scene_of_objects(text_c(&object));
@@ -434,9 +416,8 @@ static void smooth_gltf_write(const char *path)
     text_free(&text);
 }
 
-static void every_format_has_normals_and_texture_coordinates(void **state)
+TEST(every_format_has_normals_and_texture_coordinates)
 {
-    (void)state;
     file_write("a.obj", smooth_obj);
     file_write("a.dae", smooth_dae);
     file_write("a.fbx", smooth_fbx);
@@ -464,9 +445,8 @@ static void every_format_has_normals_and_texture_coordinates(void **state)
 
 // Checks what the process that runs assimp may do (tests/assimp_process.c), with lower limits. The caller of
 // glint may ignore the signals that end it.
-static void child_is_limited(void **state)
+TEST(child_is_limited)
 {
-    (void)state;
     static const struct {
         const char *name, *reason;
     } cases[] = {
@@ -478,7 +458,7 @@ static void child_is_limited(void **state)
     };
     void (*const on_processor)(int) = signal(SIGXCPU, SIG_IGN),
                  (*const on_alarm)(int) = signal(SIGALRM, SIG_IGN);
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, "");
         assert_file_refused(cases[i].name, cases[i].reason);
         unlink(cases[i].name);
@@ -487,9 +467,8 @@ static void child_is_limited(void **state)
     signal(SIGALRM, on_alarm);
 }
 
-static void scene_file_faults_are_reported(void **state)
+TEST(scene_file_faults_are_reported)
 {
-    (void)state;
     file_write("a.obj", square);
 #define REFUSED(mesh, expected)                                                                              \
     assert_messages("scene.yaml", CAMERA_AND_LIGHT "objects:\n  - mesh: " mesh "\n", expected)
@@ -507,9 +486,8 @@ static void scene_file_faults_are_reported(void **state)
             "4:37: error: unknown transform key 'turn'; the choices are translate, rotate, scale, matrix\n");
 }
 
-static void ids_count_the_triangles(void **state)
+TEST(ids_count_the_triangles)
 {
-    (void)state;
     file_write("a.obj", octahedron);
     Scene scene = scene_of_objects("  - sphere: {center: [9, 0, 0], radius: 1}\n"
                                    "  - mesh: {file: a.obj}\n"
@@ -547,9 +525,8 @@ static void rays_down(TraceRay *rays)
 }
 
 // A repeated corner, three corners in a line and a needle lie among the square's triangles.
-static void triangles_without_area_are_never_hit(void **state)
+TEST(triangles_without_area_are_never_hit)
 {
-    (void)state;
     static TraceRay rays[GRID * GRID];
     static TraceHit clean[GRID * GRID], hits[GRID * GRID];
     rays_down(rays);
@@ -601,9 +578,8 @@ static void assert_refused(Compute *compute, const Scene *scene, const char *exp
     message_list_free(&messages);
 }
 
-static void too_many_triangles_are_refused(void **state)
+TEST(too_many_triangles_are_refused)
 {
-    (void)state;
     Mesh mesh = {.triangle_count = ((size_t)1 << 28) + 1};
     Object object = {.kind = SHAPE_MESH};
     Scene scene = {.meshes = {&mesh, 1, 1}, .objects = {&object, 1, 1}};
@@ -611,9 +587,8 @@ static void too_many_triangles_are_refused(void **state)
 }
 
 // The first mesh of a file is not a copy. The third, of two triangles, is one too many, whatever its name.
-static void copies_are_limited(void **state)
+TEST(copies_are_limited)
 {
-    (void)state;
     file_write("a.obj", square);
     MessageList messages = {0};
     const Source source = {.file = "scene.yaml", .bytes = "", .length = 0};
@@ -633,9 +608,8 @@ static void copies_are_limited(void **state)
     scene_free(&scene);
 }
 
-static void device_without_room_is_reported(void **state)
+TEST(device_without_room_is_reported)
 {
-    (void)state;
     file_write("a.obj", octahedron);
     Scene scene = scene_of_objects("  - mesh: {file: a.obj}\n");
     Device small = *probe_compute.device;

@@ -3,14 +3,11 @@
 #include "host/image/flip.h"
 #include "host/image/heatmap.h"
 #include "host/image/image_metrics.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
-
-#include <cmocka.h>
 
 enum { SIDE = 64 };
 
@@ -28,9 +25,8 @@ static Image gray_image(unsigned step)
     return image;
 }
 
-static void test_equal_images(void **state)
+TEST(test_equal_images)
 {
-    (void)state;
     Image image = gray_image(128);
     ImageMetrics metrics = image_metrics(&image, &image);
     assert_int_equal(metrics.differing_count, 0);
@@ -40,9 +36,8 @@ static void test_equal_images(void **state)
     image_free(&image);
 }
 
-static void test_one_black_pixel(void **state)
+TEST(test_one_black_pixel)
 {
-    (void)state;
     Image plain = gray_image(128), spot = gray_image(128);
     for (size_t channel = 0; channel < 3; channel++)
         spot.values[(20 * SIDE + 40) * 3 + channel] = 0;
@@ -65,9 +60,8 @@ static void test_one_black_pixel(void **state)
     image_free(&spot);
 }
 
-static void test_one_step_lighter(void **state)
+TEST(test_one_step_lighter)
 {
-    (void)state;
     Image plain = gray_image(128), lighter = gray_image(129);
     ImageMetrics metrics = image_metrics(&plain, &lighter);
     assert_int_equal(metrics.off_by_1, SIDE * SIDE * 3);
@@ -79,9 +73,8 @@ static void test_one_step_lighter(void **state)
     image_free(&lighter);
 }
 
-static void test_black_and_white(void **state)
+TEST(test_black_and_white)
 {
-    (void)state;
     Image black = gray_image(0), white = gray_image(255);
     ImageMetrics metrics = image_metrics(&black, &white);
     assert_near(metrics.linear.psnr, 0, 1e-9);
@@ -91,9 +84,8 @@ static void test_black_and_white(void **state)
     image_free(&white);
 }
 
-static void test_what_is_not_finite(void **state)
+TEST(test_what_is_not_finite)
 {
-    (void)state;
     Image plain = gray_image(128), broken = gray_image(128);
     plain.display = broken.display = false;
     broken.values[(2 * SIDE + 7) * 3 + 1] = NAN;
@@ -111,9 +103,8 @@ static void test_what_is_not_finite(void **state)
     image_free(&broken);
 }
 
-static void test_zeros_of_two_signs_differ(void **state)
+TEST(test_zeros_of_two_signs_differ)
 {
-    (void)state;
     float plus = 0, minus = -0.0F;
     Image a = {.width = 1, .height = 1, .channels = 1, .values = &plus}, b = a;
     b.values = &minus;
@@ -123,9 +114,8 @@ static void test_zeros_of_two_signs_differ(void **state)
     assert_false(metrics.has_color);
 }
 
-static void test_ulp_distance(void **state)
+TEST(test_ulp_distance)
 {
-    (void)state;
     const double inf = (double)INFINITY, nan = (double)NAN;
     assert_true(ulp_distance(1, 1 + 0x1p-23, false) == 1 && ulp_distance(1, 1 - 0x1p-24, false) == 0.5);
     assert_true(ulp_distance(-2, -2 - 0x1p-51, true) == 1);
@@ -135,9 +125,8 @@ static void test_ulp_distance(void **state)
     assert_true(isinf(ulp_distance(inf, -inf, true)) && isinf(ulp_distance(1, nan, true)));
 }
 
-static void test_summary_by_hand(void **state)
+TEST(test_summary_by_hand)
 {
-    (void)state;
     const double expected[] = {0, 1, (double)NAN, 2, 4, 3}, found[] = {1, 1, 5, 2, 2, -(double)INFINITY};
     ErrorSummary summary = error_summarize(expected, found, 6);
     assert_int_equal(summary.count, 4);
@@ -150,9 +139,8 @@ static void test_summary_by_hand(void **state)
     assert_int_equal(error_summarize(expected, found, 0).count, 0);
 }
 
-static void test_percentile(void **state)
+TEST(test_percentile)
 {
-    (void)state;
     enum { COUNT = 5000 };
     double expected[COUNT] = {0}, found[COUNT];
     for (int i = 0; i < COUNT; i++) // every number 1e-6 .. 5000e-6 once, in a jumble, of both signs
@@ -161,9 +149,8 @@ static void test_percentile(void **state)
     assert_near(error_summarize(expected, found, COUNT).largest, 5000e-6, 1e-9);
 }
 
-static void test_kinds_that_do_not_compare(void **state)
+TEST(test_kinds_that_do_not_compare)
 {
-    (void)state;
     float value[3] = {0};
     Image image = {.width = 1, .height = 1, .channels = 3, .values = value}, other = image;
     MessageList messages = {0};
@@ -178,9 +165,8 @@ static void test_kinds_that_do_not_compare(void **state)
 }
 
 // Green's construction keeps .30 R + .59 G + .11 B at the fraction wherever no channel is clipped.
-static void test_heatmap_rises(void **state)
+TEST(test_heatmap_rises)
 {
-    (void)state;
     float color[3];
     double last = -1;
     for (int i = 0; i <= 1000; i++) {

@@ -5,15 +5,13 @@
 #include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/shapes.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { OBJECTS = 3 * FLAT_RANGE_MIN }; // of them some kinds are moved by several threads
 
@@ -188,9 +186,8 @@ static void check_bvh(const CompiledScene *compiled)
     assert_true(empty.min.y > all.max.y && empty.max.z < all.min.z);
 }
 
-static void moved_scene_has_the_numbers_of_a_compiled_one(void **state)
+TEST(moved_scene_has_the_numbers_of_a_compiled_one)
 {
-    (void)state;
     static const Vector3 eyes[] = {{1.3, 2.7, -39}, {0, -8.25, 0}, {1e4, 2, -1}, {1, 2, -40}};
     Scene scene = scene_make();
     const Camera start = scene.camera;
@@ -199,7 +196,7 @@ static void moved_scene_has_the_numbers_of_a_compiled_one(void **state)
         if (is_double) settings.precision = PRECISION_DOUBLE;
         scene.camera = start;
         CompiledScene moved = compiled_make(&scene, &settings);
-        for (size_t i = 0; i < sizeof eyes / sizeof *eyes; i++) {
+        for (size_t i = 0; i < COUNT_OF(eyes); i++) {
             scene.camera.position = eyes[i];
             settings.width += 2;
             MessageList messages = {0};
@@ -215,9 +212,8 @@ static void moved_scene_has_the_numbers_of_a_compiled_one(void **state)
 }
 
 // Only an eye next to the planet needs its power.
-static void powers_come_and_go(void **state)
+TEST(powers_come_and_go)
 {
-    (void)state;
     Scene scene =
         scene_of_text("planet.yaml", "camera: {position: [0, 1e7, 0], look_at: [0, 0, 1]}\n"
                                      "objects:\n"
@@ -236,9 +232,8 @@ static void powers_come_and_go(void **state)
 }
 
 // Another camera at the same place changes the header alone.
-static void turned_camera_changes_the_header_alone(void **state)
+TEST(turned_camera_changes_the_header_alone)
 {
-    (void)state;
     Scene scene = scene_of_text("move.yaml", scene_text);
     CompiledScene compiled = compiled_make(&scene, &single);
     memset(compiled.changed, 0, sizeof compiled.changed);
@@ -255,9 +250,8 @@ static void turned_camera_changes_the_header_alone(void **state)
 }
 
 // A kernel may be built for a BVH that the scene does not have. Its one node stays empty.
-static void missing_bvh_stays_empty(void **state)
+TEST(missing_bvh_stays_empty)
 {
-    (void)state;
     Scene scene = scene_of_text("move.yaml", scene_text);
     CompileSettings settings = single;
     settings.bvh = BVH_OFF;
@@ -273,14 +267,13 @@ static void missing_bvh_stays_empty(void **state)
 }
 
 // Moves to eyes at which the device's unit changes or which do not fit, and back.
-static void far_eyes(void **state)
+TEST(far_eyes)
 {
-    (void)state;
     Scene scene = scene_of_text("move.yaml", scene_text);
     const Vector3 start = scene.camera.position;
     CompiledScene compiled = compiled_make(&scene, &single);
     static const double distances[] = {1e11, 1e39, 0};
-    for (size_t i = 0; i < sizeof distances / sizeof *distances; i++) {
+    for (size_t i = 0; i < COUNT_OF(distances); i++) {
         scene.camera.position = (Vector3){start.x, start.y, start.z - distances[i]};
         MessageList messages = {0};
         const bool moved = scene_move(&compiled, &scene, &single, &messages);
@@ -319,16 +312,15 @@ static void check_move_after_failure(const char *text, const Camera *failing, co
 }
 
 // A move that failed has changed some arrays. The next one, to whichever eye, must set all of them.
-static void moves_after_a_failure(void **state)
+TEST(moves_after_a_failure)
 {
-    (void)state;
     // without a light or a bounded object, so that a far eye keeps the unit and fails for a plane's number
     static const char planes[] = "camera: {position: [1, 2, -40], look_at: [0, 0, 0], fov: 50}\n"
                                  "objects:\n"
                                  "  - plane: {point: [0, -9, 0], normal: [0, 1, 0]}\n"
                                  "  - plane: {point: [0, 0, 90], normal: [0, 1, -1]}\n";
     static const char *const texts[] = {planes, scene_text};
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+    for (size_t i = 0; i < COUNT_OF(texts); i++) {
         Scene scene = scene_of_text("move.yaml", texts[i]);
         const Camera start = scene.camera;
         Camera other = start, wide, far = start;
@@ -350,9 +342,8 @@ static void range_count(void *context, size_t begin, size_t end)
         atomic_fetch_add(&counts[i], 1);
 }
 
-static void loops_over_threads_cover_each_index_once(void **state)
+TEST(loops_over_threads_cover_each_index_once)
 {
-    (void)state;
     static atomic_uchar counts[10007];
     for (size_t count = 0; count <= sizeof counts; count = count * 3 + 1) {
         memset(counts, 0, sizeof counts);

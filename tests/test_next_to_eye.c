@@ -2,14 +2,10 @@
 // not: kernels of other scenes pay nothing.
 #include "host/compile/compile.h"
 #include "host/compile/shapes.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static CompiledScene compile_for(const Scene *scene, Precision precision, bool shift_to_eye)
 {
@@ -59,12 +55,11 @@ static double power_of(uint4 id, bool is_double)
     return is_double ? wide : (double)narrow;
 }
 
-static void ordinary_scenes_have_no_powers(void **state)
+TEST(ordinary_scenes_have_no_powers)
 {
-    (void)state;
     static const char *const files[] = {"tests/scenes/every_shape.yaml", "scenes/cylinders-cones.yaml",
                                         "scenes/triangles.yaml"};
-    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+    for (size_t i = 0; i < COUNT_OF(files); i++) {
         Scene scene = scene_of_file(files[i]);
         CompiledScene compiled = compile(&scene, PRECISION_SINGLE);
         assert_false(compiled.features & FEATURE_EYE_POWERS);
@@ -74,9 +69,8 @@ static void ordinary_scenes_have_no_powers(void **state)
 }
 
 // The eye is 1.75 above the top of a cylinder with the radius of a planet, far from both ends.
-static void a_cylinder_is_seen_from_its_nearest_point(void **state)
+TEST(a_cylinder_is_seen_from_its_nearest_point)
 {
-    (void)state;
     const double radius = 6371001, height = 1.75;
     for (int precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         CompiledScene compiled =
@@ -99,9 +93,8 @@ static void a_cylinder_is_seen_from_its_nearest_point(void **state)
     }
 }
 
-static void a_plane_goes_through_its_nearest_point(void **state)
+TEST(a_plane_goes_through_its_nearest_point)
 {
-    (void)state;
     CompiledScene compiled =
         compile_text("  - plane: {point: [2e7, -1e7, 0], normal: [1, 2, 3]}\n", PRECISION_SINGLE);
     const Plane *plane = first(&compiled, KIND_PLANES);
@@ -114,9 +107,8 @@ static void a_plane_goes_through_its_nearest_point(void **state)
 
 // Explicit rays may start next to the plane's stored point. In double that point is exact. The point nearest
 // to the origin would be off by rounding, 4e5 ulp of a t of 1 in this plane.
-static void explicit_rays_see_a_plane_through_its_own_point(void **state)
+TEST(explicit_rays_see_a_plane_through_its_own_point)
 {
-    (void)state;
     const double point[3] = {-7351234.1, 1534783.4, 1735961.9};
     Text text = {0};
     text_appendf(&text,
@@ -134,9 +126,8 @@ static void explicit_rays_see_a_plane_through_its_own_point(void **state)
 
 // The stored height and normal are those of the triangle before its vertices are rounded, also in double,
 // where the height is a float.
-static void a_triangle_has_the_eyes_height(void **state)
+TEST(a_triangle_has_the_eyes_height)
 {
-    (void)state;
     for (int precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         const bool is_double = precision == PRECISION_DOUBLE;
         const char *text = is_double

@@ -1,17 +1,13 @@
 // Numbers of scenes are the nearest doubles: those of the C library, however they are written.
 #include "host/compile/random_shape.h"
 #include "host/import/number.h"
+#include "tests/check.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static void check(const char *text)
 {
@@ -27,9 +23,8 @@ static void check(const char *text)
     }
 }
 
-static void random_numbers_are_nearest(void **state)
+TEST(random_numbers_are_nearest)
 {
-    (void)state;
     Random random = {1};
     for (int i = 0; i < 200000; i++) {
         char text[64];
@@ -46,9 +41,8 @@ static void random_numbers_are_nearest(void **state)
     }
 }
 
-static void limits_of_the_short_way_are_right(void **state)
+TEST(limits_of_the_short_way_are_right)
 {
-    (void)state;
     static const char *const texts[] = {
         "9007199254740992",
         "9007199254740993",
@@ -80,17 +74,16 @@ static void limits_of_the_short_way_are_right(void **state)
         "5.",
         "2.2250738585072011e-308",
     };
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+    for (size_t i = 0; i < COUNT_OF(texts); i++)
         check(texts[i]);
 }
 
-static void what_is_no_number_is_refused(void **state)
+TEST(what_is_no_number_is_refused)
 {
-    (void)state;
     static const char *const texts[] = {"",   "+",   "-",   ".",   "e5", ".e5", "1e",   "1e+",
                                         "1x", "0x1", "inf", "nan", "1 ", "--1", "1.2.3"};
     double value = 7;
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+    for (size_t i = 0; i < COUNT_OF(texts); i++)
         assert_int_equal(number_read(texts[i], strlen(texts[i]), &value), NUMBER_MALFORMED);
     assert_true(value == 7);
     char text[1000];
@@ -102,14 +95,13 @@ static void what_is_no_number_is_refused(void **state)
     assert_true(value == 1.0 / 9);
 }
 
-static void scan_ends_behind_the_number(void **state)
+TEST(scan_ends_behind_the_number)
 {
-    (void)state;
     static const struct {
         const char *text;
         size_t length;
     } cases[] = {{"1e5x", 3}, {"1ex", 1}, {"1e+ 2", 1}, {"-2.5/3", 4}, {"1..2", 2}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         const char *at = cases[i].text;
         double value;
         assert_int_equal(number_scan(&at, at + strlen(at), &value), NUMBER_READ);

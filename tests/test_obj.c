@@ -1,15 +1,11 @@
 // OBJ and MTL files: the layouts that are read, materials and their images, and each message with its place.
 #include "host/import/load.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #define SCENE_OF(mesh)                                                                                       \
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \
@@ -63,9 +59,8 @@ static void assert_unit_square(const char *obj)
     scene_free(&scene);
 }
 
-static void layouts_are_read(void **state)
+TEST(layouts_are_read)
 {
-    (void)state;
     static const char *const texts[] = {
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4",
@@ -82,7 +77,7 @@ static void layouts_are_read(void **state)
         // what no face has is not checked
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv nan 0\nv 1e31 0 0\nf 1 2 3 4\n",
     };
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+    for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
             static const char *const line_ends[] = {"\n", "\r\n", "\r"};
             Text text = {0};
@@ -96,9 +91,8 @@ static void layouts_are_read(void **state)
 }
 
 // The same position with other normals and texture coordinates is another vertex; the same of all is not.
-static void corners_combine_their_parts(void **state)
+TEST(corners_combine_their_parts)
 {
-    (void)state;
     Scene scene = scene_of_obj(
         "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nvt 0.5\nvt 0.25 0.75 9\nvn 0 0 2\nvn 3 0 0\nvn 0 0 1\n"
         "f 1/1/1 2/2/1 3//2\nf 4/1/3 2/2/1 3/1/2\nf 1 2/2/1 3//2\n",
@@ -121,9 +115,8 @@ static void corners_combine_their_parts(void **state)
 }
 
 // More combinations at one position than are compared with each other.
-static void one_position_may_have_many_normals(void **state)
+TEST(one_position_may_have_many_normals)
 {
-    (void)state;
     enum { NORMALS = 300 };
     Text text = {0};
     text_appendf(&text, CORNERS);
@@ -147,9 +140,8 @@ static const Material *triangle_material(const Scene *scene, size_t triangle)
 }
 
 // Opacity dims what the surface shows. Glass has bright highlights, and its illumination models bend light.
-static void opacity_is_dissolve(void **state)
+TEST(opacity_is_dissolve)
 {
-    (void)state;
     static const struct {
         const char *lines, *expected;
         double diffuse, specular, transmission, ior;
@@ -171,7 +163,7 @@ static void opacity_is_dissolve(void **state)
          0, 1.5},
     };
     file_write("a.ppm", "P3 1 1 255 255 0 0\n");
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Text mtl = {0};
         text_appendf(&mtl, "newmtl red\nKd 0.5 0 0\nKs 0.5\nNi 1.5\n%smap_Kd a.ppm\n", cases[i].lines);
         file_write("a.mtl", text_c(&mtl));
@@ -188,9 +180,8 @@ static void opacity_is_dissolve(void **state)
     }
 }
 
-static void invalid_numbers_become_defaults(void **state)
+TEST(invalid_numbers_become_defaults)
 {
-    (void)state;
     file_write("a.mtl", "newmtl red\nKd -1 0 0\nNi 0\nNs -5\nd 7\nKs 0 -2\nillum 11\nTr -1\n");
     Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
                                "a.mtl:2:4: warning: must be 0 or more, not -1: the default is used\n"
@@ -209,9 +200,8 @@ static void invalid_numbers_become_defaults(void **state)
 }
 
 // Polygons become triangles, and the materials move with them.
-static void materials_are_those_of_their_faces(void **state)
+TEST(materials_are_those_of_their_faces)
 {
-    (void)state;
     file_write("a.mtl", "Kd 1 0 0\nnewmtl red one \nKd 1 0 0\nKa 9 9 9\nillum 2\nKe 0 0 0\nTf 1 1 1\n");
     file_write("b c.mtl",
                "newmtl gray\nKd 0.5\nKs 0.9 0.3 0\nNs 40\nd 0.25\nNi 1.25\nnewmtl clear\nTr 0.5\nKd 0 2 0\n");
@@ -221,8 +211,8 @@ static void materials_are_those_of_their_faces(void **state)
                                "a.mtl:1:1: warning: a line before the first newmtl is not used\n");
     static const double reds[] = {1, 1, 1, 1, 1, 0, 0.5, 0.5, 0.5},
                         greens[] = {1, 1, 0, 0, 0, 2, 0.5, 0.5, 0.5};
-    assert_int_equal(scene.meshes.items[0].triangle_count, sizeof reds / sizeof *reds);
-    for (size_t i = 0; i < sizeof reds / sizeof *reds; i++) {
+    assert_int_equal(scene.meshes.items[0].triangle_count, COUNT_OF(reds));
+    for (size_t i = 0; i < COUNT_OF(reds); i++) {
         assert_number(triangle_material(&scene, i)->color.x, reds[i]);
         assert_number(triangle_material(&scene, i)->color.y, greens[i]);
     }
@@ -247,9 +237,8 @@ static void materials_are_those_of_their_faces(void **state)
     scene_free(&scene);
 }
 
-static void missing_materials_are_reported(void **state)
+TEST(missing_materials_are_reported)
 {
-    (void)state;
     file_write("a.mtl", "newmtl red\nKd 1 0 0\n");
     // the file of the mesh's own name stands in
     Scene scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE, "");
@@ -289,9 +278,8 @@ static void missing_materials_are_reported(void **state)
     scene_free(&scene);
 }
 
-static void images_of_materials_are_used(void **state)
+TEST(images_of_materials_are_used)
 {
-    (void)state;
     file_write("a.ppm", "P3 1 1 255 255 0 0\n");
     file_write("a.tga", "no image");
     file_write("a.mtl", "newmtl red\nKd 0.75 0.5 0.25\nmap_Kd ./a.ppm\nnewmtl same\nmap_Kd ./a.ppm\n");
@@ -340,7 +328,7 @@ static void images_of_materials_are_used(void **state)
         {"map_Bump -bm 9 a.ppm\nnorm a.ppm\n",
          "a.mtl:3:6: warning: a second map of normals or heights: it replaces the first\n"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Text mtl = {0};
         text_appendf(&mtl, "newmtl red\n%s", cases[i].mtl);
         file_write("a.mtl", text_c(&mtl));
@@ -354,9 +342,8 @@ static void images_of_materials_are_used(void **state)
 
 // Heights are white 1/50 of the image's width above black; a colored image of map_Bump has normals, as that
 // of norm. -bm multiplies either.
-static void bumps_are_normals(void **state)
+TEST(bumps_are_normals)
 {
-    (void)state;
     const char *ramp = "P3 5 1 255 0 0 0 51 51 51 102 102 102 51 51 51 0 0 0\n",
                *colors = "P3 2 1 255 0 51 102 153 204 255\n";
     for (int i = 0; i < 4; i++) {
@@ -389,9 +376,8 @@ static void bumps_are_normals(void **state)
     }
 }
 
-static void what_is_not_used_is_reported_once(void **state)
+TEST(what_is_not_used_is_reported_once)
 {
-    (void)state;
     file_write(
         "a.mtl",
         "newmtl red\nKd inf 1e39 nan\nKs 0 x 0\nNs 1e39\nd\nNi 1e39\nKe -1 0 0\nTf xyz 1\nmap_refl b.png\n"
@@ -425,9 +411,8 @@ static void what_is_not_used_is_reported_once(void **state)
 }
 
 // Faces are read without texture coordinates and normals that the file lacks.
-static void missing_parts_are_dropped(void **state)
+TEST(missing_parts_are_dropped)
 {
-    (void)state;
     static const struct {
         const char *obj, *expected;
         bool has_uvs, has_normals;
@@ -447,7 +432,7 @@ static void missing_parts_are_dropped(void **state)
          "a.obj:5:9: warning: a face names texture coordinate 2 (from 1); there are 1: not used\n", true,
          false},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Scene scene = scene_of_obj(cases[i].obj, cases[i].expected);
         const Mesh *mesh = &scene.meshes.items[0];
         assert_int_equal(mesh->uvs != NULL, cases[i].has_uvs);
@@ -460,9 +445,8 @@ static void missing_parts_are_dropped(void **state)
 }
 
 // Each warning about a file is printed once, however often a scene names the file.
-static void files_have_each_message_once(void **state)
+TEST(files_have_each_message_once)
 {
-    (void)state;
     Text scene_text = {0}, obj = {0}, expected = {0};
     text_appendf(&scene_text, SCENE_OF(""));
     for (int i = 0; i < 29; i++)
@@ -497,9 +481,8 @@ static void files_have_each_message_once(void **state)
 }
 
 // Nine times the most corners a face may have: to cut them would take half a minute.
-static void many_large_polygons_are_refused(void **state)
+TEST(many_large_polygons_are_refused)
 {
-    (void)state;
     Text text = {0};
     text_appendf(&text, CORNERS);
     for (int face = 0; face < 9; face++) {
@@ -517,9 +500,8 @@ static void many_large_polygons_are_refused(void **state)
                    "2415919104, more than 2147483648\n"));
 }
 
-static void faults_have_their_place(void **state)
+TEST(faults_have_their_place)
 {
-    (void)state;
     static const struct {
         const char *obj, *expected;
     } cases[] = {
@@ -549,7 +531,7 @@ static void faults_have_their_place(void **state)
         {CORNERS "f 1 2\n", "scene.yaml:4:18: error: a.obj: no triangles\n"},
         {"", "scene.yaml:4:18: error: a.obj: no triangles\n"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Scene scene;
         file_write("a.obj", cases[i].obj);
         assert_false(scene_read(&scene, SCENE_OF(""), cases[i].expected));
@@ -581,9 +563,8 @@ static void progress_note(void *context, const char *path)
 }
 
 // The material library is read last.
-static void test_progress(void **state)
+TEST(test_progress)
 {
-    (void)state;
     file_write("a.obj", "mtllib missing.mtl\nusemtl red\n" CORNERS "f 1 2 3\nf 1 2 3\n");
     const char text[] = SCENE_OF("") "  - sphere: {center: [0, 0, 0], radius: 1}\n";
     const Source source = {.file = "scene.yaml", .bytes = text, .length = strlen(text)};

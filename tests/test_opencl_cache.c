@@ -2,11 +2,10 @@
 #include "host/base/array.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
 #include <fcntl.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +13,6 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 static const char key[] = "device x\ntext y";
 static const char machine_code[] = "machine\0code\xff\n";
@@ -42,9 +40,8 @@ static bool loads(const char *entry_key)
     return found;
 }
 
-static void test_store_and_load(void **state)
+TEST(test_store_and_load)
 {
-    (void)state;
     assert_false(loads(key));
     store(key);
     assert_true(loads(key));
@@ -68,9 +65,8 @@ static void entry_set_used(const char *entry_key, time_t when)
 }
 
 // Whatever the umask permits, entries are private.
-static void test_modes(void **state)
+TEST(test_modes)
 {
-    (void)state;
     mode_t before = umask(0);
     store(key);
     umask(before);
@@ -121,12 +117,11 @@ static void assert_refused(const char *reason)
 }
 
 // An entry that others may have written is not loaded, and replaced.
-static void test_entry_others_may_access(void **state)
+TEST(test_entry_others_may_access)
 {
-    (void)state;
     static const mode_t modes[] = {0620, 0602, 0644};
     char *path = cache_entry_path(key);
-    for (size_t i = 0; i < sizeof modes / sizeof *modes; i++) {
+    for (size_t i = 0; i < COUNT_OF(modes); i++) {
         store(key);
         assert_int_equal(chmod(path, modes[i]), 0);
         assert_refused("others may access it");
@@ -138,9 +133,8 @@ static void test_entry_others_may_access(void **state)
 }
 
 // Nothing is loaded from a folder that belongs to another user, or stored in it.
-static void test_folder_of_others(void **state)
+TEST(test_folder_of_others)
 {
-    (void)state;
     char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
     assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
     for (int kind = 0; kind < 3; kind++) {
@@ -176,9 +170,8 @@ static void test_folder_of_others(void **state)
 }
 
 // Entries are useless without the key of their hash. A key that others may know is replaced.
-static void test_key_of_the_hash(void **state)
+TEST(test_key_of_the_hash)
 {
-    (void)state;
     char *cache = cache_folder_path();
     store(key);
     assert_int_equal(chdir(cache), 0);
@@ -195,9 +188,8 @@ static void test_key_of_the_hash(void **state)
 }
 
 // A file of 20 GB without contents is not read, and goes first.
-static void test_too_large(void **state)
+TEST(test_too_large)
 {
-    (void)state;
     store(key);
     store("another key");
     char *path = cache_entry_path(key);
@@ -219,9 +211,8 @@ static void test_too_large(void **state)
 }
 
 // Four processes on an empty cache make one key of the hash: what each stores, all load.
-static void test_race_on_an_empty_cache(void **state)
+TEST(test_race_on_an_empty_cache)
 {
-    (void)state;
     enum { PROCESSES = 4, ROUNDS = 20 };
     for (int round = 0; round < ROUNDS; round++) {
         char keys[PROCESSES][16];
@@ -246,9 +237,8 @@ static void test_race_on_an_empty_cache(void **state)
     }
 }
 
-static void test_list(void **state)
+TEST(test_list)
 {
-    (void)state;
     static const char described[] = "options x\nlaunch render 8x1\ndevice y, z\n";
     MessageList messages = {0};
     CacheEntries entries;
@@ -285,9 +275,8 @@ static void test_list(void **state)
     free(path);
 }
 
-static void test_clear_that_fails(void **state)
+TEST(test_clear_that_fails)
 {
-    (void)state;
     MessageList messages = {0};
     char *path = cache_folder_path(), *secret;
     assert_true(asprintf(&secret, "%s/hash-key", path) > 0);
@@ -304,9 +293,8 @@ static void test_clear_that_fails(void **state)
     free(path);
 }
 
-static void test_folder_without_rights(void **state)
+TEST(test_folder_without_rights)
 {
-    (void)state;
     char *cache = cache_folder_path();
     store(key);
     assert_int_equal(chmod(cache, 0), 0);
@@ -316,9 +304,8 @@ static void test_folder_without_rights(void **state)
 }
 
 // However few files may be open, no entry is left out in silence, and none is called removed that is not.
-static void test_few_descriptors(void **state)
+TEST(test_few_descriptors)
 {
-    (void)state;
     enum { ROOM_END = 4 };
     struct rlimit usual;
     assert_int_equal(getrlimit(RLIMIT_NOFILE, &usual), 0);
@@ -347,9 +334,8 @@ static void test_few_descriptors(void **state)
 }
 
 // Each byte changed, each shorter length, one byte more; then repaired by storing again.
-static void test_damage(void **state)
+TEST(test_damage)
 {
-    (void)state;
     store(key);
     char *path = cache_entry_path(key);
     MessageList messages = {0};
@@ -379,9 +365,8 @@ static void test_damage(void **state)
 }
 
 // As if two keys had one hash: the entry of the one lies where the other is looked for.
-static void test_entry_of_another_key(void **state)
+TEST(test_entry_of_another_key)
 {
-    (void)state;
     store("another key");
     store(key);
     char *from = cache_entry_path("another key"), *to = cache_entry_path(key);
@@ -391,9 +376,8 @@ static void test_entry_of_another_key(void **state)
     free(to);
 }
 
-static void test_entry_without_rights(void **state)
+TEST(test_entry_without_rights)
 {
-    (void)state;
     store(key);
     char *path = cache_entry_path(key);
     assert_int_equal(chmod(path, 0), 0);
@@ -404,9 +388,8 @@ static void test_entry_without_rights(void **state)
 }
 
 // Replaced when the key is stored; a pipe that nobody writes into is not waited for.
-static void test_entry_that_is_none_of_ours(void **state)
+TEST(test_entry_that_is_none_of_ours)
 {
-    (void)state;
     char *path = cache_entry_path(key), *other = cache_entry_path("another key");
     alarm(60);
     for (int kind = 0; kind < 3; kind++) {
@@ -434,9 +417,8 @@ static void test_entry_that_is_none_of_ours(void **state)
     free(other);
 }
 
-static void test_no_place(void **state)
+TEST(test_no_place)
 {
-    (void)state;
     const char *before = getenv("HOME");
     char *home = before ? strdup(before) : NULL;
     unsetenv("HOME");
@@ -465,9 +447,8 @@ static void test_no_place(void **state)
 }
 
 // A file in place of the folder stops even root.
-static void test_unwritable(void **state)
+TEST(test_unwritable)
 {
-    (void)state;
     char *path = NULL;
     assert_true(asprintf(&path, "%s/glint", scratch) > 0);
     file_write_bytes(path, "in the way", 10);
@@ -482,9 +463,8 @@ static void test_unwritable(void **state)
     free(path);
 }
 
-static void test_folder_in_place_of_entry(void **state)
+TEST(test_folder_in_place_of_entry)
 {
-    (void)state;
     store(key);
     char *path = cache_entry_path(key);
     assert_int_equal(unlink(path), 0);
@@ -496,9 +476,8 @@ static void test_folder_in_place_of_entry(void **state)
 }
 
 // While two processes replace the entry, a reader always finds it whole.
-static void test_many_processes(void **state)
+TEST(test_many_processes)
 {
-    (void)state;
     store(key);
     pid_t writers[2];
     for (int i = 0; i < 2; i++) {
@@ -520,11 +499,10 @@ static void test_many_processes(void **state)
 }
 
 // The entries that were used last stay, whenever they were stored.
-static void test_trim(void **state)
+TEST(test_trim)
 {
-    (void)state;
     static const char *const keys[] = {"key a", "key b", "key c", "key d"};
-    enum { KEY_COUNT = sizeof keys / sizeof *keys };
+    enum { KEY_COUNT = COUNT_OF(keys) };
     for (int i = 0; i < KEY_COUNT; i++) {
         store(keys[i]);
         entry_set_used(keys[i], 1000 + i);

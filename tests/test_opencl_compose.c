@@ -1,12 +1,10 @@
 // The composed kernel text, its hash, the judgement of event times, and work-groups cut
 // to fit: all without a device.
 #include "host/opencl/compose.h"
+#include "tests/check.h"
 #include "tests/child.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 static const EmbeddedFile files[] = {
     {"root.cl", "// root\n#include \"a.h\"\n  #  include \"kernels/b.h\" // again\n#include \"a.h\"\nlast"},
@@ -16,9 +14,8 @@ static const EmbeddedFile files[] = {
     {NULL, NULL},
 };
 
-static void test_each_include_once(void **state)
+TEST(test_each_include_once)
 {
-    (void)state;
     char *text = kernel_compose(files, "root.cl", "#define X 1");
     assert_string_equal(text, "#line 1 \"prelude\"\n#define X 1\n"
                               "#line 1 \"root.cl\"\n// root\n"
@@ -37,17 +34,15 @@ static void compose_root(void *root)
     free(kernel_compose(files, root, ""));
 }
 
-static void test_missing_files(void **state)
+TEST(test_missing_files)
 {
-    (void)state;
     char lost[] = "lost.cl", root[] = "root";
     assert_non_null(strstr(child_run(compose_root, lost, sizeof lost).errors, "kernel file gone.h is not"));
     assert_non_null(strstr(child_run(compose_root, root, sizeof root).errors, "kernel file root is not"));
 }
 
-static void test_every_embedded_file_composes(void **state)
+TEST(test_every_embedded_file_composes)
 {
-    (void)state;
     for (const EmbeddedFile *file = kernel_files; file->name; file++) {
         char *text = program_text(file->name, "");
         if (!text) fail_msg("%s", file->name);
@@ -56,9 +51,8 @@ static void test_every_embedded_file_composes(void **state)
     }
 }
 
-static void test_event_times(void **state)
+TEST(test_event_times)
 {
-    (void)state;
     static const struct {
         cl_ulong start, end;
         double host, resolution, seconds;
@@ -74,7 +68,7 @@ static void test_event_times(void **state)
         {2000, 1002000, 0.98e-3, 0, 1e-3, false},   // 2 % longer
         {2000, 1002000, 0.98e-3, 1e-4, 1e-3, true}, // the same with a coarse timer
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         LaunchTime time = launch_time_judge(cases[i].start, cases[i].end, cases[i].host, cases[i].resolution);
         assert_float_equal(time.event_seconds, cases[i].seconds, 1e-12);
         assert_int_equal(time.trusted, cases[i].trusted);
@@ -82,9 +76,8 @@ static void test_event_times(void **state)
     }
 }
 
-static void test_work_groups_fit(void **state)
+TEST(test_work_groups_fit)
 {
-    (void)state;
     static const struct {
         size_t preferred[2], largest, sides[2], fit[2];
     } cases[] = {
@@ -94,7 +87,7 @@ static void test_work_groups_fit(void **state)
         {{8, 8}, 64, {64, 1}, {8, 1}},   {{8, 8}, 64, {5, 64}, {4, 8}},
         {{64, 1}, 48, {64, 1}, {32, 1}}, {{1, 1}, 1, {1, 1}, {1, 1}},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         size_t sides[2] = {cases[i].preferred[0], cases[i].preferred[1]};
         work_group_fit(sides, 2, cases[i].largest, cases[i].sides);
         assert_int_equal(sides[0], cases[i].fit[0]);

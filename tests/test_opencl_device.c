@@ -1,12 +1,10 @@
 // Choice among fabricated devices, and the list of the real ones.
 #include "host/opencl/device.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 static Device fabricated(unsigned index, cl_device_type type, const char *name, const char *platform)
 {
@@ -50,9 +48,8 @@ static void machine_fill(Machine *machine)
     machine->list = (DeviceList){.items = items, .count = 6, .platform_count = 3};
 }
 
-static void test_choice(void **state)
+TEST(test_choice)
 {
-    (void)state;
     static const struct {
         const char *selector;
         int index;
@@ -95,7 +92,7 @@ static void test_choice(void **state)
     };
     Machine machine = {0};
     machine_fill(&machine);
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         MessageList messages = {0};
         const Device *device = device_choose(&machine.list, cases[i].selector, &messages);
         int index = device ? (int)device->index : -1;
@@ -112,9 +109,8 @@ static void test_choice(void **state)
     }
 }
 
-static void test_choice_falls_back(void **state)
+TEST(test_choice_falls_back)
 {
-    (void)state;
     Machine machine = {0};
     machine_fill(&machine);
     MessageList messages = {0};
@@ -136,12 +132,11 @@ static void test_choice_falls_back(void **state)
     message_list_free(&messages);
 }
 
-static void test_lanes(void **state)
+TEST(test_lanes)
 {
-    (void)state;
     static const unsigned cases[][2] = {{1, 1}, {2, 1}, {3, 1}, {4, 4}, {8, 8}, {12, 8}, {16, 16}, {64, 16}};
     Device device = fabricated(0, CL_DEVICE_TYPE_CPU, "", "");
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         device.native_float_width = cases[i][0];
         device.native_double_width = cases[i][0] / 2;
         assert_int_equal(device_lanes(&device, false, 0), cases[i][1]);
@@ -157,9 +152,8 @@ static void test_lanes(void **state)
     assert_int_equal(device_lanes(&device, false, 16), 16);
 }
 
-static void test_selector(void **state)
+TEST(test_selector)
 {
-    (void)state;
     unsetenv("GLINT_DEVICE");
     assert_null(device_selector(NULL));
     setenv("GLINT_DEVICE", "", 1);
@@ -197,18 +191,16 @@ static void list_look(void *result)
     device_list_close(&list);
 }
 
-static void test_list_of_this_machine(void **state)
+TEST(test_list_of_this_machine)
 {
-    (void)state;
     ListFacts facts = {0};
     assert_int_equal(child_run(list_look, &facts, sizeof facts).status, 0);
     assert_true(facts.count > 0);
     assert_true(facts.sound);
 }
 
-static void test_list_without_platforms(void **state)
+TEST(test_list_without_platforms)
 {
-    (void)state;
     const char *before = getenv("OCL_ICD_VENDORS");
     char *kept = before ? strdup(before) : NULL;
     char *empty = scratch_open();

@@ -3,14 +3,11 @@
 // run_tests: first
 // run_tests: sanitized
 #include "host/base/memory.h"
+#include "tests/check.h"
 #include "tests/failing/calls.h"
 #include "tests/failing/work.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 // Fails a call. It must be reported where `is_needed`; else the work is done without it.
 static void call_fail(const char *call, size_t index, bool returns_null, bool is_needed)
@@ -46,14 +43,13 @@ static void calls_fail(const char *call, bool returns_null, bool is_needed)
         call_fail(call, i, returns_null, is_needed);
 }
 
-static void test_needed_calls(void **state)
+TEST(test_needed_calls)
 {
-    (void)state;
     static const char *const needed[] = {
         "clCreateContext", "clCreateCommandQueue",   "clCreateBuffer",      "clSetKernelArg",
         "clFinish",        "clEnqueueWriteBuffer",   "clEnqueueReadBuffer", "clEnqueueMapBuffer",
         "clGetEventInfo",  "clEnqueueNDRangeKernel", "clWaitForEvents"};
-    for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
+    for (size_t i = 0; i < COUNT_OF(needed); i++)
         calls_fail(needed[i], false, true);
     // only buffers in the host's memory need it
     if (work_device->type & CL_DEVICE_TYPE_CPU) calls_fail("clSetMemObjectDestructorCallback", false, true);
@@ -61,9 +57,8 @@ static void test_needed_calls(void **state)
 }
 
 // Needed where a launch follows; the last two, of the trace, come after all results.
-static void test_unmaps(void **state)
+TEST(test_unmaps)
 {
-    (void)state;
     static const char call[] = "clEnqueueUnmapMemObject";
     assert_work_is_right();
     size_t count = call_count(call)->count;
@@ -73,33 +68,30 @@ static void test_unmaps(void **state)
     assert_work_is_right();
 }
 
-static void test_needed_objects(void **state)
+TEST(test_needed_objects)
 {
-    (void)state;
     static const char *const creating[] = {"clCreateContext", "clCreateCommandQueue", "clCreateBuffer",
                                            "clEnqueueMapBuffer"};
-    for (size_t i = 0; i < sizeof creating / sizeof *creating; i++)
+    for (size_t i = 0; i < COUNT_OF(creating); i++)
         calls_fail(creating[i], true, true);
     assert_work_is_right();
 }
 
 // Times, a kernel's limit of work-items, a binary for the cache, and releases.
-static void test_dispensable_calls(void **state)
+TEST(test_dispensable_calls)
 {
-    (void)state;
     static const char *const dispensable[] = {
         "clGetEventProfilingInfo", "clGetKernelWorkGroupInfo", "clGetProgramInfo",      "clReleaseEvent",
         "clReleaseMemObject",      "clReleaseKernel",          "clReleaseProgram",      "clReleaseContext",
         "clReleaseCommandQueue",   "clGetKernelInfo",          "clGetProgramBuildInfo", "clGetMemObjectInfo"};
-    for (size_t i = 0; i < sizeof dispensable / sizeof *dispensable; i++)
+    for (size_t i = 0; i < COUNT_OF(dispensable); i++)
         call_fail(dispensable[i], EVERY_CALL, false, false);
     assert_work_is_right();
 }
 
 // A build without a log says so, and names the disk where it is full.
-static void test_empty_build_log(void **state)
+TEST(test_empty_build_log)
 {
-    (void)state;
     for (int full = 0; full < 2; full++) {
         disk_is_full = full == 1;
         injected.call = "clBuildProgram";
@@ -119,9 +111,8 @@ static void test_empty_build_log(void **state)
 
 // A cached program that the driver refuses, or from which it creates no kernel, is built from source, and
 // without a cache every program is. After a failed build, functions are built out of line.
-static void test_builds(void **state)
+TEST(test_builds)
 {
-    (void)state;
     calls_fail("clCreateProgramWithBinary", false, false);
     calls_fail("clCreateProgramWithBinary", true, false);
     calls_fail("clBuildProgram", false, false);
@@ -145,12 +136,11 @@ static void test_builds(void **state)
 }
 
 // The list says which call failed first, and so does the message where no device is left.
-static void test_discovery(void **state)
+TEST(test_discovery)
 {
-    (void)state;
     static const char *const queries[] = {"clGetPlatformIDs", "clGetPlatformInfo", "clGetDeviceIDs",
                                           "clGetDeviceInfo"};
-    for (size_t i = 0; i < sizeof queries / sizeof *queries; i++) {
+    for (size_t i = 0; i < COUNT_OF(queries); i++) {
         injected.call = NULL;
         for (size_t index = 0, count = 1; index < count; index++) {
             call_counts_clear();
@@ -178,9 +168,8 @@ static void test_discovery(void **state)
 }
 
 // A device whose memory is unknown is used until a buffer cannot be created.
-static void test_unknown_memory(void **state)
+TEST(test_unknown_memory)
 {
-    (void)state;
     const Device *known = work_device;
     Device unknown = *work_device;
     unknown.memory_bytes = unknown.largest_buffer_bytes = 0;

@@ -6,17 +6,15 @@
 #include "host/base/fault.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/files.h"
 #include <ftw.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 // features.h has nothing for the device: the prelude is the kernel.
 static const char triple[] =
@@ -129,9 +127,8 @@ static void drivers_own_cache_empty(void)
     free(empty);
 }
 
-static void test_cold_and_warm(void **state)
+TEST(test_cold_and_warm)
 {
-    (void)state;
     Run cold = run_in_child(triple_request());
     assert_false(cold.from_cache);
     drivers_own_cache_empty();
@@ -143,9 +140,8 @@ static void test_cold_and_warm(void **state)
     if (warm.is_pocl) assert_true(warm.compiled_before_launch > 0);
 }
 
-static void test_what_the_key_holds(void **state)
+TEST(test_what_the_key_holds)
 {
-    (void)state;
     ProgramRequest request = triple_request();
     run_in_child(request);
     assert_true(run_in_child(request).from_cache);
@@ -162,9 +158,8 @@ static void test_what_the_key_holds(void **state)
     free(other);
 }
 
-static void test_no_cache(void **state)
+TEST(test_no_cache)
 {
-    (void)state;
     ProgramRequest request = triple_request();
     run_in_child(request);
     request.no_cache = true;
@@ -202,9 +197,8 @@ static Text the_entry(char **key)
     return entry;
 }
 
-static void test_damaged_entry_is_replaced(void **state)
+TEST(test_damaged_entry_is_replaced)
 {
-    (void)state;
     run_in_child(triple_request());
     char *key;
     Text entry = the_entry(&key);
@@ -222,9 +216,8 @@ static void test_damaged_entry_is_replaced(void **state)
 }
 
 // A whole entry whose binary the driver cannot use.
-static void test_refused_binary_is_replaced(void **state)
+TEST(test_refused_binary_is_replaced)
 {
-    (void)state;
     run_in_child(triple_request());
     char *key;
     Text entry = the_entry(&key), nonsense = {0};
@@ -239,9 +232,8 @@ static void test_refused_binary_is_replaced(void **state)
     text_free(&nonsense);
 }
 
-static void test_two_processes_at_once(void **state)
+TEST(test_two_processes_at_once)
 {
-    (void)state;
     pid_t children[2];
     for (int i = 0; i < 2; i++) {
         children[i] = fork();
@@ -259,9 +251,8 @@ static void test_two_processes_at_once(void **state)
     assert_true(run_in_child(triple_request()).from_cache);
 }
 
-static void test_unwritable_cache(void **state)
+TEST(test_unwritable_cache)
 {
-    (void)state;
     setenv("XDG_CACHE_HOME", "/dev/null", 1);
     assert_false(run_in_child(triple_request()).from_cache);
     assert_false(run_in_child(triple_request()).from_cache);
@@ -273,9 +264,8 @@ static bool names_place(const char *log, const char *place)
     return strstr(log, place) || strstr(log, "<kernel>:");
 }
 
-static void test_text_that_does_not_compile(void **state)
+TEST(test_text_that_does_not_compile)
 {
-    (void)state;
     Run run = {.request = {.root = "features.h",
                            .prelude = "// one\nkernel void triple(global uint *v) { v[0] = x; }"}};
     ChildEnd end = child_run(run_triple, &run, sizeof run);
@@ -292,9 +282,8 @@ static void test_text_that_does_not_compile(void **state)
     text_free(&text);
 }
 
-static void test_missing_root(void **state)
+TEST(test_missing_root)
 {
-    (void)state;
     Run run = {.request = {.root = "absent.cl", .prelude = ""}};
     ChildEnd end = child_run(run_triple, &run, sizeof run);
     assert_int_equal(end.status, 2);
@@ -332,9 +321,8 @@ static void build_broken(void *result)
     opened_close(&opened);
 }
 
-static void test_place_of_a_compile_error(void **state)
+TEST(test_place_of_a_compile_error)
 {
-    (void)state;
     BuildLog log = {0};
     assert_int_equal(child_run(build_broken, &log, sizeof log).status, 0);
     if (!names_place(log.log, "broken.h:4")) print_error("%s\n", log.log);
@@ -374,9 +362,8 @@ static void make_empty_buffers(void *result)
     opened_close(&opened);
 }
 
-static void test_failures(void **state)
+TEST(test_failures)
 {
-    (void)state;
     Run run = {.request = triple_request()};
     ChildEnd end = child_run(ask_for_too_much, &run, sizeof run);
     assert_int_equal(end.status, 2);

@@ -6,14 +6,11 @@
 #include "host/scene/object_transform.h"
 #include "host/scene/oval.h"
 #include "host/verify/reference.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-
-#include <cmocka.h>
 
 enum { RAYS = 2000 };
 
@@ -192,9 +189,8 @@ static void hits_ovals(void **state)
 }
 
 // What is certain at `certified` is right, also at outlines and rims.
-static void certain_hits_of_ovals_are_right(void **state)
+TEST(certain_hits_of_ovals_are_right)
 {
-    (void)state;
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     static TraceRay rays[RAYS];
     static TraceHit hits[RAYS];
@@ -231,9 +227,8 @@ static void certain_hits_of_ovals_are_right(void **state)
 
 // An ellipsoid with the semi-axes s along the columns of a rotation R is |S^-1 R^T (p - c)| = 1, with the
 // gradient R S^-2 R^T (p - c) (Glassner, An Introduction to Ray Tracing, 1989, chapter 2).
-static void ellipsoids_follow_the_textbook(void **state)
+TEST(ellipsoids_follow_the_textbook)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
     static TraceRay rays[RAYS];
     static TraceHit hits[RAYS];

@@ -1,11 +1,9 @@
 // Tests how long launches take if parts of an image have very different costs: the pace alone, without a
 // device or a clock.
 #include "host/render/band.h"
-#include <setjmp.h>
-#include <stdarg.h>
+#include "tests/check.h"
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { WIDTH = 640, HEIGHT = 360, ROWS_MAX = 512, FIRST_LAUNCH = 4096, GROWTH_MAX = 4 };
 
@@ -65,11 +63,10 @@ static Run run(uint32_t sample_count, uint32_t glass_row)
 }
 
 // A launch of as many samples as the sky allows would take 100 s.
-static void glass_below_sky_has_no_long_launch(void **state)
+TEST(glass_below_sky_has_no_long_launch)
 {
-    (void)state;
     static const uint32_t sample_counts[] = {1, 64};
-    for (size_t i = 0; i < sizeof sample_counts / sizeof *sample_counts; i++)
+    for (size_t i = 0; i < COUNT_OF(sample_counts); i++)
         for (uint32_t glass_row = 1; glass_row <= HEIGHT; glass_row++) {
             Run got = run(sample_counts[i], glass_row);
             // the rows of glass below sky in a launch that would take a quarter of the target if all were sky
@@ -79,9 +76,8 @@ static void glass_below_sky_has_no_long_launch(void **state)
         }
 }
 
-static void rows_shrink_after_a_slow_band(void **state)
+TEST(rows_shrink_after_a_slow_band)
 {
-    (void)state;
     Pace pace = {.target_seconds = target};
     pace_begin_band(&pace);
     pace_note_launch(&pace, 100000, 100000 * cheap);
@@ -96,9 +92,8 @@ static void rows_shrink_after_a_slow_band(void **state)
     assert_true(pace_band_samples(&pace) >= 339999 && pace_band_samples(&pace) <= 340000);
 }
 
-static void launches_begin_small(void **state)
+TEST(launches_begin_small)
 {
-    (void)state;
     Pace pace = {.target_seconds = target};
     pace_begin_band(&pace);
     assert_int_equal(pace_launch_samples(&pace), FIRST_LAUNCH);
@@ -125,13 +120,12 @@ static void launches_begin_small(void **state)
 }
 
 // The device is kept busy where that makes launches longer than the target, but not in the first ones.
-static void busy_device_grows_by_four(void **state)
+TEST(busy_device_grows_by_four)
 {
-    (void)state;
     Pace pace = {.target_seconds = target, .samples_min = 50000};
     pace_begin_band(&pace);
     static const uint64_t expected[] = {4096, 16384, 50000, 50000};
-    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+    for (size_t i = 0; i < COUNT_OF(expected); i++) {
         assert_int_equal(pace_launch_samples(&pace), expected[i]);
         pace_note_launch(&pace, expected[i], (double)expected[i] * dear);
     }
@@ -140,11 +134,10 @@ static void busy_device_grows_by_four(void **state)
     assert_int_equal(pace_launch_samples(&pace), FIRST_LAUNCH);
 }
 
-static void plain_images_have_few_launches(void **state)
+TEST(plain_images_have_few_launches)
 {
-    (void)state;
     static const uint32_t sample_counts[] = {1, 4, 16, 64, 256};
-    for (size_t i = 0; i < sizeof sample_counts / sizeof *sample_counts; i++) {
+    for (size_t i = 0; i < COUNT_OF(sample_counts); i++) {
         Run got = run(sample_counts[i], HEIGHT);
         double least = (double)got.samples * cheap / target;
         assert_true(got.longest <= 1.01 * target);
@@ -155,13 +148,12 @@ static void plain_images_have_few_launches(void **state)
 
 // Every pixel is in one part of a place, no part is larger than allowed, and rows that are too wide are
 // split.
-static void parts_cover_a_place(void **state)
+TEST(parts_cover_a_place)
 {
-    (void)state;
     static const uint32_t sizes[][2] = {{1, 1}, {3840, 2160}, {3840, 8}, {1921, 1083}, {7, 500}, {100000, 3}};
     static const size_t groups[] = {1, 8};
     static const TileShape item_shapes[] = {{1, 1}, {16, 16}};
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++)
+    for (size_t i = 0; i < COUNT_OF(sizes); i++)
         for (size_t j = 0; j < 4; j++) {
             const TileShape item = item_shapes[j / 2];
             const size_t side = groups[j % 2];

@@ -1,14 +1,12 @@
 // An image rendered in passes, and by a renderer whose camera was moved, has the bits of one rendered at
 // once; a preview's differs by roundings. run_tests: sanitize-long-only
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { WIDTH = 53, HEIGHT = 37, SAMPLES = 7, AOVS = AOV_T | AOV_OBJECT | AOV_SHADOW };
 
@@ -34,9 +32,8 @@ static bool take(void *context, const Film *band, uint32_t samples)
     return true;
 }
 
-static void passes_give_the_bits_of_one_render(void **state)
+TEST(passes_give_the_bits_of_one_render)
 {
-    (void)state;
     Scene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.sample_count = SAMPLES;
@@ -66,9 +63,8 @@ static bool stop_now(void *context)
     return stop_countdown-- == 0;
 }
 
-static void passes_stop(void **state)
+TEST(passes_stop)
 {
-    (void)state;
     Scene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.sample_count = SAMPLES;
@@ -132,9 +128,8 @@ static void check_moved_renderer(bool moves)
     scene_free(&scene);
 }
 
-static void moved_renderer_gives_the_bits_of_a_new_one(void **state)
+TEST(moved_renderer_gives_the_bits_of_a_new_one)
 {
-    (void)state;
     check_moved_renderer(false);
     check_moved_renderer(true);
 }
@@ -178,9 +173,8 @@ static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
     return rounded;
 }
 
-static void preview_differs_by_roundings(void **state)
+TEST(preview_differs_by_roundings)
 {
-    (void)state;
     preview_check(scene_of_file("scenes/globe.yaml"), BVH_ON, 0.2);
     preview_check(scene_of_file("scenes/spheres16.yaml"), BVH_OFF, 0.2);
     // seen from afar it was rounded by 3e-5
@@ -192,9 +186,8 @@ static void preview_differs_by_roundings(void **state)
 
 // An eye next to a sphere needs the sphere's power, and so a second kernel. An eye that alternates between
 // two places builds each kernel once.
-static void eye_next_to_a_sphere_builds_two_kernels(void **state)
+TEST(eye_next_to_a_sphere_builds_two_kernels)
 {
-    (void)state;
     Scene scene = scene_of_text("two.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 50}\n"
                                             "lights: [{point: {position: [0, 9, -9]}}]\n"
                                             "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125}}]\n");

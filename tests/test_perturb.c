@@ -4,14 +4,10 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
+#include "tests/check.h"
 #include "tests/probe.h"
 #include <float.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { OPERAND_COUNT = 1 << 20 };
 
@@ -105,9 +101,8 @@ static void operands_make(float *a, float *b)
     }
 }
 
-static void wrong_quotients_and_roots_are_repaired(void **state)
+TEST(wrong_quotients_and_roots_are_repaired)
 {
-    (void)state;
     float *numbers[4];
     for (size_t i = 0; i < 4; i++)
         numbers[i] = memory_allocate(OPERAND_COUNT, sizeof(float));
@@ -167,7 +162,7 @@ static void multiply_add(unsigned lanes, const float *a, const float *b, const f
 static void terms_make(float *a, float *b, float *c)
 {
     static const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, FLT_MAX, -FLT_MAX, INFINITY, -INFINITY};
-    enum { SPECIAL_COUNT = sizeof special / sizeof *special };
+    enum { SPECIAL_COUNT = COUNT_OF(special) };
     Random random = {39};
     for (size_t i = 0; i < OPERAND_COUNT; i++) {
         float *factors[] = {&a[i], &b[i]};
@@ -200,9 +195,8 @@ static bool same(float a, float b)
     return isnan(a) ? isnan(b) : a == b && signbit(a) == signbit(b);
 }
 
-static void fma_in_software_is_exact(void **state)
+TEST(fma_in_software_is_exact)
 {
-    (void)state;
     if (!probe_has(PRECISION_STRICT)) skip();
     float *numbers[5];
     for (size_t i = 0; i < 5; i++)

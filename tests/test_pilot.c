@@ -2,16 +2,13 @@
 #include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/measure/pilot.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 enum { WIDTH = 71, HEIGHT = 50, CELL = 5 };
 
@@ -27,9 +24,8 @@ static unsigned place_in_cell(const Film *whole, const double *color, uint32_t x
 }
 
 // Every cell has one, at places that differ, whatever the bands.
-static void sample_has_a_pixel_of_each_cell(void **state)
+TEST(sample_has_a_pixel_of_each_cell)
 {
-    (void)state;
     Scene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_sound_from());
     settings.sample_count = 2;
@@ -53,9 +49,8 @@ static void sample_has_a_pixel_of_each_cell(void **state)
     scene_free(&scene);
 }
 
-static void bound_of_zeros_and_ones(void **state)
+TEST(bound_of_zeros_and_ones)
 {
-    (void)state;
     double values[1000] = {0};
     assert_true(fabs(mean_upper_bound(values, 1000, 0.05) - (pow(0.05, -1e-3) - 1)) < 1e-12);
     values[7] = 1; // (1 + m)^999 m = 20
@@ -69,9 +64,8 @@ static void bound_of_zeros_and_ones(void **state)
 
 // Rare values, as of wrong pixels, in strata that differ: the bound misses the mean no more often than it
 // may, and is not useless (400 zeros alone give 0.006).
-static void bound_covers_the_mean(void **state)
+TEST(bound_covers_the_mean)
 {
-    (void)state;
     enum { TRIALS = 2000, COUNT = 400 };
     const double risk = 0.1;
     Random random = {3};
@@ -102,9 +96,8 @@ static Film film_of(const double *colors, uint32_t count)
     return film;
 }
 
-static void verdicts_of_a_sample(void **state)
+TEST(verdicts_of_a_sample)
 {
-    (void)state;
     enum { COUNT = 1000 };
     double colors[3 * COUNT], wrong[3 * COUNT];
     for (size_t i = 0; i < 3 * COUNT; i++)
@@ -158,9 +151,8 @@ static void verdicts_of_a_sample(void **state)
 }
 
 // Calculated by hand, per channel: the larger square, in all lights, and half of that in each of two mirrors.
-static void scene_bounds_its_colors(void **state)
+TEST(scene_bounds_its_colors)
 {
-    (void)state;
     static const char text[] =
         "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 60}\n"
         "background: [0, 9, 0]\n"
@@ -188,9 +180,8 @@ static void scene_bounds_its_colors(void **state)
 }
 
 // No sample this small proves an RMSE of 1e-6, and every precision keeps one of a thousand.
-static void pilot_chooses(void **state)
+TEST(pilot_chooses)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
     Scene scene = scene_of_file("scenes/globe.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);

@@ -1,10 +1,8 @@
 // The lines of objects in a scene's file, by every reader, and their description.
 #include "host/scene/describe.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-#include <cmocka.h>
 
 enum { OBJECTS_MAX = 4 };
 
@@ -72,10 +70,9 @@ static void check_lines(size_t i, const char *line_end)
 }
 
 // Line ends of Unix, Windows and old Macs.
-static void test_lines(void **state)
+TEST(test_lines)
 {
-    (void)state;
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         check_lines(i, "\n");
         check_lines(i, "\r\n");
         check_lines(i, "\r");
@@ -90,9 +87,8 @@ static void assert_described(const Scene *scene, size_t id, const char *expected
     text_free(&text);
 }
 
-static void test_descriptions(void **state)
+TEST(test_descriptions)
 {
-    (void)state;
     Scene scene = scene_of_text("a.yaml", "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
                                           "lights: [{point: {position: [3, 5, 4]}}]\n"
                                           "materials: {red: {color: [1, 0, 0]}}\n"

@@ -1,16 +1,12 @@
 // PLY files: the layouts that are read, as one square, and the errors for files shorter than they
 // hold.
 #include "host/scene/vector.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #define SCENE                                                                                                \
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \
@@ -53,9 +49,8 @@ static void assert_refused(const Text *text, const char *message)
     text_free(&expected);
 }
 
-static void ascii_layouts_are_read(void **state)
+TEST(ascii_layouts_are_read)
 {
-    (void)state;
     static const char *const texts[] = {
         HEADER CORNERS TRIANGLES,
         // no newline at the end, after a longer line
@@ -78,7 +73,7 @@ static void ascii_layouts_are_read(void **state)
               "0 0 0 0 0\n1 0 0 1 7 2 1 2\n0 1 0 0 0\n1 1 0 0 0\n"
               "6 0 0 1 0 0 1 65535 3 0 1 2\n0 1 3 1 3 2\nand more\n",
     };
-    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+    for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
             static const char *const line_ends[] = {"\n", "\r\n", "\r"};
             Text text = {0};
@@ -148,10 +143,9 @@ static Text binary_square(const Type *type, bool big, const char *line_end)
     return text;
 }
 
-static void binary_layouts_are_read(void **state)
+TEST(binary_layouts_are_read)
 {
-    (void)state;
-    for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
+    for (size_t i = 0; i < COUNT_OF(types); i++) {
         for (int big = 0; big < 2; big++) {
             for (int returns = 0; returns < 2; returns++) {
                 Text text = binary_square(&types[i], big, returns ? "\r\n" : "\n");
@@ -162,9 +156,8 @@ static void binary_layouts_are_read(void **state)
     }
 }
 
-static void faults_name_line_and_row(void **state)
+TEST(faults_name_line_and_row)
 {
-    (void)state;
     static const struct {
         const char *text, *message;
     } cases[] = {
@@ -207,7 +200,7 @@ static void faults_name_line_and_row(void **state)
         {"solid\n", "1:1: error: no PLY file, which starts with a line 'ply'"},
         {"", "1:1: error: no PLY file, which starts with a line 'ply'"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Text text = {0};
         text_appendf(&text, "%s", cases[i].text);
         assert_refused(&text, cases[i].message);
@@ -234,9 +227,8 @@ static Text binary_with_count(const char *header, double count, const Type *type
     return text;
 }
 
-static void binary_faults_name_byte_and_row(void **state)
+TEST(binary_faults_name_byte_and_row)
 {
-    (void)state;
     static const char *const headers[] = {BINARY("uchar"), BINARY("int"), BINARY("double")};
     static const struct {
         size_t header;
@@ -250,7 +242,7 @@ static void binary_faults_name_byte_and_row(void **state)
                  {2, NAN, 7, "nan"},
                  {2, 2.5, 7, "2.5"},
                  {2, 1e300, 7, "1e+300"}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         const Type *type = &types[cases[i].type];
         Text text = binary_with_count(headers[cases[i].header], cases[i].count, type), message = {0};
         text_appendf(&message,
@@ -264,9 +256,8 @@ static void binary_faults_name_byte_and_row(void **state)
 }
 
 // A file truncated anywhere is rejected with the position.
-static void binary_file_cut_short_is_refused(void **state)
+TEST(binary_file_cut_short_is_refused)
 {
-    (void)state;
     Text whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
     assert_square(&whole);
     for (size_t size = strlen(BINARY("uchar")); size < whole.count; size++) {
@@ -292,9 +283,8 @@ static Scene scene_of_ply(const char *ply, const char *expected)
 }
 
 // Normals and texture coordinates of vertices, and those of corners, which a vertex may have several of.
-static void normals_and_uvs_are_read(void **state)
+TEST(normals_and_uvs_are_read)
 {
-    (void)state;
     Scene scene = scene_of_ply(
         ASCII FACES "element vertex 4\n" XYZ "property float nx\nproperty float ny\nproperty float nz\n"
                     "property float s\nproperty double t\n" END TRIANGLES
@@ -329,9 +319,8 @@ static void normals_and_uvs_are_read(void **state)
     scene_free(&scene);
 }
 
-static void what_is_not_used_is_reported(void **state)
+TEST(what_is_not_used_is_reported)
 {
-    (void)state;
     Scene scene = scene_of_ply(ASCII "element vertex 4\n" XYZ "property uchar red\nproperty uchar green\n"
                                      "element edge 1\nproperty int vertex1\nelement empty 9\n" FACES END
                                      "0 0 0 1 1\n1 0 0 1 1\n0 1 0 1 1\n1 1 0 1 1\n0\n" TRIANGLES,
@@ -340,9 +329,8 @@ static void what_is_not_used_is_reported(void **state)
     scene_free(&scene);
 }
 
-static void vertices_without_a_coordinate_are_refused(void **state)
+TEST(vertices_without_a_coordinate_are_refused)
 {
-    (void)state;
     Text text = {0};
     text_appendf(&text,
                  ASCII "element vertex 1\nproperty float x\nproperty float z\n" FACES END "0 0\n" TRIANGLES);

@@ -2,13 +2,9 @@
 #include "host/compile/camera_basis.h"
 #include "host/verify/certify.h"
 #include "host/verify/reference_color.h"
+#include "tests/check.h"
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define MISS         NAN
 #define COUNT(array) (sizeof(array) / sizeof *(array))
@@ -62,9 +58,8 @@ static void check(const Known *known, size_t count)
     }
 }
 
-static void knows_spheres(void **state)
+TEST(knows_spheres)
 {
-    (void)state;
     const Object unit = sphere((Vector3){0, 0, 0}, 1), tiny = sphere((Vector3){0.3, 0.2, 5}, 1e-4);
     const Object ground = sphere((Vector3){0, -1e6, 0}, 1e6);
     const Vector3 z = {0, 0, 1}, zero = {0, 0, 0}, eye = {0, 1, 0};
@@ -90,9 +85,8 @@ static void knows_spheres(void **state)
     check(known, COUNT(known));
 }
 
-static void sees_only_insides(void **state)
+TEST(sees_only_insides)
 {
-    (void)state;
     Object ball = sphere((Vector3){0, 0, 0}, 1),
            tube = cylinder((Vector3){0, 0, -1}, (Vector3){0, 0, 2}, 1, true, false);
     Object cup = frustum(1, 0.5, false);
@@ -107,9 +101,8 @@ static void sees_only_insides(void **state)
     check(known, COUNT(known));
 }
 
-static void knows_flat_shapes(void **state)
+TEST(knows_flat_shapes)
 {
-    (void)state;
     const Object plane = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
     const Object disc = {.kind = SHAPE_DISC, .as.disc = {{0, 0, 2}, {0, 0, 3}, 0.5}};
     const Object box = {.kind = SHAPE_BOX, .as.box = {{-1, -1, -1}, {1, 1, 1}}};
@@ -137,9 +130,8 @@ static void knows_flat_shapes(void **state)
     check(known, COUNT(known));
 }
 
-static void knows_cylinders(void **state)
+TEST(knows_cylinders)
 {
-    (void)state;
     const Vector3 zero = {0, 0, 0}, x = {1, 0, 0}, z = {0, 0, 1};
     const Object infinite = cylinder(zero, z, 1, false, false);
     const Object capped = cylinder(zero, (Vector3){0, 0, 2}, 1, true, true);
@@ -165,9 +157,8 @@ static void knows_cylinders(void **state)
     check(known, COUNT(known));
 }
 
-static void knows_cones(void **state)
+TEST(knows_cones)
 {
-    (void)state;
     const Object half = infinite_cone(0.5), right = infinite_cone(1);
     const Object tip = frustum(1, 0, true), cup = frustum(0.5, 1, false);
     const Vector3 x = {1, 0, 0}, z = {0, 0, 1};
@@ -192,9 +183,8 @@ static void knows_cones(void **state)
 }
 
 // The numbers are those of interval arithmetic.
-static void knows_tori(void **state)
+TEST(knows_tori)
 {
-    (void)state;
     const Object ring = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 3}, 1, 0.25}};
     const Object wire = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 1e-3}};
     const Object spindle = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 2}};
@@ -243,9 +233,8 @@ static double red(const Scene *scene, Vector3 origin, Vector3 direction)
     return reference_color(scene, &ray).color.x;
 }
 
-static void shades_as_phong(void **state)
+TEST(shades_as_phong)
 {
-    (void)state;
     Object floor = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
     Material material = {
         .color = {0.8, 0, 0}, .ambient = 0.5, .diffuse = {0.5, 0, 0}, .specular = 0.25, .shininess = 2};
@@ -276,9 +265,8 @@ static void shades_as_phong(void **state)
     assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), 0.2, 1e-16);
 }
 
-static void casts_shadows(void **state)
+TEST(casts_shadows)
 {
-    (void)state;
     // The shadow of a unit sphere that stands on a plane under a light ten high ends at 10 / sqrt 80.
     Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}},
                         sphere((Vector3){0, 1, 0}, 1)};
@@ -296,9 +284,8 @@ static void casts_shadows(void **state)
     }
 }
 
-static void lays_checkers(void **state)
+TEST(lays_checkers)
 {
-    (void)state;
     Object floor = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
     Material material = {
         .ambient = 1, .checker = true, .checker_size = 2, .checker_colors = {{1, 1, 1}, {0.5, 0.5, 0.5}}};
@@ -315,9 +302,8 @@ static void lays_checkers(void **state)
     assert_near(red(&scene, (Vector3){-1, 5, 1}, down), 0.25, 0);
 }
 
-static void aims_cameras(void **state)
+TEST(aims_cameras)
 {
-    (void)state;
     Camera camera = {.position = {1, 2, 3}, .look_at = {1, 2, -1}, .up = {0, 5, 0}, .half_tangent = 0.5};
     ReferenceRay ray = reference_camera_ray(&camera, 4, 2, 0, 0);
     // Forward -z, half a pixel up from the middle, one and a half to the left; a pixel is 1/2 wide.
@@ -337,9 +323,8 @@ static void aims_cameras(void **state)
     assert_true(ray.direction.x == (Quad)0.5 && ray.direction.y == 0);
 }
 
-static void aims_panoramas(void **state)
+TEST(aims_panoramas)
 {
-    (void)state;
     const Camera camera = {.look_at = {0, 0, -1},
                            .up = {0, 1, 0},
                            .field_axis = FIELD_HORIZONTAL,
@@ -352,7 +337,7 @@ static void aims_panoramas(void **state)
                   {3, 1, -0.38268343236508977, 0, -0.92387953251128674},
                   {5, 0, 0.46193976625564337, 0.8660254037844386, -0.19134171618254489},
                   {7, 2, 0.19134171618254489, -0.8660254037844386, 0.46193976625564337}};
-    for (size_t i = 0; i < sizeof pixels / sizeof *pixels; i++) {
+    for (size_t i = 0; i < COUNT_OF(pixels); i++) {
         const ReferenceRay ray = reference_camera_ray(&camera, 8, 3, pixels[i].column, pixels[i].row);
         const Vector3 expected = {pixels[i].x, pixels[i].y, pixels[i].z};
         assert_true(reference_distance(expected, ray.direction) < 4 * DBL_EPSILON);
@@ -360,9 +345,8 @@ static void aims_panoramas(void **state)
 }
 
 // The camera's vectors in double are those of quadruple precision but for rounding.
-static void rounds_cameras(void **state)
+TEST(rounds_cameras)
 {
-    (void)state;
     Random random = {7};
     for (int i = 0; i < 50; i++) {
         const Camera camera = {.position = vector_scale(random_unit_vector(&random), 5),
@@ -380,9 +364,8 @@ static void rounds_cameras(void **state)
     }
 }
 
-static void rounds_every_number(void **state)
+TEST(rounds_every_number)
 {
-    (void)state;
     const Vector3 third = {1.0 / 3, 1.0 / 3, 1.0 / 3};
     const double rounded = (double)(1.0f / 3);
     Object object = {.kind = SHAPE_BOX, .as.box = {third, third}};
@@ -398,9 +381,8 @@ static void rounds_every_number(void **state)
     assert_near(object.as.cone.radius[1], rounded, 0);
 }
 
-static void finds_the_nearest(void **state)
+TEST(finds_the_nearest)
 {
-    (void)state;
     Object objects[] = {sphere((Vector3){0, 0, 9}, 1), sphere((Vector3){0, 0, 5}, 1),
                         sphere((Vector3){0, 0, 6}, 2)};
     Scene scene = one_object(objects, NULL, NULL, 0);
@@ -416,9 +398,8 @@ static void finds_the_nearest(void **state)
 }
 
 // A ray from a distance of 1 hits a shape of size 1e-6 within 1e-31 of its surface.
-static void finds_small_shapes_exactly(void **state)
+TEST(finds_small_shapes_exactly)
 {
-    (void)state;
     enum { SHAPES = 4 };
     Random random = {1};
     size_t found[SHAPES] = {0};
@@ -449,9 +430,8 @@ static void finds_small_shapes_exactly(void **state)
 }
 
 // A point off the surface along the exact normal is as far from it as it was moved, and the normal is there.
-static void measures_distances(void **state)
+TEST(measures_distances)
 {
-    (void)state;
     size_t measured = 0;
     ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
@@ -483,9 +463,8 @@ static void measures_distances(void **state)
     assert_true(measured > 15 * form_count);
 }
 
-static void knows_highlights(void **state)
+TEST(knows_highlights)
 {
-    (void)state;
     const Quad3 normal = {0, 0, 1}, to_eye = {0, 0, 1};
     const double exponents[] = {0, 1, 10, 1e3, 1e6}, angles[] = {0, 1e-4, 1e-3, 0.1, 1};
     for (size_t i = 0; i < COUNT(exponents); i++)
@@ -501,9 +480,8 @@ static void knows_highlights(void **state)
 }
 
 // Whichever channel it is, and whether the pixel's decisions are right or wrong.
-static void nonfinite_colors_are_errors(void **state)
+TEST(nonfinite_colors_are_errors)
 {
-    (void)state;
     uint32_t places[3][2] = {{0, 0}, {1, 0}, {2, 0}}, objects[3] = {0}, paths[3] = {0}, doubts[3] = {0};
     ReferencePixel pixels[3];
     for (size_t i = 0; i < COUNT(pixels); i++)

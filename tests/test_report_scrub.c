@@ -1,17 +1,12 @@
 // What glint report leaves out of its files.
 #include "host/cli/report_scrub.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
+#include "tests/check.h"
 #include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
 
-#include <cmocka.h>
-
-static void texts_are_scrubbed(void **state)
+TEST(texts_are_scrubbed)
 {
-    (void)state;
     static const struct {
         const char *text, *scrubbed;
     } rows[] = {
@@ -36,7 +31,7 @@ static void texts_are_scrubbed(void **state)
     setenv("USER", "annuser", true);
     setenv("LOGNAME", "annuser", true);
     Scrubber scrubber = scrubber_open("/srv/here");
-    for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    for (size_t i = 0; i < COUNT_OF(rows); i++) {
         Text text = {0};
         text_append(&text, rows[i].text, strlen(rows[i].text));
         Text scrubbed = scrub(&scrubber, &text);
@@ -47,9 +42,8 @@ static void texts_are_scrubbed(void **state)
     scrubber_close(&scrubber);
 }
 
-static void host_is_scrubbed(void **state)
+TEST(host_is_scrubbed)
 {
-    (void)state;
     struct utsname host;
     assert_int_equal(uname(&host), 0);
     if (strlen(host.nodename) < 2 || strcmp(host.nodename, "localhost") == 0) skip();

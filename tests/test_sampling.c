@@ -3,15 +3,11 @@
 //
 // run_tests: sanitize-long-only
 #include "host/base/memory.h"
+#include "tests/check.h"
 #include "tests/probe.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 enum { COUNT = 4096 };
 
@@ -79,9 +75,8 @@ static void assert_net(const Point *points, unsigned log2)
     }
 }
 
-static void points_are_nets(void **state)
+TEST(points_are_nets)
 {
-    (void)state;
     static const int32_t pixels[][2] = {{0, 0}, {1, 0}, {0, 1}, {3839, 2159}};
     Points *all[4];
     for (size_t i = 0; i < 4; i++) {
@@ -99,9 +94,8 @@ static void points_are_nets(void **state)
         free(all[i]);
 }
 
-static void precisions_agree(void **state)
+TEST(precisions_agree)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
     Points *strict = points_make(false, 17, 4, 3), *exact = points_make(true, 17, 4, 3);
     assert_memory_equal(strict->square, exact->square, sizeof strict->square);
@@ -115,9 +109,8 @@ static void precisions_agree(void **state)
 
 // Equal parts of the square are equal parts of the disc: rings and quarters have as many points as their
 // area.
-static void disc_is_uniform(void **state)
+TEST(disc_is_uniform)
 {
-    (void)state;
     enum { RINGS = 16 };
     Points *points = points_make(false, 5, 6, 1);
     size_t rings[RINGS] = {0}, quarters[4] = {0};

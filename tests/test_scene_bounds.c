@@ -1,12 +1,9 @@
 // Bounds against points on each shape, known in closed form.
 #include "host/compile/scene_bounds.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-
-#include <cmocka.h>
 
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nobjects:\n"
 
@@ -23,9 +20,8 @@ static Bounds bounds_of(const char *objects, size_t expected_unbounded_count)
     return bounds;
 }
 
-static void test_sphere_box_triangle(void **state)
+TEST(test_sphere_box_triangle)
 {
-    (void)state;
     Bounds sphere = bounds_of("  - sphere: {center: [1, 2, 3], radius: 2}\n", 0);
     assert_vector(sphere.min, -1, 0, 1);
     assert_vector(sphere.max, 3, 4, 5);
@@ -37,9 +33,8 @@ static void test_sphere_box_triangle(void **state)
     assert_vector(triangle.max, 2, 5, 1);
 }
 
-static void test_discs(void **state)
+TEST(test_discs)
 {
-    (void)state;
     Bounds flat = bounds_of("  - disc: {center: [1, 2, 3], normal: [0, 5, 0], radius: 2}\n", 0);
     assert_vector(flat.min, -1, 2, 1);
     assert_vector(flat.max, 3, 2, 5);
@@ -48,9 +43,8 @@ static void test_discs(void **state)
     assert_vector(tilted.max, sqrt(2), sqrt(2), 2);
 }
 
-static void test_cylinder_and_cone(void **state)
+TEST(test_cylinder_and_cone)
 {
-    (void)state;
     Bounds cylinder =
         bounds_of("  - cylinder: {from: [0, 0, 0], to: [3, 3, 0], radius: 1, caps: false}\n", 0);
     assert_vector(cylinder.min, -sqrt(0.5), -sqrt(0.5), -1);
@@ -60,9 +54,8 @@ static void test_cylinder_and_cone(void **state)
     assert_vector(cone.max, 2, 4, 2);
 }
 
-static void test_unbounded(void **state)
+TEST(test_unbounded)
 {
-    (void)state;
     Bounds bounds = bounds_of("  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                               "  - cylinder: {point: [0, 0, 0], axis: [0, 1, 0], radius: 1}\n"
                               "  - cone: {apex: [0, 0, 0], axis: [0, 1, 0], angle: 10}\n"

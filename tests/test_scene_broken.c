@@ -2,17 +2,14 @@
 // it, and every message has such a scene.
 #include "host/base/array.h"
 #include "host/import/load.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #include <ctype.h>
 #include <dirent.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 enum { BROKEN_SCENES_MIN = 30, SETS_MAX = 40 };
 
@@ -199,9 +196,8 @@ static size_t check_sources(const char *folder)
 }
 
 // Runs after all broken scenes are read.
-static void test_every_message_has_a_scene(void **state)
+TEST(test_every_message_has_a_scene)
 {
-    (void)state;
     // tests/test_scene_yaml.c and test_scene_include.c have them, without a file or with many
     text_appendf(&all_expected, "a scene of more than 2 GiB, recursive include of '', included files");
     size_t count = check_sources("host/import") + check_sources("host/import/yaml");
@@ -209,9 +205,8 @@ static void test_every_message_has_a_scene(void **state)
     text_free(&all_expected);
 }
 
-static void test_names(void **state)
+TEST(test_names)
 {
-    (void)state;
     MessageList messages = {0};
     SceneOptions options = {0};
     Scene scene;

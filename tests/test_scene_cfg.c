@@ -1,12 +1,9 @@
 // `.cfg`: every block's values, and the tolerances.
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #define CAMERA "=>camera :\n{\n\tposition 0 0 5\n\tlook_at 0 0 -1\n}\n"
 #define LIGHT  "=>light :\n{\n\tposition 0 9 0\n\tintensity 1 1 1\n}\n"
@@ -18,9 +15,8 @@ static int set_up(void **state)
     return complete_open("tests/scenes/complete.cfg");
 }
 
-static void test_scene(void **state)
+TEST(test_scene)
 {
-    (void)state;
     assert_vector(complete.camera.position, 0, 0, 5);
     assert_vector(complete.camera.look_at, 0, 0, -1);
     assert_vector(complete.camera.up, 0, 1, 0);
@@ -32,18 +28,16 @@ static void test_scene(void **state)
     assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
 }
 
-static void test_light(void **state)
+TEST(test_light)
 {
-    (void)state;
     assert_int_equal(complete.lights.count, 1);
     assert_int_equal(complete.lights.items[0].kind, LIGHT_POINT);
     assert_vector(complete.lights.items[0].position, 1, 2, 3);
     assert_vector(complete.lights.items[0].color, 0.5, 0.6, 0.7);
 }
 
-static void test_sphere(void **state)
+TEST(test_sphere)
 {
-    (void)state;
     const Object *sphere = &complete.objects.items[0];
     assert_int_equal(sphere->kind, SHAPE_SPHERE);
     assert_vector(sphere->as.sphere.center, 0, -3, -5);
@@ -55,9 +49,8 @@ static void test_sphere(void **state)
     assert_number(material_of(sphere)->shininess, 30);
 }
 
-static void test_plane(void **state)
+TEST(test_plane)
 {
-    (void)state;
     const Object *plane = &complete.objects.items[1];
     assert_int_equal(plane->kind, SHAPE_PLANE);
     assert_vector(plane->as.plane.point, 0, -6, 0);
@@ -65,9 +58,8 @@ static void test_plane(void **state)
     assert_vector(material_of(plane)->color, 0, 0, 1);
 }
 
-static void test_cylinder(void **state)
+TEST(test_cylinder)
 {
-    (void)state;
     const Object *cylinder = &complete.objects.items[2];
     assert_int_equal(cylinder->kind, SHAPE_CYLINDER);
     assert_false(cylinder->as.cylinder.finite);
@@ -77,9 +69,8 @@ static void test_cylinder(void **state)
     assert_number(material_of(cylinder)->specular, 0.25);
 }
 
-static void test_cone(void **state)
+TEST(test_cone)
 {
-    (void)state;
     const Object *cone = &complete.objects.items[3];
     assert_int_equal(cone->kind, SHAPE_CONE);
     assert_false(cone->as.cone.finite);
@@ -88,23 +79,20 @@ static void test_cone(void **state)
     assert_number(cone->as.cone.slope, tan(0.5)); // the angle is in radians
 }
 
-static void test_any_order_and_blanks(void **state)
+TEST(test_any_order_and_blanks)
 {
-    (void)state;
     assert_messages(
         "s.cfg", SPHERE "\r\n\n" LIGHT "=> camera:\r\n\n{\r\n\n  look_at 0 0 1\r\n\tposition 0\t0 0\r\n}\r\n",
         "");
 }
 
-static void test_text_between_blocks_is_skipped(void **state)
+TEST(test_text_between_blocks_is_skipped)
 {
-    (void)state;
     assert_messages("s.cfg", CAMERA "transfo 1 2 3\n" LIGHT SPHERE, "6:1: warning: skipped 'transfo'\n");
 }
 
-static void test_no_lights_no_objects(void **state)
+TEST(test_no_lights_no_objects)
 {
-    (void)state;
     assert_messages("s.cfg", CAMERA, "warning: s.cfg: no objects\nwarning: s.cfg: no lights\n");
 }
 

@@ -1,16 +1,13 @@
 // Tachyon's `.dat`: every statement's values in glint's coordinates, what glint does not show, and a picture
 // that Tachyon's own pixels check.
 #include "host/import/load.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #define CAMERA_OF(projection, end)                                                                           \
     "camera " projection " zoom 1 aspectratio 1 antialiasing 0 raydepth 8\ncenter 0 0 -5 viewdir 0 0 1 "     \
@@ -32,9 +29,8 @@ static int tear_down(void **state)
 }
 
 // z is negated.
-static void test_camera(void **state)
+TEST(test_camera)
 {
-    (void)state;
     const Camera *camera = &complete.camera;
     assert_int_equal(complete.width, 640);
     assert_int_equal(complete.height, 480);
@@ -53,9 +49,8 @@ static void test_camera(void **state)
     scene_free(&scene);
 }
 
-static void test_lights(void **state)
+TEST(test_lights)
 {
-    (void)state;
     const Light *lights = complete.lights.items;
     assert_vector(complete.ambient, 1, 1, 1);
     assert_int_equal(complete.lights.count, 5);
@@ -72,9 +67,8 @@ static void test_lights(void **state)
     assert_vector(lights[4].color, 0.25, 0, 0);
 }
 
-static void test_materials(void **state)
+TEST(test_materials)
 {
-    (void)state;
     const Material *plastic = material_of(&complete.objects.items[0]),
                    *green = material_of(&complete.objects.items[2]),
                    *blue = material_of(&complete.objects.items[8]);
@@ -105,9 +99,8 @@ static void test_materials(void **state)
     scene_free(&scene);
 }
 
-static void test_shapes(void **state)
+TEST(test_shapes)
 {
-    (void)state;
     const Object *objects = complete.objects.items;
     assert_int_equal(complete.objects.count, 16);
     assert_int_equal(objects[0].kind, SHAPE_SPHERE);
@@ -145,9 +138,8 @@ static void test_shapes(void **state)
     assert_vector(objects[13].as.cylinder.axis, -1, 0, 1);
 }
 
-static void test_meshes(void **state)
+TEST(test_meshes)
 {
-    (void)state;
     const Object *ring = &complete.objects.items[14], *array = &complete.objects.items[15];
     assert_int_equal(ring->kind, SHAPE_MESH);
     const Mesh *mesh = &complete.meshes.items[ring->as.mesh.index];
@@ -173,7 +165,7 @@ static void test_meshes(void **state)
                      {{1, 3, 4}, {0, 1, 0}}};
     static const Vector3 vertices[] = {{0, 0, -1}, {1, 0, -1}, {0, 1, -1}, {1, 1, -1}, {2, 2, -2}};
     mesh = &complete.meshes.items[array->as.mesh.index];
-    assert_int_equal(mesh->triangle_count, sizeof triangles / sizeof *triangles);
+    assert_int_equal(mesh->triangle_count, COUNT_OF(triangles));
     for (size_t i = 0; i < mesh->triangle_count; i++) {
         const Color color = complete.materials.items[mesh->materials[i]].color, expected = triangles[i].color;
         assert_vector(color, expected.x, expected.y, expected.z);
@@ -189,9 +181,8 @@ static void test_meshes(void **state)
 
 #define WARNS(text, expected) assert_messages("s.dat", LIT SPHERE text, expected)
 
-static void test_losses(void **state)
+TEST(test_losses)
 {
-    (void)state;
     WARNS("", "");
     WARNS("fog exp2 start 0 end 9 density 0.2 color 0 0 0\nfog off start 0 end 9 density 0 color 0 0 "
           "0\n" SPHERE,
@@ -245,9 +236,8 @@ static void test_losses(void **state)
                     "warning: s.dat: no lights\n");
 }
 
-static void test_fading(void **state)
+TEST(test_fading)
 {
-    (void)state;
     const char *text = BEGIN CAMERA_OF("", "") SPHERE
         "sphere center 0 4 0 rad 1 " TEXTURE
         "light center 3 2 0 rad 0.1 attenuation constant 1 linear 2 quadratic 1 color 1.6 0 0\n";
@@ -259,9 +249,8 @@ static void test_fading(void **state)
     scene_free(&scene);
 }
 
-static void test_frustum(void **state)
+TEST(test_frustum)
 {
-    (void)state;
     Scene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("", "frustum -1 2 -3 1 ") SPHERE);
     assert_number(scene.camera.half_tangent, 2);
     assert_number(scene.camera.frame_aspect, 0.75);
@@ -270,9 +259,8 @@ static void test_frustum(void **state)
     scene_free(&scene);
 }
 
-static void test_orthographic(void **state)
+TEST(test_orthographic)
 {
-    (void)state;
     Scene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("projection orthographic", "") SPHERE);
     assert_true(scene.camera.orthographic);
     assert_number(scene.camera.half_tangent, 0.5);
@@ -281,9 +269,8 @@ static void test_orthographic(void **state)
 
 // Colors of Tachyon 0.99, whose rays go through a pixel's upper right corner, where four pixels of the double
 // resolution meet.
-static void test_picture(void **state)
+TEST(test_picture)
 {
-    (void)state;
     static const char text[] = "begin_scene resolution 40 30\n" CAMERA_OF(
         "", "") "directional_light direction 0.5 -1 1 color 0.9 0.8 0.7\nbackground 0.1 0.2 0.3\n"
                 "plane center 0 -1 0 normal 0 1 0 texture ambient 0.1 diffuse 0.8 specular 0.25 opacity 1 "
@@ -308,7 +295,7 @@ static void test_picture(void **state)
     enum { WIDTH = 80, HEIGHT = 60 };
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     Film film = film_render(&probe_compute, &scene, &settings, 0);
-    for (size_t i = 0; i < sizeof pixels / sizeof *pixels; i++) {
+    for (size_t i = 0; i < COUNT_OF(pixels); i++) {
         const double *corner = film.color + 3 * ((2 * pixels[i].y - 1) * WIDTH + 2 * pixels[i].x + 1);
         for (size_t k = 0; k < 3; k++)
             assert_near((corner[k] + corner[k + 3] + corner[k + 3 * WIDTH] + corner[k + 3 * WIDTH + 3]) / 4,

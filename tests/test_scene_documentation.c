@@ -1,13 +1,10 @@
 // The examples in docs/scene-format.md are scenes that are read without a message, and its tables name every
 // shape.
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 static Text page;
 
@@ -56,9 +53,8 @@ static void check_examples(void **state)
     text_free(&name);
 }
 
-static void test_every_shape_is_named(void **state)
+TEST(test_every_shape_is_named)
 {
-    (void)state;
     for (size_t i = 0; i < SHAPE_COUNT; i++) {
         if (i == SHAPE_OVAL) continue; // not in files
         Text row = {0};
@@ -69,9 +65,8 @@ static void test_every_shape_is_named(void **state)
 }
 
 // The names of colors in the page are those of CSS Color Module Level 3, section 4, with their values.
-static void test_names_of_colors(void **state)
+TEST(test_names_of_colors)
 {
-    (void)state;
     static const struct {
         const char *name, *hex;
     } colors[] = {
@@ -88,8 +83,8 @@ static void test_names_of_colors(void **state)
     size_t count = 0;
     for (const char *at = names; (at = strchr(at, '`')) && at < end; at++)
         count++;
-    assert_int_equal(count, 2 * sizeof colors / sizeof *colors);
-    for (size_t i = 0; i < sizeof colors / sizeof *colors; i++) {
+    assert_int_equal(count, 2 * COUNT_OF(colors));
+    for (size_t i = 0; i < COUNT_OF(colors); i++) {
         Text quoted = {0}, text = {0};
         text_appendf(&quoted, "`%s`", colors[i].name);
         const char *named = strstr(names, text_c(&quoted));

@@ -1,16 +1,13 @@
 // `include` of YAML scenes: what the files give, in which order, and the places of what is wrong in them.
 #include "host/import/load.h"
 #include "host/scene/describe.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-
-#include <cmocka.h>
 
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
 #define LIGHTS "lights: [point: {position: [0, 9, 0]}]\n"
@@ -81,9 +78,8 @@ static void write_forest(const char *scene)
     "  - instance: {of: pair, material: blue}\n"                                                             \
     "  - mesh: {file: triangle.obj}\n"
 
-static void test_files_are_joined(void **state)
+TEST(test_files_are_joined)
 {
-    (void)state;
     write_forest(FOREST);
     Scene scene = scene_set("forest.yaml", NULL, 0);
     assert_vector(scene.camera.position, 0, 0, 9); // the first one
@@ -120,9 +116,8 @@ static void test_files_are_joined(void **state)
     scene_free(&scene);
 }
 
-static void test_scene_has_precedence(void **state)
+TEST(test_scene_has_precedence)
 {
-    (void)state;
     write_forest("include: ground.yaml\nmaterials: {green: {}}\nbackground: 0\n" CAMERA LIGHTS);
     Scene scene = scene_set("forest.yaml", NULL, 0);
     assert_vector(scene.camera.position, 0, 0, -5);
@@ -131,9 +126,8 @@ static void test_scene_has_precedence(void **state)
     scene_free(&scene);
 }
 
-static void test_hash_covers_the_files(void **state)
+TEST(test_hash_covers_the_files)
 {
-    (void)state;
     write_forest(FOREST);
     Scene scene = scene_set("forest.yaml", NULL, 0), same = scene_set("forest.yaml", NULL, 0);
     file_write("parts/colors.yaml", "materials:\n  green: {color: [0, 0.5, 0]}\n");
@@ -146,9 +140,8 @@ static void test_hash_covers_the_files(void **state)
 }
 
 // What an alias repeats in an included file is joined under one of its names alone.
-static void test_aliases_of_files(void **state)
+TEST(test_aliases_of_files)
 {
-    (void)state;
     file_write("alias.yaml", "define: {two: {objects: &s [{sphere: {center: [0, 0, 0], radius: 1}},\n"
                              "                             {sphere: {center: [0, 0, 0], radius: 2}}]}}\n"
                              "objects: *s\n");
@@ -164,9 +157,8 @@ static void test_aliases_of_files(void **state)
     scene_free(&scene);
 }
 
-static void test_values_are_set(void **state)
+TEST(test_values_are_set)
 {
-    (void)state;
     write_forest(FOREST);
     static const char *const overrides[] = {"objects[2].plane.point=[0, 4, 0]", "materials.green.color=blue",
                                             "objects[5]=mesh: {file: triangle.obj}"};
@@ -187,9 +179,8 @@ static void name_append(void *context, const char *path)
     text_appendf(context, "%s\n", path);
 }
 
-static void test_files_are_named(void **state)
+TEST(test_files_are_named)
 {
-    (void)state;
     write_forest(FOREST);
     file_write("ground.yaml", "objects: [\n");
     Text names = {0};
@@ -203,9 +194,8 @@ static void test_files_are_named(void **state)
     text_free(&names);
 }
 
-static void test_names_of_two_files(void **state)
+TEST(test_names_of_two_files)
 {
-    (void)state;
     write_forest("include: [ground.yaml, parts/trees.yaml]\n"
                  "materials:\n  bark: {}\n  green: {}\n"
                  "define: {tree: {objects: []}}\n");
@@ -216,9 +206,8 @@ static void test_names_of_two_files(void **state)
 }
 
 // Messages are in the order of the files, then of the lines.
-static void test_mistakes_in_files(void **state)
+TEST(test_mistakes_in_files)
 {
-    (void)state;
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: -1}\n"
                                "  - mesh: {file: lost.obj}\npurple: 1\n");
     file_write("b.yaml", "objects: [sphere: {}]\n");
@@ -248,9 +237,8 @@ static void test_mistakes_in_files(void **state)
                    "b.yaml:1:1: error: the scene is empty\n");
 }
 
-static void test_cycles(void **state)
+TEST(test_cycles)
 {
-    (void)state;
     file_write("scene.yaml", "include: [parts/a.yaml]\n");
     file_write("parts/a.yaml", "lights: []\ninclude: ../b.yaml\n");
     file_write("b.yaml", "include:\n  - parts/a.yaml\n  - scene.yaml\n  - b.yaml\n");
@@ -260,9 +248,8 @@ static void test_cycles(void **state)
                    "parts/../b.yaml:4:5: error: recursive include of 'parts/../b.yaml'\n");
 }
 
-static void test_number_of_files(void **state)
+TEST(test_number_of_files)
 {
-    (void)state;
     Text list = {0};
     for (int i = 0; i < 100; i++) {
         char name[32];

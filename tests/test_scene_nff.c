@@ -1,13 +1,10 @@
 // `.nff`: every element's values, and what files in the wild hold and is tolerated.
+#include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #define VIEW     "v\nfrom 0 0 -5\nat 0 0 0\nup 0 1 0\nangle 45\n"
 #define LIT      VIEW "l 0 9 0\n"
@@ -24,9 +21,8 @@ static int tear_down(void **state)
     return complete_close(state) + probe_close(state);
 }
 
-static void test_view(void **state)
+TEST(test_view)
 {
-    (void)state;
     assert_int_equal(complete.width, 640);
     assert_int_equal(complete.height, 480);
     assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
@@ -40,9 +36,8 @@ static void test_view(void **state)
 }
 
 // Four lights: each without a color has the intensity sqrt(4) / 8.
-static void test_lights(void **state)
+TEST(test_lights)
 {
-    (void)state;
     assert_int_equal(complete.lights.count, 4);
     const Light *lights = complete.lights.items;
     assert_int_equal(lights[0].kind, LIGHT_POINT);
@@ -54,9 +49,8 @@ static void test_lights(void **state)
     assert_vector(complete.ambient, 0.25, 0.25, 0.25);
 }
 
-static void test_materials(void **state)
+TEST(test_materials)
 {
-    (void)state;
     assert_int_equal(complete.materials.count, 2);
     const Material *matte = &complete.materials.items[0], *glass = matte + 1;
     assert_vector(matte->color, 1, 0.5, 0.25);
@@ -73,9 +67,8 @@ static void test_materials(void **state)
     assert_int_equal(complete.objects.items[2].material, 1);
 }
 
-static void test_round_shapes(void **state)
+TEST(test_round_shapes)
 {
-    (void)state;
     const Object *objects = complete.objects.items;
     assert_int_equal(objects[0].kind, SHAPE_SPHERE);
     assert_vector(objects[0].as.sphere.center, 1, 2, 3);
@@ -114,9 +107,8 @@ static double triangle_area(const Object *triangle)
     return vector_cross(vector_subtract(v[1], v[0]), vector_subtract(v[2], v[0])).z / 2;
 }
 
-static void test_polygons(void **state)
+TEST(test_polygons)
 {
-    (void)state;
     assert_int_equal(complete.objects.count, 6 + 1 + 3 + 1);
     const Object *triangles = complete.objects.items + 6;
     for (size_t i = 0; i < 5; i++)
@@ -135,9 +127,8 @@ static void test_polygons(void **state)
     }
 }
 
-static void test_tolerated(void **state)
+TEST(test_tolerated)
 {
-    (void)state;
     assert_messages("s.nff", LIT MATERIAL SPHERE, "");
     assert_messages("s.nff", "\xEF\xBB\xBF" LIT MATERIAL SPHERE, "");
     assert_messages("s.nff",
@@ -174,9 +165,8 @@ static void check_sides(const char *shape, double reach, bool only_inside)
 
 // Rays along the z axis, from outside and from inside. What is seen only from inside is hit at its far side
 // by both.
-static void test_only_inside(void **state)
+TEST(test_only_inside)
 {
-    (void)state;
     check_sides("s 0 0 0 1", 1, false);
     check_sides("s 0 0 0 -1", 1, true);
     check_sides("c 0 -1 0 1 0 1 0 1", 1, false);

@@ -3,13 +3,10 @@
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/scene/polygon.h"
+#include "tests/check.h"
 
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 typedef struct {
     Vector3 *items;
@@ -132,12 +129,11 @@ static void check_points(const double (*points)[2], size_t count)
 #define CHECK_POINTS(...)                                                                                    \
     do {                                                                                                     \
         const double points[][2] = {__VA_ARGS__};                                                            \
-        check_points(points, sizeof points / sizeof *points);                                                \
+        check_points(points, COUNT_OF(points));                                                              \
     } while (0)
 
-static void test_small(void **state)
+TEST(test_small)
 {
-    (void)state;
     CHECK_POINTS({0, 0}, {1, 0}, {0, 1});
     CHECK_POINTS({0, 0}, {1, 0}, {1, 1}, {0, 1});
     CHECK_POINTS({0, 0}, {4, 0}, {1, 1}, {0, 4}); // an arrowhead
@@ -145,18 +141,16 @@ static void test_small(void **state)
     CHECK_POINTS({0, 0}, {1, 0.1}, {2, 0}, {1.9, 1}, {2, 2}, {1, 1.9}, {0, 2}, {0.1, 1});
 }
 
-static void test_corners_on_edges(void **state)
+TEST(test_corners_on_edges)
 {
-    (void)state;
     CHECK_POINTS({0, 0}, {1, 0}, {2, 0}, {0, 2});
     CHECK_POINTS({0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}, {3, 2}, {3, 3}, {1, 3}, {0, 3}, {0, 1});
     CHECK_POINTS({0, 0}, {1, 0}, {2, 0}, {3, 0}, {0, 3});
     CHECK_POINTS({0, 0}, {4, 0}, {4, 4}, {3, 4}, {3, 1}, {1, 1}, {1, 4}, {0, 4}, {0, 3}, {0, 2});
 }
 
-static void test_gear(void **state)
+TEST(test_gear)
 {
-    (void)state;
     static const double turns[4] = {-0.19, 0.19, 0.3, 0.7};
     Outline gear = {0};
     for (size_t i = 0; i < 144; i++) {
@@ -168,9 +162,8 @@ static void test_gear(void **state)
     free(gear.items);
 }
 
-static void test_comb_and_spiral(void **state)
+TEST(test_comb_and_spiral)
 {
-    (void)state;
     Outline comb = {0}, spiral = {0};
     for (size_t i = 0; i < 50; i++)
         outline_add(&comb, (double)i, i % 2 ? 10 : 0.5);
@@ -194,9 +187,8 @@ static void test_comb_and_spiral(void **state)
     free(spiral.items);
 }
 
-static void test_stars(void **state)
+TEST(test_stars)
 {
-    (void)state;
     for (size_t trial = 0; trial < 200; trial++) {
         Outline star = {0};
         size_t count = 3 + trial;
@@ -212,15 +204,13 @@ static void test_stars(void **state)
 }
 
 // A hole, joined to the outline by an edge that runs to it and back.
-static void test_hole(void **state)
+TEST(test_hole)
 {
-    (void)state;
     CHECK_POINTS({0, 0}, {3, 0}, {3, 3}, {0, 3}, {0, 0}, {1, 1}, {1, 2}, {2, 2}, {2, 1}, {1, 1});
 }
 
-static void test_repeated_corners(void **state)
+TEST(test_repeated_corners)
 {
-    (void)state;
     const Vector3 square[] = {{0, 0, 0}, {0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {1, 1, 0}, {1, 1, 0}, {0, 1, 0}};
     assert_int_equal(polygon_triangulate(square, 7, &triangles), POLYGON_CUT);
     assert_int_equal(triangles.count, 2);
@@ -229,9 +219,8 @@ static void test_repeated_corners(void **state)
     assert_int_equal(triangles.count, 2);
 }
 
-static void test_not_simple(void **state)
+TEST(test_not_simple)
 {
-    (void)state;
     const Vector3 line[] = {{0, 0, 0}, {1, 1, 1}, {2, 2, 2}, {3, 3, 3}};
     assert_int_equal(polygon_triangulate(line, 3, &triangles), POLYGON_WITHOUT_AREA);
     assert_int_equal(triangles.count, 0);
@@ -244,9 +233,8 @@ static void test_not_simple(void **state)
 
 // Shewchuk's example (1997, figure 3): points around (0.5, 0.5), a unit in the last place apart, against a
 // line through (12, 12) and (24, 24). Their exact sign is that of y - x.
-static void test_orientation_is_exact(void **state)
+TEST(test_orientation_is_exact)
 {
-    (void)state;
     const double b[2] = {12, 12}, c[2] = {24, 24};
     for (int x = -64; x < 64; x++) {
         for (int y = -64; y < 64; y++) {
@@ -260,13 +248,12 @@ static void test_orientation_is_exact(void **state)
 }
 
 // Corners whose differences round to one line, or whose products vanish, and corners that are on one.
-static void test_area_is_exact(void **state)
+TEST(test_area_is_exact)
 {
-    (void)state;
     const Vector3 needles[][3] = {{{0x1p60, 0x1p60, -1}, {0, 0, -1}, {0.25, 0, -1}},
                                   {{0x1p-60, 0, 0}, {1, 1, 0}, {2, 2, 0}},
                                   {{0, 0, 0}, {1e-200, 0, 0}, {0, 1e-200, 0}}};
-    for (size_t i = 0; i < sizeof needles / sizeof *needles; i++) {
+    for (size_t i = 0; i < COUNT_OF(needles); i++) {
         assert_true(triangle_has_area(needles[i][0], needles[i][1], needles[i][2]));
         assert_int_equal(polygon_triangulate(needles[i], 3, &triangles), POLYGON_CUT);
         assert_int_equal(triangles.count, 1);

@@ -1,13 +1,10 @@
 // `.rt`: every element's values, and what files in the wild hold and is tolerated.
 #include "host/compile/scene_bounds.h"
+#include "tests/check.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 #define CAMERA "C 0,0,-5 0,0,1 60\n"
 #define LIT    CAMERA "L 0,9,0 1\n"
@@ -19,9 +16,8 @@ static int set_up(void **state)
     return complete_open("tests/scenes/complete.rt");
 }
 
-static void test_scene(void **state)
+TEST(test_scene)
 {
-    (void)state;
     assert_int_equal(complete.width, 640);
     assert_int_equal(complete.height, 480);
     assert_int_equal(complete.color_meaning, COLORS_DISPLAY);
@@ -36,9 +32,8 @@ static void test_scene(void **state)
     assert_number(complete.camera.frame_aspect, 0);
 }
 
-static void test_lights(void **state)
+TEST(test_lights)
 {
-    (void)state;
     assert_int_equal(complete.lights.count, 3);
     const Light *lights = complete.lights.items;
     assert_int_equal(lights[0].kind, LIGHT_POINT);
@@ -48,9 +43,8 @@ static void test_lights(void **state)
     assert_vector(lights[2].color, 0, 0, 0.25);
 }
 
-static void test_sphere_and_plane(void **state)
+TEST(test_sphere_and_plane)
 {
-    (void)state;
     const Object *sphere = &complete.objects.items[0], *plane = sphere + 1;
     assert_int_equal(sphere->kind, SHAPE_SPHERE);
     assert_vector(sphere->as.sphere.center, 1, 2, 3);
@@ -67,9 +61,8 @@ static void test_sphere_and_plane(void **state)
     assert_number(material_of(plane)->specular, 0);
 }
 
-static void test_cylinder_and_cone(void **state)
+TEST(test_cylinder_and_cone)
 {
-    (void)state;
     const Object *cylinder = &complete.objects.items[2], *cone = &complete.objects.items[6];
     assert_int_equal(cylinder->kind, SHAPE_CYLINDER);
     assert_vector(cylinder->as.cylinder.from, 1, -1, 3); // its center is given
@@ -85,9 +78,8 @@ static void test_cylinder_and_cone(void **state)
     assert_true(cone->as.cone.finite && cone->as.cone.caps);
 }
 
-static void test_square_and_triangle(void **state)
+TEST(test_square_and_triangle)
 {
-    (void)state;
     const Object *first = &complete.objects.items[3], *second = first + 1, *triangle = first + 2;
     assert_int_equal(first->kind, SHAPE_TRIANGLE);
     assert_int_equal(first->material, second->material);
@@ -104,9 +96,8 @@ static void test_square_and_triangle(void **state)
     assert_int_equal(complete.objects.count, 7);
 }
 
-static void test_square_on_the_floor(void **state)
+TEST(test_square_on_the_floor)
 {
-    (void)state;
     Scene scene = scene_of_text("s.rt", LIT "sq 0,0,0 0,1,0 2 255,0,0\n");
     size_t unbounded_count;
     Bounds bounds = scene_bounds(&scene, &unbounded_count);
@@ -115,17 +106,15 @@ static void test_square_on_the_floor(void **state)
     scene_free(&scene);
 }
 
-static void test_blanks_comments_and_line_ends(void **state)
+TEST(test_blanks_comments_and_line_ends)
 {
-    (void)state;
     assert_messages(
         "s.rt", "\xEF\xBB\xBF# top\r\n\r\n \tC\t0,0,0   0,0,1\t60 # end\r\nL 0,0,9 1#x\r\nsp 0,0,0 1 1,2,3",
         "");
 }
 
-static void test_missing_parts_are_fine(void **state)
+TEST(test_missing_parts_are_fine)
 {
-    (void)state;
     assert_messages("s.rt", CAMERA, "warning: s.rt: no objects\nwarning: s.rt: no lights\n");
     Scene scene = scene_of_text("s.rt", CAMERA);
     assert_vector(scene.ambient, 0, 0, 0);
@@ -133,9 +122,8 @@ static void test_missing_parts_are_fine(void **state)
     scene_free(&scene);
 }
 
-static void test_axes_are_made_unit(void **state)
+TEST(test_axes_are_made_unit)
 {
-    (void)state;
     assert_messages("s.rt", LIT "pl 0,0,0 0,0.5,0 255,0,0\n",
                     "3:10: warning: 'normal' is not a unit vector; normalized\n");
     assert_messages("s.rt", LIT "pl 0,0,0 0.577,0.577,0.577 255,0,0\n", "");
@@ -145,9 +133,8 @@ static void test_axes_are_made_unit(void **state)
     scene_free(&scene);
 }
 
-static void test_zero_camera_direction(void **state)
+TEST(test_zero_camera_direction)
 {
-    (void)state;
     assert_messages("s.rt", "C -50,0,20 0,0,0 70\nL 0,9,0 1\n" SPHERE,
                     "1:12: warning: 'direction' is zero: looks along +z\n");
     Scene scene = scene_of_text("s.rt", "C 0,0,0 0,0,0 70\n");
@@ -155,17 +142,15 @@ static void test_zero_camera_direction(void **state)
     scene_free(&scene);
 }
 
-static void test_far_camera_keeps_its_direction(void **state)
+TEST(test_far_camera_keeps_its_direction)
 {
-    (void)state;
     Scene scene = scene_of_text("s.rt", "C 1e20,0,0 0,0,1 70\n");
     assert_true(scene.camera.look_at.z > 0);
     scene_free(&scene);
 }
 
-static void test_color_before_sizes(void **state)
+TEST(test_color_before_sizes)
 {
-    (void)state;
     assert_messages("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6\n",
                     "3:16: warning: the color stands before the sizes\n");
     Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
@@ -175,9 +160,8 @@ static void test_color_before_sizes(void **state)
     scene_free(&scene);
 }
 
-static void test_first_of_several_old_cameras(void **state)
+TEST(test_first_of_several_old_cameras)
 {
-    (void)state;
     assert_messages("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\nL 0,9,0 1\n" SPHERE,
                     "2:1: warning: only the first camera is used\n");
     Scene scene = scene_of_text("s.rt", "c 0,0,0 0,0,1 60\nc 9,9,9 0,1,0 90\n");
@@ -185,9 +169,8 @@ static void test_first_of_several_old_cameras(void **state)
     scene_free(&scene);
 }
 
-static void test_lenient_skips_what_it_does_not_know(void **state)
+TEST(test_lenient_skips_what_it_does_not_know)
 {
-    (void)state;
     Text messages = scene_messages("s.rt", LIT "ma:steel 1\nsp 0,0,0 2 255,0,0 0.5 10 tex:earth.xpm\n", true);
     assert_string_equal(text_c(&messages), "3:1: warning: skipped unknown element 'ma:steel'\n"
                                            "4:27: warning: skipped 'tex:earth.xpm'\n");
@@ -195,9 +178,8 @@ static void test_lenient_skips_what_it_does_not_know(void **state)
 }
 
 // Blanks next to commas, a brightness above 1, checkers and the names of textures.
-static void test_lenient_reads_dialects(void **state)
+TEST(test_lenient_reads_dialects)
 {
-    (void)state;
     const char *const text = "A 0.2 255, 255,255\nC 0 ,0, -5 0,0 , 1 60\nL 1,2,\t3 1.5 255,0,0\n"
                              "sp 1, 2, 3 2 255, 0 ,0 0.5 10 cb:8\npl 0,0,0 0,1,0 9,9,9 earth.xpm\n"
                              "cy 0,0,0 0,1,0 255 , 0 , 0 1 2\n";
@@ -222,9 +204,8 @@ static void test_lenient_reads_dialects(void **state)
     scene_free(&scene);
 }
 
-static void test_lenient_keeps_other_errors(void **state)
+TEST(test_lenient_keeps_other_errors)
 {
-    (void)state;
     Text messages = scene_messages("s.rt",
                                    LIT "sp 0,0,0 -2 255,0,0\nsp 0, ,0 2 255,0,0\nsp 0, 0 2 255,0,0\n"
                                        "L 0,0,0 -1\n",
@@ -237,9 +218,8 @@ static void test_lenient_keeps_other_errors(void **state)
     text_free(&messages);
 }
 
-static void test_many_warnings_are_counted(void **state)
+TEST(test_many_warnings_are_counted)
 {
-    (void)state;
     Text text = {0};
     text_appendf(&text, LIT);
     for (int i = 0; i < 30; i++)

@@ -1,14 +1,11 @@
 // Tests that transformed objects are hit where the same objects are, written out.
 #include "host/scene/affine.h"
 #include "host/scene/describe.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-
-#include <cmocka.h>
 
 enum { RAYS = 400 };
 
@@ -116,11 +113,10 @@ static Scene scene_with(const char *objects)
     return scene_of_text("a.yaml", text);
 }
 
-static void transformed_objects_are_hit_where_plain_ones_are(void **state)
+TEST(transformed_objects_are_hit_where_plain_ones_are)
 {
-    (void)state;
     if (!probe_has(PRECISION_DOUBLE)) skip();
-    for (size_t p = 0; p < sizeof pairs / sizeof *pairs; p++) {
+    for (size_t p = 0; p < COUNT_OF(pairs); p++) {
         Scene scenes[2] = {scene_with(pairs[p].transformed), scene_with(pairs[p].plain)};
         Random random = {p + 1};
         TraceRay rays[RAYS];
@@ -148,9 +144,8 @@ static void transformed_objects_are_hit_where_plain_ones_are(void **state)
 }
 
 // A mesh's materials stay with its instances unless they have one.
-static void an_instance_may_have_a_material(void **state)
+TEST(an_instance_may_have_a_material)
 {
-    (void)state;
     char *folder = scratch_open(), name[256];
     snprintf(name, sizeof name, "%s/m.mtl", folder);
     file_write(name, "newmtl gray\nKd 0.5 0.5 0.5\n");
@@ -177,9 +172,8 @@ static void an_instance_may_have_a_material(void **state)
     scratch_close(folder);
 }
 
-static void a_scale_that_is_nearly_the_same_counts_as_the_same(void **state)
+TEST(a_scale_that_is_nearly_the_same_counts_as_the_same)
 {
-    (void)state;
     AxisScale scale;
     const Affine nearly =
         affine_of_steps((Vector3){1, 1 + 0.4e-6, 1}, (Vector3){10, 20, 30}, (Vector3){0, 0, 0});

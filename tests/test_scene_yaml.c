@@ -1,15 +1,12 @@
 // The native format: every key's value, every default, warnings, and the scene that is read.
 #include "host/import/load.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <string.h>
 #include <sys/stat.h>
-
-#include <cmocka.h>
 
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
 #define LIT    CAMERA "lights:\n  - point: {position: [0, 9, 0]}\n"
@@ -21,9 +18,8 @@ static int set_up(void **state)
     return complete_open("tests/scenes/complete.yaml");
 }
 
-static void test_scene_keys(void **state)
+TEST(test_scene_keys)
 {
-    (void)state;
     assert_vector(complete.camera.position, 0, 1.5, -6);
     assert_vector(complete.camera.look_at, 0, 1, 0);
     assert_vector(complete.camera.up, 0, 1, 0.5);
@@ -37,9 +33,8 @@ static void test_scene_keys(void **state)
     assert_int_equal(complete.height, 0);
 }
 
-static void test_lights(void **state)
+TEST(test_lights)
 {
-    (void)state;
     assert_int_equal(complete.lights.count, 4);
     const Light *point = &complete.lights.items[0], *directional = point + 1, *spot = point + 2,
                 *other = point + 3;
@@ -59,9 +54,8 @@ static void test_lights(void **state)
     assert_number(other->penumbra, 0);
 }
 
-static void test_materials(void **state)
+TEST(test_materials)
 {
-    (void)state;
     assert_int_equal(complete.materials.count, 5);
     assert_int_equal(complete.material_names.count, 5);
     assert_string_equal(complete.material_names.items[0], "red");
@@ -95,9 +89,8 @@ static void test_materials(void **state)
     assert_number(defaults.checker_size, 1);
 }
 
-static void test_tints(void **state)
+TEST(test_tints)
 {
-    (void)state;
     Scene scene =
         scene_of_text("a.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
                                 "materials:\n"
@@ -141,9 +134,8 @@ static void test_tints(void **state)
     scene_free(&scene);
 }
 
-static void test_energy(void **state)
+TEST(test_energy)
 {
-    (void)state;
     assert_messages("a.yaml",
                     "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\n"
                     "materials:\n"
@@ -157,9 +149,8 @@ static void test_energy(void **state)
                     "warning: a.yaml: no objects\nwarning: a.yaml: no lights\n");
 }
 
-static void test_round_shapes(void **state)
+TEST(test_round_shapes)
 {
-    (void)state;
     const Object *sphere = &complete.objects.items[0], *plane = sphere + 1, *disc = sphere + 2;
     assert_int_equal(sphere->kind, SHAPE_SPHERE);
     assert_int_equal(sphere->material, 0);
@@ -176,9 +167,8 @@ static void test_round_shapes(void **state)
     assert_number(disc->as.disc.radius, 0.5);
 }
 
-static void test_cylinders(void **state)
+TEST(test_cylinders)
 {
-    (void)state;
     const Object *open = &complete.objects.items[4], *capped = open + 1, *infinite = open + 2;
     assert_int_equal(open->kind, SHAPE_CYLINDER);
     assert_vector(open->as.cylinder.from, 1, 0, 0);
@@ -195,9 +185,8 @@ static void test_cylinders(void **state)
     assert_number(complete.materials.items[4].shininess, 64);
 }
 
-static void test_cones(void **state)
+TEST(test_cones)
 {
-    (void)state;
     const Object *frustum = &complete.objects.items[7], *tip = frustum + 1, *infinite = frustum + 2;
     assert_int_equal(frustum->kind, SHAPE_CONE);
     assert_vector(frustum->as.cone.from, 0, 0, 1);
@@ -215,9 +204,8 @@ static void test_cones(void **state)
     assert_number(infinite->as.cone.slope, 1);
 }
 
-static void test_flat_shapes(void **state)
+TEST(test_flat_shapes)
 {
-    (void)state;
     const Object *box = &complete.objects.items[3], *flat = &complete.objects.items[10], *smooth = flat + 1;
     assert_int_equal(box->kind, SHAPE_BOX);
     assert_vector(box->as.box.min, -1, -2, -3);
@@ -233,9 +221,8 @@ static void test_flat_shapes(void **state)
     assert_int_equal(smooth->material, 0);
 }
 
-static void test_defaults(void **state)
+TEST(test_defaults)
 {
-    (void)state;
     Scene scene = scene_of_text("s.yaml", CAMERA);
     assert_vector(scene.camera.up, 0, 1, 0);
     assert_number(scene.camera.half_tangent, tan(25 * M_PI / 180));
@@ -247,9 +234,8 @@ static void test_defaults(void **state)
     scene_free(&scene);
 }
 
-static void test_focal_length(void **state)
+TEST(test_focal_length)
 {
-    (void)state;
     Scene scene = scene_of_text(
         "s.yaml", "camera: {position: [0, 0, 0], look_at: [0, 0, 1], focal_length: 2, frame: [3, 2], "
                   "shift: [-0.5, 0.25]}\n");
@@ -260,9 +246,8 @@ static void test_focal_length(void **state)
     scene_free(&scene);
 }
 
-static void test_block_style_and_number_forms(void **state)
+TEST(test_block_style_and_number_forms)
 {
-    (void)state;
     Scene scene =
         scene_of_text("s.yaml", "\xEF\xBB\xBF---\r\n" // byte order mark, document start, CRLF
                                 "\"camera\":\r\n  position:\r\n    - +1.\r\n    - -.5\r\n    - 25e-1\r\n"
@@ -272,9 +257,8 @@ static void test_block_style_and_number_forms(void **state)
     scene_free(&scene);
 }
 
-static void test_names_in_every_style(void **state)
+TEST(test_names_in_every_style)
 {
-    (void)state;
     char name[400 + 1] = {0}; // longer than one read of a scalar
     memset(name, 'n', sizeof name - 1);
     Text text = {0};
@@ -293,18 +277,16 @@ static void test_names_in_every_style(void **state)
     text_free(&text);
 }
 
-static void test_tiny_numbers_are_zero(void **state)
+TEST(test_tiny_numbers_are_zero)
 {
-    (void)state;
     Scene scene = scene_of_text("s.yaml", CAMERA "background: [1e-31, 1e-999, 1e-30]\n");
     assert_true(scene.background.x == 0 && scene.background.y == 0 && scene.background.z == 1e-30);
     scene_free(&scene);
 }
 
 // The linear values of sRGB are those of Python's decimal module, rounded to float.
-static void test_colors(void **state)
+TEST(test_colors)
 {
-    (void)state;
     const double half = 0.21586050011389926F, dark = 0.0030352698354883752F, third = 0.033104766570885055F;
     Scene scene =
         scene_of_text("s.yaml", CAMERA "background: '#FF800a'\n"
@@ -350,9 +332,8 @@ static Scene scene_of_set(const char *text, const char *const *overrides, size_t
     scene_of_set(text, (const char *const[]){__VA_ARGS__},                                                   \
                  sizeof(const char *[]){__VA_ARGS__} / sizeof(char *))
 
-static void test_values_are_set(void **state)
+TEST(test_values_are_set)
 {
-    (void)state;
     Scene scene =
         SET(LIT SPHERE, "camera.fov=60", "ambient=#f00", "background= 0.5", "camera.fov=40",
             "objects[0].sphere.radius=3", "lights[0].point={position: [1, 2, 3], color: red}",
@@ -373,9 +354,8 @@ static void test_values_are_set(void **state)
     scene_free(&scene);
 }
 
-static void test_values_are_removed(void **state)
+TEST(test_values_are_removed)
 {
-    (void)state;
     Scene scene =
         SET("camera: {position: [0, 0, -5], look_at: [0, 0, 0], focal_length: 1, frame: [2, 1]}\n"
             "lights: [{point: {position: [0, 9, 0]}}]\n"
@@ -392,9 +372,8 @@ static void test_values_are_removed(void **state)
 }
 
 // What is set through one of several names of the same nodes changes under that name alone.
-static void test_aliases_keep_what_is_set_elsewhere(void **state)
+TEST(test_aliases_keep_what_is_set_elsewhere)
 {
-    (void)state;
     Scene scene = SET(LIT "materials:\n  a: &a {color: [0, 0, 1], ior: 2}\n  b: *a\n  c: *a\n"
                           "objects:\n  - &s sphere: {center: [0, 0, 0], radius: 1}\n"
                           "  - sphere: &t {center: [9, 9, 9], radius: 1}\n  - sphere: *t\n  - sphere: *t\n",
@@ -420,9 +399,8 @@ static void test_aliases_keep_what_is_set_elsewhere(void **state)
 }
 
 // A message about an image that was set points into the override's text.
-static void test_textures_that_are_set_have_a_place(void **state)
+TEST(test_textures_that_are_set_have_a_place)
 {
-    (void)state;
     static const char *const overrides[] = {"ambient=1", "objects[0].sphere.material={image: lost.png}"};
     Text source = {0}, described = {0};
     text_append(&source, LIT SPHERE, strlen(LIT SPHERE));
@@ -453,9 +431,8 @@ static void write_layered_image(const char *path)
     assert_true(image_writer_commit(writer, &messages));
 }
 
-static void test_layers_of_images(void **state)
+TEST(test_layers_of_images)
 {
-    (void)state;
     assert_int_equal(mkdir("scenes", 0700), 0);
     write_layered_image("scenes/a.exr");
     Scene scene =
@@ -476,9 +453,8 @@ static void test_layers_of_images(void **state)
     scene_free(&scene);
 }
 
-static void test_materials_may_follow_objects(void **state)
+TEST(test_materials_may_follow_objects)
 {
-    (void)state;
     Scene scene =
         scene_of_text("s.yaml", LIT "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: b}\n"
                                     "materials: {a: {}, b: {shininess: 7}}\n");
@@ -486,9 +462,8 @@ static void test_materials_may_follow_objects(void **state)
     scene_free(&scene);
 }
 
-static void test_warnings(void **state)
+TEST(test_warnings)
 {
-    (void)state;
     assert_messages("s.yaml", LIT SPHERE, "");
     assert_messages("s.yaml", CAMERA SPHERE, "warning: s.yaml: no lights\n");
     assert_messages("s.yaml", LIT, "warning: s.yaml: no objects\n");
@@ -496,9 +471,8 @@ static void test_warnings(void **state)
                     "5:15: warning: a triangle without area is never hit\n");
 }
 
-static void test_a_failed_scene_is_empty(void **state)
+TEST(test_a_failed_scene_is_empty)
 {
-    (void)state;
     Text text = {0};
     text_appendf(&text, LIT SPHERE "purple: 1\n");
     MessageList messages = {0};
@@ -514,9 +488,8 @@ static void test_a_failed_scene_is_empty(void **state)
 }
 
 // Beyond what a node's offsets count; the rest of its bytes is not read.
-static void test_more_than_2_gibibytes_are_refused(void **state)
+TEST(test_more_than_2_gibibytes_are_refused)
 {
-    (void)state;
     const Source source = {.file = "s.yaml", .bytes = CAMERA SPHERE, .length = ((size_t)1 << 31) + 1};
     MessageList messages = {0};
     Scene scene;

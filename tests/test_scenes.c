@@ -1,15 +1,11 @@
 // Every scene in scenes/ is read without a warning and renders to an image that is not blank. Where tests are
 // long each has the kernel that glint builds for it.
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <glob.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { WIDTH = 64, HEIGHT = 36, COLORS_MIN = 16, SCENES_MIN = 12 };
 
@@ -40,9 +36,8 @@ static size_t color_count(const Film *film)
     return count;
 }
 
-static void scenes_render(void **state)
+TEST(scenes_render)
 {
-    (void)state;
     glob_t scenes;
     assert_int_equal(glob("scenes/*.*", 0, NULL, &scenes), 0);
     assert_true(scenes.gl_pathc >= SCENES_MIN);

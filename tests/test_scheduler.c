@@ -2,14 +2,12 @@
 // sizes follow the paces, and the rows of a failed worker go to the others.
 #include "host/base/memory.h"
 #include "host/render/scheduler.h"
+#include "tests/check.h"
 #include <pthread.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <cmocka.h>
 
 enum { WIDTH = 4, ROWS = 64, STEP = 4, ROWS_MAX = 16, COMPONENTS = 3 };
 
@@ -100,9 +98,8 @@ static void set_paces(Scheduler *scheduler, size_t worker_count, const unsigned 
         assert_true(give_at(scheduler, i, take(scheduler, i), rows_per_second[i]));
 }
 
-static void test_one_worker_gets_what_it_asks_for(void **state)
+TEST(test_one_worker_gets_what_it_asks_for)
 {
-    (void)state;
     Sink sink;
     WorkerShare share;
     Scheduler *scheduler = start(&sink, 1);
@@ -114,9 +111,8 @@ static void test_one_worker_gets_what_it_asks_for(void **state)
     assert_int_equal(share.bands, ROWS / ROWS_MAX);
 }
 
-static void test_lower_bands_wait(void **state)
+TEST(test_lower_bands_wait)
 {
-    (void)state;
     Sink sink;
     WorkerShare shares[3];
     Scheduler *scheduler = start(&sink, 3);
@@ -137,9 +133,8 @@ static void test_lower_bands_wait(void **state)
 }
 
 // A worker may be a thousand times slower than the others.
-static void test_first_bands_are_short(void **state)
+TEST(test_first_bands_are_short)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 3);
     for (size_t i = 0; i < 3; i++)
@@ -149,14 +144,13 @@ static void test_first_bands_are_short(void **state)
 }
 
 // Half of a worker's share of the rows that are left, in whole steps and at least one.
-static void test_bands_shrink(void **state)
+TEST(test_bands_shrink)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     set_paces(scheduler, 2, (const unsigned[]){4, 4});
     static const uint32_t expected[] = {12, 8, 8, 4, 4, 4, 4, 4, 4, 4}; // of 56, 44, 36, 28 …
-    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+    for (size_t i = 0; i < COUNT_OF(expected); i++) {
         const BandRows rows = take(scheduler, i % 2);
         assert_int_equal(rows.row_count, expected[i]);
         assert_true(give_at(scheduler, i % 2, rows, 4));
@@ -165,9 +159,8 @@ static void test_bands_shrink(void **state)
     assert_true(sink.is_right);
 }
 
-static void test_bands_follow_the_pace(void **state)
+TEST(test_bands_follow_the_pace)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     set_paces(scheduler, 2, (const unsigned[]){1, 4});
@@ -178,9 +171,8 @@ static void test_bands_follow_the_pace(void **state)
 }
 
 // A worker gets no rows where the other ends sooner with all that are left, unless that fails.
-static void test_the_slow_leave_the_rest(void **state)
+TEST(test_the_slow_leave_the_rest)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     set_paces(scheduler, 2, (const unsigned[]){1, 100});
@@ -195,9 +187,8 @@ static void test_the_slow_leave_the_rest(void **state)
     assert_true(sink.is_right);
 }
 
-static void test_a_dropped_workers_rows_go_to_others(void **state)
+TEST(test_a_dropped_workers_rows_go_to_others)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     BandRows lost = take(scheduler, 1), kept = take(scheduler, 0);
@@ -215,9 +206,8 @@ static void test_a_dropped_workers_rows_go_to_others(void **state)
     assert_true(sink.is_right);
 }
 
-static void test_nobody_is_left(void **state)
+TEST(test_nobody_is_left)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     take(scheduler, 0);
@@ -228,9 +218,8 @@ static void test_nobody_is_left(void **state)
     assert_false(scheduler_close(scheduler, NULL));
 }
 
-static void test_the_sink_ends_the_render(void **state)
+TEST(test_the_sink_ends_the_render)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     sink.bands_max = 2;
@@ -257,9 +246,8 @@ static void work_a_step(Scheduler *scheduler, uint32_t first_row)
 }
 
 // A worker that is too far ahead waits for the one that has the top, or for what that leaves.
-static void test_few_bands_wait(void **state)
+TEST(test_few_bands_wait)
 {
-    (void)state;
     for (int is_dropped = 0; is_dropped < 2; is_dropped++) {
         enum { ROW_BYTES = WIDTH * COMPONENTS * sizeof(float) };
         Sink sink = {.is_right = true};
@@ -306,9 +294,8 @@ static void *thread_work(void *argument)
 }
 
 // A worker without rows waits: those of a worker that fails later are its own.
-static void test_idle_workers_wait_for_lost_rows(void **state)
+TEST(test_idle_workers_wait_for_lost_rows)
 {
-    (void)state;
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     const BandRows lost = take(scheduler, 0);
@@ -327,9 +314,8 @@ static void test_idle_workers_wait_for_lost_rows(void **state)
     assert_true(sink.is_right);
 }
 
-static void test_many_threads(void **state)
+TEST(test_many_threads)
 {
-    (void)state;
     enum { COUNT = 4, ROUNDS = 200 };
     for (int round = 0; round < ROUNDS; round++) {
         Sink sink;

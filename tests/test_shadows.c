@@ -3,22 +3,17 @@
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/verify/reference_color.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 // A veil's light is taken once, also in a tile whose shadow rays run to different sides, which then traverse
 // the BVH in several packets: the light is above the corner of a tile.
-static void takes_a_veils_light_once(void **state)
+TEST(takes_a_veils_light_once)
 {
-    (void)state;
     Scene scene = scene_of_text(
         "veil.yaml", "camera: {position: [0, 9, 0.01], look_at: [0, 0, 0], up: [0, 0, 1], fov: 40}\n"
                      "background: [0, 0, 0]\n"
@@ -46,9 +41,8 @@ static void takes_a_veils_light_once(void **state)
 }
 
 // Squares of distances to the light times squares of sizes are beyond a float's range.
-static void darkens_an_eclipse_in_meters(void **state)
+TEST(darkens_an_eclipse_in_meters)
 {
-    (void)state;
     Scene scene = scene_of_text(
         "eclipse.yaml", "camera: {position: [1.4998e11, 0, -3e7], look_at: [1.4998e11, 0, 0], fov: 60}\n"
                         "background: [0, 0, 0]\n"
@@ -96,9 +90,8 @@ static Mesh coarse_ball(void)
 
 // The flat triangles of a smooth ball do not shade it where its normals face the light. Only a small ball
 // near it does.
-static void smooth_meshes_do_not_shade_themselves(void **state)
+TEST(smooth_meshes_do_not_shade_themselves)
 {
-    (void)state;
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_STRICT; precision++) {
         Scene scene =
             scene_of_text("ball.yaml", "camera: {position: [0, 0.6, 4.2], look_at: [0, 0, 0], fov: 32}\n"
@@ -215,11 +208,10 @@ static void keeps_small_shadows_on(const Ground *ground)
     scene_free(&scene);
 }
 
-static void keeps_small_shadows_on_huge_ground(void **state)
+TEST(keeps_small_shadows_on_huge_ground)
 {
-    (void)state;
     if (!probe_has(probe_sound_from())) skip();
-    for (size_t i = 0; i < sizeof grounds / sizeof *grounds; i++)
+    for (size_t i = 0; i < COUNT_OF(grounds); i++)
         keeps_small_shadows_on(&grounds[i]);
 }
 

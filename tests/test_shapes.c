@@ -2,15 +2,11 @@
 // run_tests: sanitize-long-only
 #include "host/compile/compile.h"
 #include "host/verify/reference.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_BESIDE = 3, SEEDS_BESIDE = 80 };
 
@@ -242,9 +238,8 @@ static void hits_each_shape(void **state)
     }
 }
 
-static void hits_the_nearest_of_many(void **state)
+TEST(hits_the_nearest_of_many)
 {
-    (void)state;
     Random random = {form_count};
     for (int scene = 0; scene < scene_count(); scene++) {
         RandomShape shapes[SHAPES_IN_SCENE];
@@ -265,9 +260,8 @@ static void make_steep(RandomShape *cone)
 }
 
 // There c cancels, and some rays are classified as leaving without a closer test.
-static void hits_from_next_to_the_side(void **state)
+TEST(hits_from_next_to_the_side)
 {
-    (void)state;
     const uint64_t seed_count = tests_are_long() ? SEEDS_BESIDE : 1;
     for (uint64_t seed = 0; seed < seed_count; seed++) {
         Random random = {form_count + 2 + 1000 * seed};
@@ -289,9 +283,8 @@ static bool same_bits(const TraceHit *a, const TraceHit *b)
             (memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0));
 }
 
-static void gives_the_same_bits_at_every_width(void **state)
+TEST(gives_the_same_bits_at_every_width)
 {
-    (void)state;
     static Trial trial;
     static TraceHit hits[2][RAYS_PER_SHAPE];
     Random random = {form_count + 1};

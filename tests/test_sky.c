@@ -1,15 +1,11 @@
 // The sky as a light: its cells have the light of its colors, and what hides them casts a shadow.
 #include "host/base/array.h"
 #include "host/scene/sky.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 #define HEAD "camera: {position: [0, 0.5, 0], look_at: [0, 0, 0], up: [0, 0, -1], height: 1e-3}\n"
 
@@ -88,9 +84,8 @@ static Color gradient(Vector3 direction)
                       vector_scale(height > 0 ? zenith : nadir, fabs(height)));
 }
 
-static void colors_are_a_light(void **state)
+TEST(colors_are_a_light)
 {
-    (void)state;
     Scene scene = scene_of_text("s.yaml", HEAD "background: {horizon: [0.5, 2, 0], zenith: [3, 0.25, 1], "
                                                "nadir: [0, 0.5, 0], light: true}\n");
     assert_int_equal(scene.lights.count, 1);
@@ -121,9 +116,8 @@ static Color image_color(Vector3 direction)
     return texel((int)(u * IMAGE_WIDTH) % IMAGE_WIDTH, (int)(v * IMAGE_HEIGHT));
 }
 
-static void an_image_is_a_light(void **state)
+TEST(an_image_is_a_light)
 {
-    (void)state;
     float values[3 * IMAGE_WIDTH * IMAGE_HEIGHT];
     for (int i = 0; i < IMAGE_WIDTH * IMAGE_HEIGHT; i++) {
         const Color color = texel(i % IMAGE_WIDTH, i / IMAGE_WIDTH);
@@ -148,9 +142,8 @@ static void an_image_is_a_light(void **state)
 
 // Below the middle of a disc that hides the sky within 45 degrees of the zenith, a white floor under a sky
 // with the colors h and z reflects the integral of 2 c (h + (z - h) c) from c = 0 to the root of 1/2.
-static void what_hides_the_sky_casts_a_shadow(void **state)
+TEST(what_hides_the_sky_casts_a_shadow)
 {
-    (void)state;
     Scene scene =
         scene_of_text("s.yaml", HEAD "background: {horizon: [0.5, 1, 2], zenith: [2, 1, 0], light: true}\n"
                                      "objects:\n"
@@ -171,9 +164,8 @@ static void what_hides_the_sky_casts_a_shadow(void **state)
 }
 
 // What a wall is lit by is what the eye sees of the sky, whichever way that is turned.
-static void what_is_seen_shines(void **state)
+TEST(what_is_seen_shines)
 {
-    (void)state;
     enum { ROWS = 32, COLUMNS = 64 };
     static const char sky[] = "background: {sun: {elevation: 12, azimuth: 70, light: false}, turn: 37, up: "
                               "[0.3, 1, -0.2], light: true, ground: [0.1, 0.3, 0.2]}\n";
@@ -185,7 +177,7 @@ static void what_is_seen_shines(void **state)
     scene_free(&scene);
     free(text);
     static const Vector3 normals[] = {{0, 1, 0}, {1, 0, 0}, {0, 0, -1}, {-0.6, 0, 0.8}};
-    for (size_t i = 0; i < sizeof normals / sizeof *normals; i++) {
+    for (size_t i = 0; i < COUNT_OF(normals); i++) {
         const Vector3 n = normals[i];
         Color expected = {0};
         for (size_t pixel = 0; pixel < (size_t)ROWS * COLUMNS; pixel++) {

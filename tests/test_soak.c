@@ -5,18 +5,14 @@
 #include "host/base/array.h"
 #include "host/base/hash.h"
 #include "host/scene/mesh.h"
+#include "tests/check.h"
 #include "tests/child.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_scene.h"
 #include <malloc.h>
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 enum {
     OBJECTS = 40,
@@ -237,9 +233,8 @@ static void render_alone(void *result)
     exit(probe_close(NULL) == 0 ? 0 : 1);
 }
 
-static void memory_and_images_stay(void **state)
+TEST(memory_and_images_stay)
 {
-    (void)state;
     static Soak all;
     all.count = tests_are_long() ? SCENES_MAX : SCENES;
     ChildEnd end = child_run(soak_run, &all, sizeof all);

@@ -3,16 +3,13 @@
 // 10%. Skipped where the scenes are not there.
 // run_tests: sanitize-long-only
 #include "host/compile/flat_types.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #define SPD "../shared/corpus/spd"
 
@@ -72,15 +69,14 @@ static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
     scene_free(&scene);
 }
 
-static void test_counts(void **state)
+TEST(test_counts)
 {
-    (void)state;
     if (access(SPD, F_OK) != 0) {
         print_message("no " SPD ": skipped\n");
         skip();
     }
     size_t wrong_count = 0;
-    for (size_t k = 0; k < sizeof published / sizeof *published; k++) {
+    for (size_t k = 0; k < COUNT_OF(published); k++) {
         uint64_t counts[COLUMN_COUNT];
         rays_count(published[k].name, counts);
         for (size_t i = 0; i < COLUMN_COUNT; i++) {

@@ -1,14 +1,10 @@
 // STL files in text and binary: facets, and what is wrong with them.
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 #define SCENE                                                                                                \
     "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 0, -5]}}]\n"        \
@@ -36,9 +32,8 @@ static void assert_square(const char *messages)
     scene_free(&scene);
 }
 
-static void text_is_read(void **state)
+TEST(text_is_read)
 {
-    (void)state;
     static const struct {
         const char *text, *messages;
     } cases[] = {
@@ -55,7 +50,7 @@ static void text_is_read(void **state)
         {"# made by hand\r\r\n\nsolid\n" TWO_FACETS, ""},
         {"; by hand\n solid\n" TWO_FACETS, "1:1: warning: ';' is not used\n"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.stl", cases[i].text);
         assert_square(cases[i].messages);
     }
@@ -75,9 +70,8 @@ static void binary_fill(char bytes[WHOLE], const char *title)
         memcpy(bytes + HEADER + i * FACET_SIZE + 12, corners[i], sizeof corners[i]);
 }
 
-static void binary_is_read(void **state)
+TEST(binary_is_read)
 {
-    (void)state;
     static const char *const titles[] = {"", "a title", "solid part"};
     char bytes[WHOLE + 3] = {0};
     for (size_t i = 0; i < 3; i++) {
@@ -92,9 +86,8 @@ static void binary_is_read(void **state)
                   "4:18: warning: a.stl: 3 bytes behind the last facet are not used\n");
 }
 
-static void faults_have_their_place(void **state)
+TEST(faults_have_their_place)
 {
-    (void)state;
     static const struct {
         const char *text, *message;
     } cases[] = {
@@ -111,7 +104,7 @@ static void faults_have_their_place(void **state)
         {"facet", "4:18: error: a.stl: byte 5: no STL file, which starts with 'solid' or has 84 bytes before "
                   "its facets\n"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.stl", cases[i].text);
         assert_messages("scene.yaml", SCENE, cases[i].message);
     }

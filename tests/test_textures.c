@@ -2,18 +2,14 @@
 // out here in double; the same bits at every width; and the messages for those that cannot be used.
 #include "host/compile/features.h"
 #include "host/image/image.h"
+#include "tests/check.h"
 #include "tests/files.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
 #include <turbojpeg.h>
 #include <unistd.h>
-
-#include <cmocka.h>
 
 static char folder[] = "/tmp/glint-textures-XXXXXX";
 static char texture_path[64];
@@ -98,9 +94,8 @@ static void check_seen(const char *camera, const char *object, double red, doubl
 #define BALL          "sphere: {center: [0, 0, 0], radius: 1,"
 #define FROM(x, y, z) "position: [" #x ", " #y ", " #z "], look_at: [0, 0, 0], fov: 0.01"
 
-static void sphere_shows_east_and_west(void **state)
+TEST(sphere_shows_east_and_west)
 {
-    (void)state;
     const TestTexture texture = {2, 1, {{1, 0, 0.25F}, {0, 1, 0.75F}}}; // west, east
     texture_write(&texture);
     check_seen(FROM(-5, 0, 0), BALL, 1, 0, 0.25);
@@ -111,9 +106,8 @@ static void sphere_shows_east_and_west(void **state)
     check_seen(FROM(-3, 0, -3), BALL, 0.75, 0.25, 0.375);
 }
 
-static void sphere_shows_north_and_south(void **state)
+TEST(sphere_shows_north_and_south)
 {
-    (void)state;
     const TestTexture texture = {
         4, 2, {{0, 0, 0}, {0, 0, 1}, {0, 1, 0}, {0, 1, 1}, {1, 0, 0}, {1, 0, 1}, {1, 1, 0}, {1, 1, 1}}};
     texture_write(&texture);
@@ -235,9 +229,8 @@ static void check_places(const char *camera, const char *object, TextureMap map,
     scene_free(&scene);
 }
 
-static void sphere_agrees_all_around(void **state)
+TEST(sphere_agrees_all_around)
 {
-    (void)state;
     check_places("position: [1, 2, 5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, on_sphere);
     check_places("position: [0.1, -0.3, -5], look_at: [0, 0, 0], fov: 25", BALL, map_sphere,
                  on_sphere); // the seam
@@ -246,9 +239,8 @@ static void sphere_agrees_all_around(void **state)
     check_places("position: [0, -5, 0], look_at: [0, 0, 0], fov: 25", BALL, map_sphere, on_sphere);
 }
 
-static void planes_repeat_it(void **state)
+TEST(planes_repeat_it)
 {
-    (void)state;
     check_places("position: [0.3, 0.2, 3], look_at: [0.5, 0.5, 0]",
                  "plane: {point: [0, 0, 0], normal: [0, 0, 1],", map_wall, repeated);
     check_places("position: [0.3, 0.2, -3], look_at: [0.5, 0.5, 0]",
@@ -259,9 +251,8 @@ static void planes_repeat_it(void **state)
                  "disc: {center: [0, 0, 0], normal: [0, 1, 0], radius: 1.5,", map_floor, repeated);
 }
 
-static void meshes_have_it_by_uv(void **state)
+TEST(meshes_have_it_by_uv)
 {
-    (void)state;
     check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/quad.obj,",
                  map_quad, repeated);
 }
@@ -274,24 +265,22 @@ static void map_wide(Vector3 position, Vector3 normal, double *u, double *v)
     *v = 0.75 * position.y + 0.5;
 }
 
-static void meshes_wrap_it(void **state)
+TEST(meshes_wrap_it)
 {
-    (void)state;
     static const TextureWrap wraps[][2] = {{TEXTURE_REPEATED, TEXTURE_REPEATED},
                                            {TEXTURE_CLAMPED, TEXTURE_MIRRORED},
                                            {TEXTURE_MIRRORED, TEXTURE_CLAMPED}};
-    for (size_t i = 0; i < sizeof wraps / sizeof *wraps; i++)
+    for (size_t i = 0; i < COUNT_OF(wraps); i++)
         check_places("position: [0.3, 0.2, 4], look_at: [0, 0, 0]", "mesh: {file: tests/textures/wide.obj,",
                      map_wide, wraps[i]);
 }
 
 // Far away, where a pixel sees more than the whole texture, its color is the mean of all texels. No dimension
 // of 5 x 3 is a power of two.
-static void far_away_it_is_its_mean(void **state)
+TEST(far_away_it_is_its_mean)
 {
-    (void)state;
     static const uint32_t sizes[][2] = {{8, 8}, {5, 3}, {7, 1}, {1, 6}, {1, 1}};
-    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+    for (size_t i = 0; i < COUNT_OF(sizes); i++) {
         TestTexture texture = texture_make(sizes[i][0], sizes[i][1]);
         uint32_t count = texture.width * texture.height;
         double mean[3] = {0};
@@ -306,9 +295,8 @@ static void far_away_it_is_its_mean(void **state)
 }
 
 // A pixel sees 3 texels of a row across, halfway between those levels where a texel stands for 2 and for 4.
-static void between_levels_it_blends(void **state)
+TEST(between_levels_it_blends)
 {
-    (void)state;
     TestTexture texture = {8, 8, {{0}}};
     for (uint32_t i = 0; i < 64; i++)
         texture.colors[i][0] = i % 8 < 2; // two columns of eight
@@ -323,9 +311,8 @@ static void between_levels_it_blends(void **state)
 }
 
 // A mirror's texture of a texture is filtered for the whole path to the eye.
-static void mirrors_filter_textures(void **state)
+TEST(mirrors_filter_textures)
 {
-    (void)state;
     TestTexture texture = texture_make(8, 8);
     double mean[3] = {0};
     for (uint32_t k = 0; k < 192; k++)
@@ -364,22 +351,19 @@ static void check_builds(const char *path)
     scene_free(&scene);
 }
 
-static void every_build_gives_the_same_bits(void **state)
+TEST(every_build_gives_the_same_bits)
 {
-    (void)state;
     check_builds("scenes/globe.yaml");
 }
 
-static void every_build_has_the_same_holes(void **state)
+TEST(every_build_has_the_same_holes)
 {
-    (void)state;
     check_builds("tests/scenes/cutouts.yaml");
 }
 
 // Instances that share a mesh have the holes of copies, but for pixels whose ray is at an edge.
-static void instances_have_the_holes_of_copies(void **state)
+TEST(instances_have_the_holes_of_copies)
 {
-    (void)state;
     Scene scene = scene_of_file("tests/scenes/cutouts.yaml");
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_STRICT);
     Film films[2];
@@ -403,9 +387,8 @@ static void instances_have_the_holes_of_copies(void **state)
 }
 
 // Scenes have cutouts only if a pixel is transparent.
-static void opaque_images_cut_nothing(void **state)
+TEST(opaque_images_cut_nothing)
 {
-    (void)state;
     static const char *const images[] = {"scenes/images/globe.png", "tests/textures/leaf.png"};
     for (size_t i = 0; i < 2; i++) {
         Text text = {0};
@@ -452,9 +435,8 @@ static void check_shade(const char *camera, const char *object, const char *more
 #define FRONT  FROM(0.1, 0.2, 5)
 
 // Lambert's cosine of normals that are tilted by 1/2 along u or v, with the light at 3/5 of u or v.
-static void normal_maps_tilt_normals(void **state)
+TEST(normal_maps_tilt_normals)
 {
-    (void)state;
     const float right[] = {0.75F, 0.5F, 1}, up[] = {0.5F, 0.75F, 1}, flat[] = {0.5F, 0.5F, 1};
     const double toward = (0.3 + 0.8) / sqrt(1.25), away = (-0.3 + 0.8) / sqrt(1.25);
     const char *from_right = "[-0.6, 0, -0.8]", *from_up = "[0, -0.6, -0.8]";
@@ -484,9 +466,8 @@ static void normal_maps_tilt_normals(void **state)
 }
 
 // A flat map changes no bit, whatever the strength.
-static void flat_normal_maps_change_nothing(void **state)
+TEST(flat_normal_maps_change_nothing)
 {
-    (void)state;
     const TestTexture texture = {2, 2, {{0.5F, 0.5F, 1}, {0.5F, 0.5F, 1}, {0.5F, 0.5F, 1}, {0.5F, 0.5F, 1}}};
     texture_write(&texture);
     Film films[2];
@@ -515,9 +496,8 @@ static void flat_normal_maps_change_nothing(void **state)
     film_free(&films[1]);
 }
 
-static void jpeg_is_read(void **state)
+TEST(jpeg_is_read)
 {
-    (void)state;
     enum { SIDE = 16 };
     uint8_t pixels[SIDE * SIDE * 3], *bytes = NULL;
     for (size_t i = 0; i < sizeof pixels; i++)
@@ -562,9 +542,8 @@ static void jpeg_is_read(void **state)
     "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [0, 5, "                 \
     "5]}}]\nmaterials:\n"
 
-static void scene_faults_are_reported(void **state)
+TEST(scene_faults_are_reported)
 {
-    (void)state;
     assert_messages("s.yaml", MATERIALS "  a: {image: a.png, color: [1, 1, 1]}\n",
                     "4:21: error: 'color' cannot be combined with 'image'\n");
     assert_messages("s.yaml", MATERIALS "  a: {size: 2}\n",
@@ -596,9 +575,8 @@ static void check_refused(const char *expected)
     text_free(&text);
 }
 
-static void texture_faults_are_reported(void **state)
+TEST(texture_faults_are_reported)
 {
-    (void)state;
     unlink(texture_path);
     check_refused("No such file");
     assert_int_equal(symlink("/dev/null", texture_path), 0);
@@ -612,9 +590,8 @@ static void texture_faults_are_reported(void **state)
     check_refused("a color is not finite");
 }
 
-static void textures_are_shared(void **state)
+TEST(textures_are_shared)
 {
-    (void)state;
     const TestTexture texture = texture_make(3, 2);
     texture_write(&texture);
     Text text = {0};

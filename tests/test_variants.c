@@ -5,15 +5,11 @@
 // run_tests: sanitize-long-only
 #include "host/compile/transform.h"
 #include "host/import/load.h"
+#include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"
 #include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-
-#include <cmocka.h>
 
 // Neither is a whole number of tiles of any width.
 enum { WIDTH = 71, HEIGHT = 41 };
@@ -51,9 +47,8 @@ static void same_and_freed(Film *film, const Film *expected, const char *what)
     film_free(film);
 }
 
-static void scene_has_every_feature(void **state)
+TEST(scene_has_every_feature)
 {
-    (void)state;
     // test_textures has textures, which a mirror image would have to mirror, test_instances instances
     assert_int_equal(features_of(&every_shape) | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_IMAGES |
                          FEATURE_CUTOUTS | FEATURE_NORMAL_MAPS | FEATURE_INSTANCES | SAMPLED_FEATURES,
@@ -62,9 +57,8 @@ static void scene_has_every_feature(void **state)
                      FEATURE_AREA_LIGHTS | FEATURE_SKY_LIGHT | FEATURE_LENS);
 }
 
-static void lanes_agree(void **state)
+TEST(lanes_agree)
 {
-    (void)state;
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
         Film expected = {0};
@@ -83,9 +77,8 @@ static void lanes_agree(void **state)
     }
 }
 
-static void lanes_agree_on_aovs(void **state)
+TEST(lanes_agree_on_aovs)
 {
-    (void)state;
     const unsigned aovs = AOV_T | AOV_NORMAL | AOV_POSITION | AOV_OBJECT | AOV_SHADOW | AOV_RAY | AOV_PATH;
     const Precision from = probe_same_bits_from();
     for (Precision precision = from; precision <= (tests_are_long() ? PRECISION_STRICT : from); precision++) {
@@ -232,19 +225,18 @@ static size_t group_of(size_t scene)
 static FeatureSet features_of_group(size_t scene)
 {
     FeatureSet features = 0;
-    for (size_t i = 0; i < sizeof feature_scenes / sizeof *feature_scenes - LONG_SCENES; i++)
+    for (size_t i = 0; i < COUNT_OF(feature_scenes) - LONG_SCENES; i++)
         if (group_of(i) == group_of(scene)) features |= feature_scenes[i].features;
     return features;
 }
 
 // Compares builds for a scene's features alone with the one build for all. Short tests build for five scenes
 // at once: most features are left out of six builds of seven.
-static void features_alone_and_all_together_agree(void **state)
+TEST(features_alone_and_all_together_agree)
 {
-    (void)state;
     FeatureSet seen = 0;
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
-    const size_t count = sizeof feature_scenes / sizeof *feature_scenes;
+    const size_t count = COUNT_OF(feature_scenes);
     for (size_t i = 0; i < count - (tests_are_long() ? 0 : LONG_SCENES); i++) {
         Scene scene = scene_of_text("feature.yaml", feature_scenes[i].text);
         assert_int_equal(features_of(&scene), feature_scenes[i].features);
@@ -272,9 +264,8 @@ static void features_alone_and_all_together_agree(void **state)
     scene_free(&empty);
 }
 
-static void bands_agree(void **state)
+TEST(bands_agree)
 {
-    (void)state;
     static const uint32_t band_rows[] = {1, 7, 32};
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     Film expected = render(&every_shape, &settings);
@@ -293,9 +284,8 @@ static void bands_agree(void **state)
 }
 
 // With bands as short as they can be, each sample of a pixel has a separate launch.
-static void launches_of_samples_agree(void **state)
+TEST(launches_of_samples_agree)
 {
-    (void)state;
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     Film one = render(&every_shape, &settings);
     settings.sample_count = 5;
@@ -318,16 +308,15 @@ static void launches_of_samples_agree(void **state)
     film_free(&expected);
 }
 
-static void regions_are_cuts_of_the_whole(void **state)
+TEST(regions_are_cuts_of_the_whole)
 {
-    (void)state;
     static const uint32_t regions[][4] = {
         {0, 0, 1, 1},      {WIDTH - 1, HEIGHT - 1, 1, 1}, {3, 5, 37, 19}, {WIDTH - 18, 0, 18, HEIGHT},
         {0, 13, WIDTH, 1},
     };
     RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
     Film whole = render(&every_shape, &settings);
-    for (size_t i = 0; i < sizeof regions / sizeof *regions; i++) {
+    for (size_t i = 0; i < COUNT_OF(regions); i++) {
         const uint32_t *r = regions[i];
         settings.region_x = r[0];
         settings.region_y = r[1];
@@ -343,9 +332,8 @@ static void regions_are_cuts_of_the_whole(void **state)
 }
 
 // A shifted frame shows a part of a larger frame around the view. The numbers are exact.
-static void shifted_frames_are_cuts_of_a_larger_one(void **state)
+TEST(shifted_frames_are_cuts_of_a_larger_one)
 {
-    (void)state;
     enum { SIDE = 32 };
     Scene scene = every_shape;
     scene.camera = (Camera){.position = {0.5, 3, -10}, .look_at = {0.5, 3, 1}, .up = {0, 1, 0}};
@@ -397,9 +385,8 @@ static void check_sampled(const Scene *scene)
 }
 
 // The points of areas are those of the pixel and the sample, wherever and whenever they are computed.
-static void points_of_areas_agree(void **state)
+TEST(points_of_areas_agree)
 {
-    (void)state;
     check_sampled(&sampled);
     Scene parallel = sampled;
     parallel.camera.orthographic = true;
@@ -408,9 +395,8 @@ static void points_of_areas_agree(void **state)
 }
 
 // Packets of a panorama are not part of a plane; culls must not assume that they are.
-static void panoramas_agree(void **state)
+TEST(panoramas_agree)
 {
-    (void)state;
     Scene panorama = every_shape;
     panorama.camera.equirectangular = true;
     panorama.camera.field_axis = FIELD_HORIZONTAL;
@@ -430,9 +416,8 @@ static void panoramas_agree(void **state)
 }
 
 // Hard case R7 (docs/verify.md).
-static void mirror_gives_the_mirrored_image(void **state)
+TEST(mirror_gives_the_mirrored_image)
 {
-    (void)state;
     Scene mirrored = scene_of_file("tests/scenes/every_shape.yaml"), seen = every_shape;
     scene_mirror(&mirrored);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
@@ -452,9 +437,8 @@ static void mirror_gives_the_mirrored_image(void **state)
 }
 
 // On a GPU, kernels with features that their scene does not need keep functions out of line.
-static void functions_stay_out_of_line(void **state)
+TEST(functions_stay_out_of_line)
 {
-    (void)state;
     const Device *device = probe_compute.device;
     Device gpu = *device;
     gpu.type = CL_DEVICE_TYPE_GPU;

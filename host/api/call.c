@@ -1,5 +1,6 @@
 // Begins and ends the calls of glint.h.
 #include "host/api/handles.h"
+#include "host/base/array.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -59,7 +60,7 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
                                            [GLINT_STRICT] = PRECISION_STRICT,
                                            [GLINT_DOUBLE] = PRECISION_DOUBLE,
                                            [GLINT_CERTIFIED] = PRECISION_CERTIFIED};
-    if ((size_t)given >= sizeof precisions / sizeof *precisions)
+    if ((size_t)given >= COUNT_OF(precisions))
         return message_error(messages, "there is no precision %d", (int)given);
     *precision = precisions[given];
     return true;

@@ -1,7 +1,9 @@
-// Growing arrays: any struct with `Item *items; size_t count, capacity;`.
+// The size of an array, and growing arrays: any struct with `Item *items; size_t count, capacity;`.
 #pragma once
 
 #include <stddef.h>
+
+#define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
 
 // Ensures capacity for `extra` more items by doubling. `array` is an lvalue of such a struct.
 #define array_reserve(array, extra)                                                                          \

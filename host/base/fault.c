@@ -1,5 +1,7 @@
 #include "host/base/fault.h"
 
+#include "host/base/array.h"
+
 #include <assert.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -161,7 +163,7 @@ void fault_catch_crashes(void)
     const struct sigaction action = {.sa_handler = crash_report, .sa_flags = SA_ONSTACK};
     fault_limits();
     sigaltstack(&other, NULL);
-    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++)
+    for (size_t i = 0; i < COUNT_OF(signals); i++)
         sigaction(signals[i], &action, NULL);
 }
 

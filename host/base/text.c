@@ -56,7 +56,7 @@ void text_free(Text *text)
 ShortText text_size(double bytes)
 {
     static const char *const units[] = {"KiB", "MiB", "GiB", "TiB"};
-    enum { UNIT_COUNT = sizeof units / sizeof *units };
+    enum { UNIT_COUNT = COUNT_OF(units) };
     ShortText size;
     if (bytes < 1024) {
         snprintf(size.text, sizeof size.text, "%.0f byte%s", bytes, text_plural((uint64_t)bytes));

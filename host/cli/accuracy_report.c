@@ -1,6 +1,7 @@
 #include "host/cli/accuracy_report.h"
 
 #include "host/api/version.h"
+#include "host/base/array.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include <inttypes.h>
@@ -85,7 +86,7 @@ static const char *crossed_words(const AccuracyVariant *variant, size_t index)
         {DISQUALIFIED_OBJECT, "another object away from the silhouettes"},
         {DISQUALIFIED_SHADOW, "wrong shadows away from edges"},
     };
-    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
+    for (size_t i = 0; i < COUNT_OF(faults); i++)
         if ((variant->disqualified & faults[i].fault) && index-- == 0) return faults[i].words;
     return NULL;
 }

@@ -1,5 +1,6 @@
 #include "host/cli/format.h"
 
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/output.h"
 #include "host/base/text.h"
@@ -43,7 +44,7 @@ static ReportFormat format_of_ending(const char *path)
     } endings[] = {
         {".json", FORMAT_JSON}, {".csv", FORMAT_CSV}, {".md", FORMAT_MARKDOWN}, {".xml", FORMAT_JUNIT}};
     const char *ending = strrchr(path, '.');
-    for (size_t i = 0; ending && i < sizeof endings / sizeof *endings; i++)
+    for (size_t i = 0; ending && i < COUNT_OF(endings); i++)
         if (strcasecmp(ending, endings[i].ending) == 0) return endings[i].format;
     return FORMAT_TEXT;
 }

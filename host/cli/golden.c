@@ -34,7 +34,7 @@ static const struct {
     Layer layer;
 } hashed[] = {{"object", LAYER_OBJECT}, {"t", LAYER_T},       {"normal", LAYER_NORMAL},
               {"shadow", LAYER_SHADOW}, {"path", LAYER_PATH}, {"color", LAYER_COLOR}};
-enum { HASHED_COUNT = sizeof hashed / sizeof *hashed };
+enum { HASHED_COUNT = COUNT_OF(hashed) };
 
 // A line of the file.
 typedef struct {

@@ -1,5 +1,6 @@
 #include "host/cli/progress.h"
 
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
@@ -29,7 +30,7 @@ void progress_catch_signals(void)
 {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
     const struct sigaction action = {.sa_handler = interrupt_note};
-    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++) {
+    for (size_t i = 0; i < COUNT_OF(signals); i++) {
         struct sigaction before;
         if (sigaction(signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
             sigaction(signals[i], &action, NULL);

@@ -96,7 +96,7 @@ static const Step steps[] = {
      true,
      false},
 };
-enum { STEP_COUNT = sizeof steps / sizeof *steps };
+enum { STEP_COUNT = COUNT_OF(steps) };
 
 typedef struct {
     double seconds;
@@ -200,7 +200,7 @@ static char *folder_create(void)
 static void variables_set(const char *folder)
 {
     static const char *const variables[] = {"XDG_CACHE_HOME", "POCL_CACHE_DIR", "TMPDIR"};
-    for (size_t i = 0; i < sizeof variables / sizeof *variables; i++)
+    for (size_t i = 0; i < COUNT_OF(variables); i++)
         setenv(variables[i], folder, true);
 }
 
@@ -279,7 +279,7 @@ static const char *meaning_of(const char *name)
 {
     const bool is_kernel = strchr(name, '/') != NULL;
     const char *key = is_kernel ? strrchr(name, '.') : name;
-    for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
+    for (size_t i = 0; i < COUNT_OF(meanings); i++)
         if (strcmp(meanings[i].name, key) == 0) return meanings[i].meaning;
     return "";
 }
@@ -356,7 +356,7 @@ static Text index_text(const Archive *archive, const StepResult *results)
 static bool archive_files(Archive *archive, const char *folder, const StepResult *results,
                           const Scrubber *scrubber, OutputFile *output, MessageList *messages)
 {
-    for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
+    for (size_t i = 0; i < COUNT_OF(meanings); i++)
         if (strchr(meanings[i].name, '.') != meanings[i].name)
             folder_file_add(archive, folder, meanings[i].name, scrubber);
     kernels_add(archive, folder, scrubber);

@@ -1,5 +1,6 @@
 #include "host/cli/report_json.h"
 
+#include "host/base/array.h"
 #include "host/cli/passport_report.h"
 #include <inttypes.h>
 #include <math.h>
@@ -74,7 +75,7 @@ void command_json(Json *json, const RenderReport *report, const LaunchTime *time
                    {"start_ms", time->start_seconds},
                    {"end_ms", time->end_seconds}};
     const double origin = report_origin(report, time->device);
-    for (size_t i = 0; i < sizeof moments / sizeof *moments; i++) {
+    for (size_t i = 0; i < COUNT_OF(moments); i++) {
         if (time->trusted && isfinite(origin) && moments[i].seconds > 0)
             json_number(json, moments[i].key, 1e3 * (moments[i].seconds - origin));
         else

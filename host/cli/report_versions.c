@@ -1,5 +1,6 @@
 #include "host/cli/report_versions.h"
 #include "host/api/version.h"
+#include "host/base/array.h"
 
 #include <assimp/version.h>
 #include <jansson.h>
@@ -59,7 +60,7 @@ static void variables_append(Text *text, const Scrubber *scrubber)
                                            "HIP_",    "LP_",   "MESA_",    "NEO",     "OCL",
                                            "OPENCL_", "POCL_", "ROCR_",    "RUSTICL_"};
     for (char **variable = environ; *variable; variable++)
-        for (size_t i = 0; i < sizeof prefixes / sizeof *prefixes; i++)
+        for (size_t i = 0; i < COUNT_OF(prefixes); i++)
             if (strncmp(*variable, prefixes[i], strlen(prefixes[i])) == 0 && !strstr(*variable, "REMOTE")) {
                 const Text line = {.items = *variable, .count = strlen(*variable)};
                 Text scrubbed = scrub(scrubber, &line);

@@ -1,6 +1,7 @@
 // glint verify runs the hard cases on a device and prints one line per case.
 #include "host/verify/verify.h"
 #include "host/api/version.h"
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/json.h"
 #include "host/base/text.h"
@@ -140,7 +141,7 @@ static void record_print(CaseRecord *record, char tier)
                   {result->off_surface, "off the surface"},
                   {result->wrong_normals, "normals turned"},
                   {result->differing, "differ"}};
-    for (size_t i = 0; i < sizeof faults / sizeof *faults; i++)
+    for (size_t i = 0; i < COUNT_OF(faults); i++)
         if (faults[i].count > 0) printf("  %zu %s", faults[i].count, faults[i].what);
     putchar('\n');
     fflush(stdout);

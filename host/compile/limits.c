@@ -1,3 +1,4 @@
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/camera_basis.h"
@@ -110,7 +111,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
         {FEATURE_NORMAL_MAPS, "a material has a normal map"},
     };
     const FeatureSet features = settings->certifies ? features_of(scene) : 0;
-    for (size_t i = 0; i < sizeof unbounded / sizeof *unbounded; i++)
+    for (size_t i = 0; i < COUNT_OF(unbounded); i++)
         if (features & unbounded[i].feature)
             return message_error(messages,
                                  "%s, which has no error bound: choose a precision other than certified",

@@ -38,7 +38,7 @@ static Base base_of(const char *name)
     } names[] = {{"R", BASE_R},   {"G", BASE_G},     {"B", BASE_B},   {"Y", BASE_Y},
                  {"RY", BASE_RY}, {"BY", BASE_BY},   {"X", BASE_X},   {"Z", BASE_Z},
                  {"red", BASE_R}, {"green", BASE_G}, {"blue", BASE_B}};
-    for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+    for (size_t i = 0; i < COUNT_OF(names); i++)
         if (strcasecmp(name, names[i].name) == 0) return names[i].base;
     return BASE_COUNT;
 }

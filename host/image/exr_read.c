@@ -1,5 +1,6 @@
 // Reads OpenEXR through the C core: one layer at full resolution, in scan lines or tiles, of halves or
 // floats, or of integers with a single channel.
+#include "host/base/array.h"
 #include "host/image/codec.h"
 #include "host/image/exr_layers.h"
 
@@ -276,7 +277,7 @@ static void primaries_check(const ExrReader *reader)
     const exr_attr_chromaticities_t *c = attribute->chromaticities;
     const float found[] = {c->red_x,  c->red_y,  c->green_x, c->green_y,
                            c->blue_x, c->blue_y, c->white_x, c->white_y};
-    for (size_t i = 0; i < sizeof found / sizeof *found; i++) {
+    for (size_t i = 0; i < COUNT_OF(found); i++) {
         if (fabsf(found[i] - rec_709[i]) < 0.001F) continue;
         image_warn(reader->file, "EXR: the chromaticities are ignored; the colors are taken for Rec. 709's");
         return;

@@ -1,3 +1,4 @@
+#include "host/base/array.h"
 #include "host/image/codec.h"
 
 #include "host/base/fault.h"
@@ -196,7 +197,7 @@ static const struct {
 
 static bool (*decoder_of(const void *bytes, size_t length))(Image *image, const ImageFile *file)
 {
-    for (size_t i = 0; i < sizeof decoders / sizeof *decoders; i++) {
+    for (size_t i = 0; i < COUNT_OF(decoders); i++) {
         const size_t start_length = strlen(decoders[i].start);
         if (length >= start_length && memcmp(bytes, decoders[i].start, start_length) == 0)
             return decoders[i].decode;

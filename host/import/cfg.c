@@ -39,7 +39,7 @@ static const BlockKey keys[] = {
     {"specular", offsetof(BlockValues, specular), false, &range_not_negative},
 };
 
-enum { KEY_COUNT = sizeof keys / sizeof *keys, BLOCK_KEYS_MAX = 8 };
+enum { KEY_COUNT = COUNT_OF(keys), BLOCK_KEYS_MAX = 8 };
 
 typedef struct {
     Report report;
@@ -219,7 +219,7 @@ static const Block *block_find(CfgReader *reader)
         report_error(&reader->report, line_peek(&reader->line).offset, "':' is missing");
         return NULL;
     }
-    for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
+    for (size_t i = 0; i < COUNT_OF(blocks); i++) {
         if (word_is(name, blocks[i].name)) return line_end(&reader->line) ? &blocks[i] : NULL;
     }
     report_error(&reader->report, name.offset, "unknown block '%.*s'", word_shown(name), name.text);

@@ -2,6 +2,7 @@
 // files"): keywords in any case and their values, separated by whitespace. docs/scene-format.md lists what is
 // read and how it maps to glint.
 #include "host/import/dat.h"
+#include "host/base/array.h"
 #include "host/import/place.h"
 
 #include <stdarg.h>
@@ -204,7 +205,7 @@ static const struct {
     {"tpolyfile", NULL, 0},
 };
 
-enum { STATEMENT_COUNT = sizeof statements / sizeof *statements };
+enum { STATEMENT_COUNT = COUNT_OF(statements) };
 
 static size_t statement_find(Word word)
 {

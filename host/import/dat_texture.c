@@ -89,7 +89,7 @@ static bool function_read(DatReader *reader)
     if (!line_whole_number(&reader->line, "texfunc", &range_function, &function)) return false;
     if (function > 0) dat_warn(reader, offset, "texfunc %u is not shown: the color is used", function);
     if (function >= FIRST_IMAGE) dat_word(reader);
-    for (size_t i = 0; i < sizeof keywords / sizeof *keywords && function > 0; i++) {
+    for (size_t i = 0; i < COUNT_OF(keywords) && function > 0; i++) {
         Vector3 unused;
         if (dat_skip(reader, keywords[i]) && !dat_components(reader, keywords[i], &unused)) return false;
     }
@@ -125,7 +125,7 @@ static bool key_read(DatReader *reader, Word word, Texture *texture)
                    {"specular", &range_unit, &texture->specular},
                    {"opacity", &range_unit, &texture->opacity},
                    {"phong_size", &range_not_negative, &texture->phong_size}};
-    for (size_t i = 0; i < sizeof factors / sizeof *factors; i++)
+    for (size_t i = 0; i < COUNT_OF(factors); i++)
         if (dat_is(word, factors[i].name))
             return factor_read(reader, factors[i].name, factors[i].range, factors[i].value);
     if (dat_is(word, "phong")) return phong_read(reader, texture);

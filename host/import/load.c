@@ -64,7 +64,7 @@ static bool has_scene_ending(const char *path)
 {
     static const char *const endings[] = {".rt", ".cfg", ".nff", ".dat"};
     bool is_known = scene_is_yaml(path);
-    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+    for (size_t i = 0; i < COUNT_OF(endings); i++)
         is_known |= ends_with(path, endings[i]);
     return is_known;
 }

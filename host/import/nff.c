@@ -324,7 +324,7 @@ static const struct {
 static void element_read(NffReader *reader)
 {
     Word name = line_word(&reader->line);
-    for (size_t i = 0; i < sizeof elements / sizeof *elements; i++) {
+    for (size_t i = 0; i < COUNT_OF(elements); i++) {
         if (!word_is(name, elements[i].name)) continue;
         reader->has_fault = !elements[i].read(reader);
         if (reader->has_fault) reader->line.at = reader->line.end;

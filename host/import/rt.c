@@ -294,7 +294,7 @@ static void element_read(RtReader *reader)
     Word name = line_word(&reader->line);
     if (!name.length) return;
     reader->has_element = true;
-    for (size_t i = 0; i < sizeof elements / sizeof *elements; i++) {
+    for (size_t i = 0; i < COUNT_OF(elements); i++) {
         if (word_is(name, elements[i].name)) {
             elements[i].read(reader);
             return;

@@ -1,5 +1,6 @@
 #include "host/mpi/other_rank.h"
 
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/cli/options.h"
 #include "host/mpi/frames.h"
@@ -137,7 +138,7 @@ static void job_run(RankRenderer *worker, const Job *job)
 static void signals_ignore(void)
 {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
-    for (size_t i = 0; i < sizeof signals / sizeof *signals; i++)
+    for (size_t i = 0; i < COUNT_OF(signals); i++)
         signal(signals[i], SIG_IGN);
 }
 

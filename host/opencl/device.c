@@ -148,7 +148,7 @@ static void device_identify(DeviceList *list, Device *device)
 {
     Text pci = {0}, uuid = {0};
     PciPlace place = {0};
-    for (size_t i = 0; i < sizeof pci_queries / sizeof *pci_queries && pci.count == 0; i++)
+    for (size_t i = 0; i < COUNT_OF(pci_queries) && pci.count == 0; i++)
         if (extensions_have(device->extensions, pci_queries[i].extension) &&
             pci_queries[i].query(list, device->id, &place))
             text_appendf(&pci, "%04x:%02x:%02x.%x", place.domain, place.bus, place.device, place.function);

@@ -1,5 +1,6 @@
 #include "host/opencl/passport_measure.h"
 
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/opencl/passport_quotients.h"
 #include "host/opencl/passport_time.h"
@@ -179,7 +180,7 @@ static void specials_measure(Measurement *measurement)
         {{1, nan, 0}, nan, 0, PROBE_COMPARE, true},
         {{inf, most, 0}, inf, 0, PROBE_COMPARE, true},
     };
-    enum { COUNT = sizeof cases / sizeof *cases };
+    enum { COUNT = COUNT_OF(cases) };
     double values[COUNT];
     cases_run(measurement, cases, COUNT, values);
     measurement->passport->has_infinities_and_nans = true;
@@ -208,7 +209,7 @@ static void subnormals_measure(Measurement *measurement)
          PROBE_COMPARE,
          false},
     };
-    enum { COUNT = sizeof cases / sizeof *cases };
+    enum { COUNT = COUNT_OF(cases) };
     double values[COUNT];
     cases_run(measurement, cases, COUNT, values);
     size_t kept = 0, flushed = 0;

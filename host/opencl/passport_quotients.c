@@ -1,5 +1,6 @@
 #include "host/opencl/passport_quotients.h"
 
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
@@ -157,7 +158,7 @@ void quotients_measure(Measurement *measurement)
         {quotients, 2 - ulp, PROBE_SWEEP_RECIPROCAL, false},
         {quotients, 1 + ulp, PROBE_SWEEP_QUOTIENT, false},
     };
-    enum { SWEEPS = sizeof sweeps / sizeof *sweeps };
+    enum { SWEEPS = COUNT_OF(sweeps) };
     const bool may_be_exhaustive = passport->is_thorough && !measurement->is_double;
     quotients->is_exhaustive = roots->is_exhaustive = may_be_exhaustive;
     for (size_t i = 0; i < SWEEPS && compute_ok(measurement->compute); i++) {

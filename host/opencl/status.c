@@ -1,4 +1,5 @@
 // OpenCL's status codes by name.
+#include "host/base/array.h"
 #include "host/opencl/device.h"
 #include <CL/cl_ext.h>
 #include <string.h>
@@ -102,7 +103,7 @@ static const struct {
 
 const char *cl_status_meaning(const char *function, cl_int status)
 {
-    for (size_t i = 0; i < sizeof meanings / sizeof *meanings; i++)
+    for (size_t i = 0; i < COUNT_OF(meanings); i++)
         if (meanings[i].status == status && strcmp(meanings[i].function, function) == 0)
             return meanings[i].meaning;
     return NULL;

@@ -143,7 +143,7 @@ static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned ao
         KernelKind kind;
         unsigned layers;
     } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}, {KERNEL_COVERAGE, AOVS_OF_SAMPLES}};
-    for (size_t i = 0; i < sizeof fills / sizeof *fills; i++) {
+    for (size_t i = 0; i < COUNT_OF(fills); i++) {
         if (!(aovs & fills[i].layers)) continue;
         if (!band_fill(renderer, fills[i].kind, buffers, aovs, &place)) return false;
         if (renderer->repeat && !band_repeat(renderer, fills[i].kind, fills[i].layers, buffers, aovs, rows))

@@ -1,4 +1,5 @@
 // Images and rays through glass.
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/verify/checks.h"
 #include "host/verify/families.h"
@@ -147,7 +148,7 @@ void verify_matched_glass(VerifyRun *run)
     Scene without = matched_scene("");
     Film empty = verify_render(run, &without, false, 256, 256);
     scene_free(&without);
-    for (unsigned k = 0; k < sizeof matched / sizeof *matched; k++) {
+    for (unsigned k = 0; k < COUNT_OF(matched); k++) {
         Scene scene = matched_scene(matched[k]);
         Film image = verify_render(run, &scene, false, 256, 256);
         scene_free(&scene);

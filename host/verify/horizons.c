@@ -1,4 +1,5 @@
 // Images of ground up to its horizon.
+#include "host/base/array.h"
 #include "host/verify/checks.h"
 #include <math.h>
 
@@ -23,7 +24,7 @@ void verify_ground_horizon(VerifyRun *run)
     } views[] = {{60, 0}, {0.5, 0}, {0.02, -0.0014142}};
     Scene scene = verify_scene("objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
     const Vector3 eye = {0, 1, 0};
-    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+    for (size_t k = 0; k < COUNT_OF(views); k++) {
         scene.camera = verify_camera(eye, (Vector3){0, 1 + views[k].rise, 1}, views[k].fov);
         Film image = verify_render(run, &scene, false, 128, 512);
         VerifyTarget ground = verify_target(run, &scene.objects.items[0], eye);

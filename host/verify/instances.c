@@ -86,7 +86,7 @@ void verify_instances(VerifyRun *run)
     };
     TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
     TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
-    for (size_t which = 0; which < sizeof placed / sizeof *placed; which++) {
+    for (size_t which = 0; which < COUNT_OF(placed); which++) {
         Scene scene = scene_empty();
         const Mesh mesh = ball_make();
         array_push(scene.meshes, mesh);

@@ -1,4 +1,5 @@
 // A scene of every shape, scaled, mirrored and turned: the image may change in the known way only.
+#include "host/base/array.h"
 #include "host/compile/transform.h"
 #include "host/verify/run.h"
 #include <math.h>
@@ -101,7 +102,7 @@ void verify_scaled_scenes(VerifyRun *run)
     Film image = verify_render(run, &scene, false, 160, 120);
     demand_every_object(run, &scene, &image);
     scene_free(&scene);
-    for (size_t i = 0; i < sizeof exponents / sizeof *exponents; i++) {
+    for (size_t i = 0; i < COUNT_OF(exponents); i++) {
         double scale = ldexp(1, exponents[i]);
         Scene scaled = every_shape_scene();
         scene_scale(&scaled, scale);

@@ -163,7 +163,7 @@ void verify_degenerate_meshes(VerifyRun *run)
     Scene scene = scene_empty();
     add_random_triangles(&scene, SOUND, 0.5);
     verify_trace(run, &scene, true, rays, count, clean);
-    for (size_t i = 0; i < sizeof degenerate / sizeof *degenerate; i++)
+    for (size_t i = 0; i < COUNT_OF(degenerate); i++)
         scene_add_triangle(&scene, degenerate[i]);
     verify_trace(run, &scene, true, rays, count, hits);
     scene_free(&scene);
@@ -172,7 +172,7 @@ void verify_degenerate_meshes(VerifyRun *run)
         run->result->differing += !verify_same_bits(&hits[i], &clean[i]);
     }
     static const char *const no_numbers[] = {".nan", ".inf", "-.inf"};
-    for (size_t i = 0; i < sizeof no_numbers / sizeof *no_numbers; i++)
+    for (size_t i = 0; i < COUNT_OF(no_numbers); i++)
         run->result->wrong += !is_refused(no_numbers[i]);
     free(rays);
     free(hits);
@@ -252,7 +252,7 @@ void verify_bvh(VerifyRun *run)
         m6_rays(run, &scene, batch * M6_RAYS, hits, rays);
         verify_trace_opened(run, list, rays, M6_RAYS, plain);
         double unlimited = rays[0].tmax;
-        for (size_t cut = 0; cut < sizeof parts / sizeof *parts; cut++) {
+        for (size_t cut = 0; cut < COUNT_OF(parts); cut++) {
             for (size_t i = 0; i < M6_RAYS; i++)
                 if (verify_is_hit(&plain[i]))
                     rays[i].tmax = fmin(unlimited, verify_rounded(run, plain[i].t * parts[cut]));

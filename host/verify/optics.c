@@ -1,4 +1,5 @@
 // Checks of refraction and of the camera's frame.
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/camera_basis.h"
 #include "host/verify/run.h"
@@ -100,9 +101,9 @@ void verify_camera_frames(VerifyRun *run)
         {.look_at = {1e-30, 0, 0}, .up = {0, 1e30, 0}, .half_tangent = 1},
         {.look_at = {0, 0, 1e30}, .up = {0, 1e-30, 0}, .half_tangent = 1},
     };
-    for (size_t i = 0; i < sizeof refused / sizeof *refused; i++)
+    for (size_t i = 0; i < COUNT_OF(refused); i++)
         run->result->wrong += !is_camera_refused(refused[i]);
-    for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
+    for (size_t i = 0; i < COUNT_OF(cameras); i++) {
         const CameraBasis basis = camera_basis(&cameras[i], 640, 480);
         const Vector3 axes[3] = {basis.forward, basis.right, basis.up};
         run->result->unsound += !is_orthonormal(axes);

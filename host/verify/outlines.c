@@ -1,5 +1,6 @@
 // Images of what is far, thin or pointed: each pixel's hit or miss against the exact one for the ray that
 // was traced.
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
 #include "host/verify/checks.h"
@@ -52,7 +53,7 @@ void verify_far_fringe(VerifyRun *run)
     Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, -1]}\n"
                                "objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
     static const double distances[] = {10, 100, 1e3, 1e4};
-    for (size_t k = 0; k < sizeof distances / sizeof *distances; k++) {
+    for (size_t k = 0; k < COUNT_OF(distances); k++) {
         double distance = distances[k];
         const Vector3 eye = {0, 0, distance};
         scene.camera = verify_camera(eye, origin, 2.2 / distance * (180 / M_PI));
@@ -104,7 +105,7 @@ void verify_apex(VerifyRun *run)
         const char *light;
     } views[] = {{{0, 0, -5}, "[0, 0, 1]"}, {{5, 0, 0}, "[-1, 0, 0]"}};
     enum { SIDE = 65 };
-    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+    for (size_t k = 0; k < COUNT_OF(views); k++) {
         char text[160];
         snprintf(text, sizeof text,
                  "lights:\n  - directional: {direction: %s}\n"
@@ -139,7 +140,7 @@ void verify_far_torus(VerifyRun *run)
 {
     static const double distances[] = {10, 50, 1000};
     Scene scene = torus_scene(0.25);
-    for (size_t k = 0; k < sizeof distances / sizeof *distances; k++) {
+    for (size_t k = 0; k < COUNT_OF(distances); k++) {
         const Vector3 eye = {0.3 * distances[k], 0.4 * distances[k], -0.866 * distances[k]};
         scene.camera = verify_camera(eye, origin, 0);
         scene.camera.half_tangent = 1.3 / distances[k];
@@ -154,7 +155,7 @@ void verify_far_torus(VerifyRun *run)
 void verify_tangent_circle(VerifyRun *run)
 {
     static const double heights[] = {0.25, 0.25 - 0x1p-26, 0.25 + 0x1p-25};
-    enum { COUNT = sizeof heights / sizeof *heights };
+    enum { COUNT = COUNT_OF(heights) };
     if (run->tier == TIER_A) return;
     TraceRay rays[COUNT];
     TraceHit hits[COUNT];
@@ -231,7 +232,7 @@ void verify_thin_ring(VerifyRun *run)
     } views[] = {{30, 1024}, {17.2, 1536}};
     const Vector3 eye = {0, -5, 5};
     Scene scene = torus_scene(0.001);
-    for (size_t k = run->settings->quick ? 1 : 0; k < sizeof views / sizeof *views; k++) {
+    for (size_t k = run->settings->quick ? 1 : 0; k < COUNT_OF(views); k++) {
         scene.camera = verify_camera(eye, origin, views[k].fov);
         Film image = verify_render(run, &scene, false, views[k].side, views[k].side);
         check_pixels(run, &image, &scene);

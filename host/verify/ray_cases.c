@@ -1,3 +1,4 @@
+#include "host/base/array.h"
 #include "host/verify/rays.h"
 
 // What a row does not name is 0.
@@ -236,4 +237,4 @@ const VerifyRays verify_rays[] = {
      "-56.2431908], [-1113.45459, -79.2090149, -56.2431908]]}\n",
      BY_NUMBERS(m5), .decided_tiers = "ABCD"},
 };
-const size_t verify_rays_count = sizeof verify_rays / sizeof *verify_rays;
+const size_t verify_rays_count = COUNT_OF(verify_rays);

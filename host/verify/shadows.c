@@ -1,4 +1,5 @@
 // Images of shadows: none where nothing stands in the light, and none missing.
+#include "host/base/array.h"
 #include "host/verify/checks.h"
 #include <math.h>
 
@@ -10,13 +11,13 @@ void verify_plane_acne(VerifyRun *run)
     static const double elevations[] = {0.01, 1, 45};
     const Vector3 normal = {1, 2, 3}, unit = vector_normalize(normal);
     const Vector3 across = vector_normalize(vector_cross(normal, (Vector3){1, 0, 0}));
-    for (size_t k = 0; k < sizeof sizes_places / sizeof *sizes_places; k++) {
+    for (size_t k = 0; k < COUNT_OF(sizes_places); k++) {
         double size = sizes_places[k][0], place = sizes_places[k][1];
         Vector3 point = vector_add(vector_scale((Vector3){0.3, -0.2, 0.5}, size),
                                    vector_scale((Vector3){1, -2, 0.5}, place));
         Vector3 eye =
             vector_add(point, vector_add(vector_scale(unit, 3 * size), vector_scale(across, 0.5 * size)));
-        for (size_t light = 0; light < sizeof elevations / sizeof *elevations; light++) {
+        for (size_t light = 0; light < COUNT_OF(elevations); light++) {
             double angle = elevations[light] * (M_PI / 180);
             Scene scene = verify_scene("lights:\n  - directional: {direction: [0, 0, 1]}\n"
                                        "objects:\n  - plane: {point: [0, 0, 0], normal: [1, 2, 3]}\n");
@@ -104,7 +105,7 @@ void verify_contact_shadow(VerifyRun *run)
     Scene scene = verify_scene("lights:\n  - point: {position: [0, 10, 0]}\n"
                                "objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
                                "  - sphere: {center: [0, 1, 0], radius: 1}\n");
-    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+    for (size_t k = 0; k < COUNT_OF(views); k++) {
         const Vector3 eye = views[k].eye;
         scene.camera = verify_camera(eye, touched, views[k].fov);
         Film image = verify_render(run, &scene, false, 384, 384);

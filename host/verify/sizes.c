@@ -1,4 +1,5 @@
 // Shapes far larger, or smaller, than their distance from the eye: what rounding moves of them.
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/verify/checks.h"
 #include <math.h>
@@ -189,7 +190,7 @@ static const SizedShape shapes[] = {
 void verify_sizes(VerifyRun *run)
 {
     size_t shape_count = 0;
-    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+    for (size_t i = 0; i < COUNT_OF(shapes); i++) {
         if (strcmp(shapes[i].case_name, run->result->name) != 0) continue;
         check_sizes(run, &shapes[i]);
         shape_count++;

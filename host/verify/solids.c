@@ -159,7 +159,7 @@ static const char *const coincident[] = {
     "triangle: {vertices: [[0, 0.25, 0], [2, 0.25, 0.5], [0, 0.25, 3]]}",
     "disc: {center: [1, 0.5, 0.5], normal: [1, 0, 0], radius: 0.75}",
 };
-enum { COINCIDENT = sizeof coincident / sizeof *coincident };
+enum { COINCIDENT = COUNT_OF(coincident) };
 
 // The first in the list is seen of objects that are hit at the same distance, which does not depend on the
 // list's order. A scene of each object alone gives it.

@@ -1,4 +1,5 @@
 #include "host/verify/verify.h"
+#include "host/base/array.h"
 #include "host/import/load.h"
 
 #include "host/base/fault.h"
@@ -68,7 +69,7 @@ static const struct {
     {"R8", "degenerate cameras", {verify_camera_frames, verify_degenerate_views}},
 };
 
-_Static_assert(sizeof cases / sizeof *cases <= VERIFY_CASES_MAX, "VERIFY_CASES_MAX is too small");
+_Static_assert(COUNT_OF(cases) <= VERIFY_CASES_MAX, "VERIFY_CASES_MAX is too small");
 
 bool verify_holds(const VerifyResult *result)
 {
@@ -339,7 +340,7 @@ Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees)
 
 const char *verify_case_name(size_t i)
 {
-    return i < sizeof cases / sizeof *cases ? cases[i].name : NULL;
+    return i < COUNT_OF(cases) ? cases[i].name : NULL;
 }
 
 static bool is_chosen(const VerifyChoice *choice, const char *name)
@@ -369,7 +370,7 @@ void verify_run(Compute *compute, const VerifySettings *settings, const VerifyCh
                 const VerifySink *sink, VerifyKernels *kernels)
 {
     Renderer *tracer = NULL, *painter = NULL;
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    for (size_t i = 0; i < COUNT_OF(cases); i++) {
         if (!is_chosen(choice, cases[i].name)) continue;
         VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
         if (sink->start && !sink->start(sink->context, &result)) continue;

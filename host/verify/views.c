@@ -1,4 +1,5 @@
 // Images by cameras whose numbers are extreme or say too little.
+#include "host/base/array.h"
 #include "host/verify/run.h"
 #include <math.h>
 
@@ -44,11 +45,11 @@ static void check_views_without_up(VerifyRun *run)
         Vector3 eye, look_at, axis;
     } views[] = {{{0.3, 5, 0.4}, {0.3, 0, 0.4}, {1, 0, 0}}, {{2, 4, 6}, {0, 0, 0}, {1, 0, 0}}};
     const Vector3 here = {0, 0, 0};
-    for (size_t k = 0; k < sizeof views / sizeof *views; k++) {
+    for (size_t k = 0; k < COUNT_OF(views); k++) {
         Vector3 toward = vector_subtract(views[k].look_at, views[k].eye);
         Film expected = view(run, here, views[k].eye, views[k].look_at, views[k].axis, 40);
         const Vector3 ups[] = {toward, vector_scale(toward, -0.5), {0, 0, 0}};
-        for (size_t i = 0; i < sizeof ups / sizeof *ups; i++) {
+        for (size_t i = 0; i < COUNT_OF(ups); i++) {
             Film image = view(run, here, views[k].eye, views[k].look_at, ups[i], 40);
             compare(run, &image, &expected);
             film_free(&image);
@@ -89,7 +90,7 @@ static void check_extremes(VerifyRun *run)
     const Vector3 here = {0, 0, 0}, far = {1e7, -1e7, 2e7}, up = {0, 1, 0}, eye = {2, 4, 6};
     static const double fovs[] = {1e-3, 179.9};
     const size_t middle = (SIDE * SIDE - 1) / 2;
-    for (size_t i = 0; i < sizeof fovs / sizeof *fovs; i++) {
+    for (size_t i = 0; i < COUNT_OF(fovs); i++) {
         Film image = view(run, here, eye, here, up, fovs[i]);
         run->result->wrong += image.object[middle] != 1 || !(image.color[3 * middle] > 0);
         film_free(&image);

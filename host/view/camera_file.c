@@ -1,5 +1,6 @@
 #include "host/view/camera_file.h"
 
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/yaml/animation.h"
 #include "host/import/yaml/yaml.h"
@@ -205,7 +206,7 @@ static bool value_write(Text *text, const char *key, const Camera *old, const Ca
     } members[] = {{"position", old->position, camera->position},
                    {"look_at", old->look_at, camera->look_at},
                    {"up", old->up, camera->up}};
-    for (size_t i = 0; i < sizeof members / sizeof *members; i++)
+    for (size_t i = 0; i < COUNT_OF(members); i++)
         if (strcmp(key, members[i].name) == 0) {
             if (!is_recorded && vectors_equal(members[i].old, members[i].new) &&
                 !(i == 0 && is_moved && has_turn))

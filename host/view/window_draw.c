@@ -1,4 +1,5 @@
 // Draws the window: the frame, and text over it.
+#include "host/base/array.h"
 #include "host/view/window_state.h"
 
 #include "host/view/keys.h"
@@ -62,7 +63,7 @@ void stage_show(Window *window)
 static void help_draw(const Window *window)
 {
     Text help = {0};
-    for (size_t i = 0; i < sizeof help_rows / sizeof *help_rows; i++)
+    for (size_t i = 0; i < COUNT_OF(help_rows); i++)
         text_appendf(&help, "%s%-12s  %s", i > 0 ? "\n" : "", help_rows[i].input, help_rows[i].effect);
     caption_draw(window->caption, CAPTION_TOP, text_c(&help));
     text_free(&help);

@@ -1,13 +1,10 @@
 #include "tests/failing/work.h"
 #include "host/base/memory.h"
+#include "tests/check.h"
 #include "tests/failing/calls.h"
 #include "tests/scene_reading.h"
-#include <setjmp.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-
-#include <cmocka.h>
 
 enum { LARGE_BYTES = 4 << 20 };
 

@@ -1,5 +1,6 @@
 // libFuzzer's target: whatever a reader gets, it must neither crash nor leak, nor believe what is not there.
 // GLINT_FUZZ names the reader; tools/fuzz runs them. Memory that a file claims is bounded by what it has.
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
@@ -252,7 +253,7 @@ int LLVMFuzzerInitialize(int *argument_count, char ***arguments)
     (void)argument_count;
     (void)arguments;
     const char *name = getenv("GLINT_FUZZ");
-    const size_t count = sizeof readers / sizeof *readers;
+    const size_t count = COUNT_OF(readers);
     while (reader < count && (!name || strcmp(readers[reader].name, name) != 0))
         reader++;
     if (reader == count) {

@@ -2,6 +2,7 @@
 // built with, each compared with the quadruple-precision reference of host/verify/reference.c on the very
 // bits that the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --check it
 // prints what exceeds the hard cases' bounds instead.
+#include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
@@ -19,7 +20,7 @@
 static const double rungs[] = {1.0001, 1.01, 1.1, 2, 10, 100, 1e3, 1e4, 1e5, 1e6};
 
 enum {
-    RUNG_COUNT = sizeof rungs / sizeof *rungs,
+    RUNG_COUNT = COUNT_OF(rungs),
     INSTANCES = 6,  // of each shape, among which each rung's rays are divided
     COPIES = 64,    // of a shape, to time a test
     TIMED_RUNS = 5, // of which the shortest counts

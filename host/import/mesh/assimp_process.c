@@ -1,4 +1,5 @@
 #include "host/import/mesh/assimp_process.h"
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/import/number.h"
 
@@ -388,7 +389,7 @@ static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
     sigset_t none, defaults;
     sigemptyset(&none);
     sigemptyset(&defaults);
-    for (size_t i = 0; i < sizeof ending / sizeof *ending; i++)
+    for (size_t i = 0; i < COUNT_OF(ending); i++)
         sigaddset(&defaults, ending[i]);
     posix_spawn_file_actions_init(&actions);
     posix_spawnattr_init(&attributes);

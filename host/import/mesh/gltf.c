@@ -1,5 +1,6 @@
 // glTF: the JSON text, its values, and the warnings about what is not shown.
 #include "host/import/mesh/gltf.h"
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/number.h"
 
@@ -168,7 +169,7 @@ bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t coun
 
 static bool extension_is_read(const char *name)
 {
-    for (size_t i = 0; i < sizeof extensions_read / sizeof *extensions_read; i++)
+    for (size_t i = 0; i < COUNT_OF(extensions_read); i++)
         if (strcmp(name, extensions_read[i]) == 0) return true;
     return false;
 }

@@ -1,5 +1,6 @@
 // glTF: materials of metal and roughness, as far as glint's have it (docs/scene-format.md), and their
 // textures.
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/gltf.h"
 #include "host/import/number.h"
@@ -70,7 +71,7 @@ static void surface_read(Gltf *gltf, const GltfItem *item, GltfSurface *surface)
         GltfLoss loss;
     } losses[] = {{&pbr, "metallicRoughnessTexture", GLTF_METAL_TEXTURE},
                   {item, "occlusionTexture", GLTF_OCCLUSION_TEXTURE}};
-    for (size_t i = 0; i < sizeof losses / sizeof *losses; i++) {
+    for (size_t i = 0; i < COUNT_OF(losses); i++) {
         const GltfItem lost = gltf_member(losses[i].item, losses[i].key);
         if (lost.json) gltf_lose(gltf, losses[i].loss, &lost);
     }

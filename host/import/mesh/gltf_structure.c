@@ -1,4 +1,5 @@
 // glTF: the JSON types of its members. What reads them takes a member of another type for a missing one.
+#include "host/base/array.h"
 #include "host/import/mesh/gltf.h"
 
 #include <string.h>
@@ -105,7 +106,7 @@ bool gltf_structure_check(Gltf *gltf)
 {
     const GltfItem root = {.json = gltf->root};
     bool is_sound = true;
-    for (size_t i = 0; i < sizeof members / sizeof *members && is_sound; i++) {
+    for (size_t i = 0; i < COUNT_OF(members) && is_sound; i++) {
         gltf->is_optional = !members[i].is_needed;
         is_sound = path_check(gltf, &root, members[i].path, members[i].type) || gltf->is_optional;
     }

@@ -1,5 +1,6 @@
 // Chooses a mesh's reader, and makes what it read a mesh of the scene.
 #include "host/import/mesh/mesh_import.h"
+#include "host/base/array.h"
 #include "host/base/file.h"
 #include "host/import/mesh/assimp_process.h"
 
@@ -18,7 +19,7 @@ static bool (*reader_of(const char *path))(MeshDraft *draft)
                    {".gltf", gltf_read},
                    {".glb", gltf_read}};
     const char *ending = strrchr(path, '.');
-    for (size_t i = 0; ending && i < sizeof readers / sizeof *readers; i++)
+    for (size_t i = 0; ending && i < COUNT_OF(readers); i++)
         if (!strcasecmp(ending, readers[i].ending)) return readers[i].read;
     return assimp_process_read;
 }

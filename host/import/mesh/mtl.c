@@ -1,6 +1,7 @@
 // Wavefront MTL (Alias|Wavefront, Advanced Visualizer manual, MTL material format, 1995), as far as materials
 // of scenes support it (docs/scene-format.md).
 #include "host/import/mesh/mtl.h"
+#include "host/base/array.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/image/image.h"
@@ -305,7 +306,7 @@ static void line_read(MtlReader *reader)
     const Word word = scan_word(&reader->scan);
     MtlMaterial *material = material_of(reader);
     if (word.length == 0) return;
-    for (size_t i = 0; i < sizeof statements / sizeof *statements; i++) {
+    for (size_t i = 0; i < COUNT_OF(statements); i++) {
         if (!word_is(word, statements[i].word)) continue;
         if (i > 0 && !material)
             report_warning(&reader->report, word.offset, "a line before the first newmtl is not used");

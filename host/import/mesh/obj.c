@@ -1,5 +1,6 @@
 // Wavefront OBJ (Alias|Wavefront, Advanced Visualizer manual, appendix B, 1995): polygons, and the materials
 // of its MTL files.
+#include "host/base/array.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/mtl.h"
 #include "host/import/mesh/scan.h"
@@ -179,7 +180,7 @@ static bool line_read(ObjReader *reader)
 {
     const Word word = scan_word(&reader->scan);
     if (word.length == 0) return true;
-    for (size_t i = 0; i < sizeof statements / sizeof *statements; i++)
+    for (size_t i = 0; i < COUNT_OF(statements); i++)
         if (word_is(word, statements[i].word)) return statements[i].read(reader);
     unused_note(&reader->unused, &reader->draft->report, word, "is not used");
     return true;

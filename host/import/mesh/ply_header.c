@@ -78,7 +78,7 @@ static const PlyType *type_of(Word word)
         {"int32", 4, PLY_SIGNED},    {"uint32", 4, PLY_UNSIGNED}, {"float32", 4, PLY_REAL},
         {"float64", 8, PLY_REAL},
     };
-    for (size_t i = 0; i < sizeof types / sizeof *types; i++)
+    for (size_t i = 0; i < COUNT_OF(types); i++)
         if (word_is(word, types[i].name)) return &types[i];
     return NULL;
 }

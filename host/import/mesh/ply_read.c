@@ -1,4 +1,5 @@
 // A PLY file's vertices and faces (Turk, The PLY Polygon File Format, 1994), in text or binary.
+#include "host/base/array.h"
 #include "host/import/mesh/ply.h"
 
 #include <stdlib.h>
@@ -64,10 +65,10 @@ static PlyRole role_of(const PlyElement *element, const PlyProperty *property)
       lists[] = {
           {"vertex_indices", ROLE_CORNERS}, {"vertex_index", ROLE_CORNERS}, {"texcoord", ROLE_CORNER_UVS}};
     if (word_is(element->name, "vertex") && !property->count_type) {
-        for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++)
+        for (size_t i = 0; i < COUNT_OF(numbers); i++)
             if (word_is(property->name, numbers[i].name)) return numbers[i].role;
     } else if (word_is(element->name, "face") && property->count_type) {
-        for (size_t i = 0; i < sizeof lists / sizeof *lists; i++)
+        for (size_t i = 0; i < COUNT_OF(lists); i++)
             if (word_is(property->name, lists[i].name)) return lists[i].role;
     }
     return ROLE_NONE;
@@ -153,7 +154,7 @@ static bool real_read(const char **text, const char *end, double *value)
     if (status != NUMBER_MALFORMED) return true;
     const char *at = *text;
     if (at < end && (*at == '-' || *at == '+')) at++;
-    for (size_t i = 0; i < sizeof not_finite / sizeof *not_finite; i++) {
+    for (size_t i = 0; i < COUNT_OF(not_finite); i++) {
         const size_t length = strlen(not_finite[i]);
         if ((size_t)(end - at) < length || strncasecmp(at, not_finite[i], length) != 0) continue;
         *text = at + length;

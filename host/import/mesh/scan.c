@@ -1,5 +1,7 @@
 #include "host/import/mesh/scan.h"
 
+#include "host/base/array.h"
+
 bool scan_is_text(Scan *scan, Report *report)
 {
     const size_t length = (size_t)(scan->end - scan->start);
@@ -13,7 +15,7 @@ void unused_note(UnusedWords *unused, Report *report, Word word, const char *wha
 {
     for (size_t i = 0; i < unused->count; i++)
         if (words_equal(unused->words[i], word)) return;
-    if (unused->count == sizeof unused->words / sizeof *unused->words) return;
+    if (unused->count == COUNT_OF(unused->words)) return;
     unused->words[unused->count++] = word;
     report_warning(report, word.offset, "'%.*s' %s", word_shown(word), word.text, what);
 }

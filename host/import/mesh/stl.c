@@ -1,5 +1,6 @@
 // STL (3D Systems, StereoLithography Interface Specification, 1989), in text or binary. The normals of its
 // facets are those of its triangles, so they are not read.
+#include "host/base/array.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/scan.h"
 
@@ -54,7 +55,7 @@ static bool line_read(StlReader *reader)
     if (word_is_in_any_case(word, "vertex")) return vertex_read(reader);
     if (word_is_in_any_case(word, "endloop") || word_is_in_any_case(word, "endfacet"))
         return facet_end(reader, word.offset);
-    for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+    for (size_t i = 0; i < COUNT_OF(known); i++)
         if (word_is_in_any_case(word, known[i])) return true;
     unused_note(&reader->unused, &reader->draft->report, word, "is not used");
     return true;

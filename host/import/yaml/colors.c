@@ -1,4 +1,5 @@
 // Colors of YAML scenes: linear numbers, sRGB in hexadecimal, or names.
+#include "host/base/array.h"
 #include "host/image/srgb.h"
 #include "host/import/yaml/fields.h"
 

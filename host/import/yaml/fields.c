@@ -1,5 +1,6 @@
 #include "host/import/yaml/fields.h"
 
+#include "host/base/array.h"
 #include "host/base/text.h"
 #include <stdio.h>
 #include <stdlib.h>

@@ -7,8 +7,6 @@
 #include "host/import/yaml/tree.h"
 #include "host/scene/scene.h"
 
-#define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
-
 typedef struct {
     const char *name; // in the tree's texts
     uint32_t material;

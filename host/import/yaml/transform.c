@@ -1,4 +1,5 @@
 // `transform:` of YAML scenes.
+#include "host/base/array.h"
 #include "host/import/yaml/yaml.h"
 
 #include <math.h>

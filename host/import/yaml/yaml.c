@@ -1,5 +1,6 @@
 // YAML scenes: the document and its camera. Reference: docs/scene-format.md.
 #include "host/import/yaml/yaml.h"
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/load.h"
 #include "host/import/yaml/animation.h"
