@@ -8,9 +8,10 @@ from pathlib import Path
 def scenes(ending):
     """The name and the bytes of each scene."""
     table = Path(__file__).with_name("broken") / f"{ending}.txt"
-    for section in re.split(r"(?m)^#### scene ", table.read_text(encoding="utf-8"))[1:]:
+    start, *sections = re.split(r"(?m)^#### scene ", table.read_text(encoding="utf-8"))
+    for section in sections:
         name, body = section.split("\n", 1)
-        text, end, _ = re.split(r"(?m)^#### expected(.*)\n", body)
+        text, end, _ = re.split(r"(?m)^#### expected(.*)\n", body.replace("#### start\n", start))
         text = re.sub(r"(?m)^#### repeat (\d+) (\d+) (.*\n)",
                       lambda run: "".join(run[3].replace("%d", str(i)) for i in range(int(run[1]), int(run[2]) + 1)), text)
         content = re.sub("(?m)^#### set .*\n", "", text).encode()

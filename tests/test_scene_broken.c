@@ -68,8 +68,9 @@ static void text_unescape(Text *text)
     text->items[text->count = length] = '\0';
 }
 
-// Reads the section that begins at `line`. Returns the line behind it, or NULL at the end.
-static char *section_read(char *line, const char *ending, BrokenScene *broken)
+// Reads the section that begins at `line`, where `#### start` stands for the text `start`. Returns the line
+// behind it, or NULL at the end.
+static char *section_read(char *line, const Text *start, const char *ending, BrokenScene *broken)
 {
     *broken = (BrokenScene){0};
     char *next = line;
@@ -87,6 +88,8 @@ static char *section_read(char *line, const char *ending, BrokenScene *broken)
             broken->sets.items[broken->sets.count++] = line + strlen("#### set ");
         } else if (starts_with(line, "#### escaped")) {
             broken->is_escaped = true;
+        } else if (starts_with(line, "#### start")) {
+            text_append(&broken->text, text_c(start), start->count);
         } else if (starts_with(line, "#### repeat ")) {
             const long first = strtol(line + strlen("#### repeat "), &value, 10),
                        last = strtol(value, &value, 10);
@@ -133,12 +136,16 @@ static void check_table(void **state)
     snprintf(path, sizeof path, "tests/broken/%s.txt", ending);
     Text table = file_text(path);
     size_t count = 0;
-    for (char *line = strstr(table.items, "#### scene "); line; count++) {
+    char *line = strstr(table.items, "#### scene ");
+    Text start = {0};
+    text_append(&start, table.items, (size_t)(line - table.items));
+    for (; line; count++) {
         BrokenScene broken;
-        line = section_read(line, ending, &broken);
+        line = section_read(line, &start, ending, &broken);
         check_scene(&broken);
     }
     assert_true(count >= BROKEN_SCENES_MIN);
+    text_free(&start);
     text_free(&table);
 }
 
