@@ -82,7 +82,7 @@ class Diff(TestCase):
             ("t.npy t.npy --max-off 1", '--max-off: "t.npy" and "t.npy" do not both have colors'),
             ("ids.npy ids.npy --max-ulp 1", '"ids.npy" and "ids.npy" do not both have floating-point values'),
             ("t.npy ids.npy --max-ulp 1", '"t.npy" and "ids.npy" do not both have floating-point values'),
-            ("t.npy t.npy --max-rmse -1", "--max-rmse: expected a number, 0 or more, not \"-1\""),
+            ("t.npy t.npy --max-rmse -1", "--max-rmse: expected a number of at least 0, not \"-1\""),
             ("t.npy t.npy --max-rmse 1%", "--max-rmse: expected a number"),
             ("t.npy t.npy --max-rmse nan", "--max-rmse: expected a number"),
         ):

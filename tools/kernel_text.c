@@ -24,13 +24,11 @@ int main(int argument_count, char **arguments)
         return EXIT_FAILURE;
     }
     CommonOptions options = {.lanes = 1};
-    unsigned precision;
     Scene scene;
     OpenDevice open;
-    if (!option_choice("precision", arguments[2], precision_names, PRECISION_COUNT, &precision) ||
+    if (!option_precision(precision_option, arguments[2], &options) ||
         !scene_open(&scene, arguments[1], &options))
         return EXIT_FAILURE;
-    options.precision = precision;
     int status = EXIT_FAILURE;
     if (device_open(&open, &(CommonOptions){0})) {
         char *text = kernel_text(&open, &scene, &options);

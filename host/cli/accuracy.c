@@ -9,43 +9,10 @@
 #include "host/cli/page.h"
 #include "host/cli/variants.h"
 #include "host/image/image.h"
-#include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-
-enum { OPTION_REFERENCE = OPTION_BEYOND_VARIANTS, OPTION_BUDGET, OPTION_SAVE, OPTION_HTML };
-
-static const struct option long_options[] = {
-    {"reference", required_argument, NULL, OPTION_REFERENCE},
-    {"budget", required_argument, NULL, OPTION_BUDGET},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    {"save", required_argument, NULL, OPTION_SAVE},
-    FORMAT_LONG_OPTIONS,
-    {"html", required_argument, NULL, OPTION_HTML},
-    VARIANT_LONG_OPTIONS,
-    PERTURB_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint accuracy SCENE... [OPTIONS]\n\n"
-    "Measure speed and error of scenes in every requested configuration.\n\n"
-    "      --reference FILE  linear colors to compare with, .exr or .npy, of the images' size or a multiple, "
-    "then averaged\n"
-    "                        (default: the image at double)\n"
-    "      --budget LIST     errors to allow: report the fastest configuration within each (default: "
-    "1e-2,1e-4,1e-6)\n"
-    "      --samples LIST    per pixel, one variant each; the reference takes the largest (default: 1)\n"
-    "      --save FOLDER     write all compared arrays there, as .npy\n"
-    "      --html FILE       self-contained HTML report\n"
-    "      --precision LIST  of single, strict, double, certified (default: the first three)\n" //
-    HELP_VARIANTS HELP_BOUNCES HELP_PERTURB HELP_FORMAT HELP_HELP;
 
 typedef struct {
     VariantOptions variants;
@@ -53,6 +20,35 @@ typedef struct {
     AccuracyBudgets budgets;
     ReportOptions report;
 } AccuracyOptions;
+
+static bool budgets_read(const Option *option, const char *value, void *options)
+{
+    AccuracyBudgets *budgets = &((AccuracyOptions *)options)->budgets;
+    return option_list(option, value, option_number, budgets->limits, sizeof *budgets->limits, BUDGETS_MAX,
+                       &budgets->count);
+}
+
+static const Option options_own[] = {
+    {"reference", "FILE",
+     "linear colors to compare with, .exr or .npy, of the images' size or a multiple, then averaged "
+     "(default: the image at double)",
+     option_text, offsetof(AccuracyOptions, reference_path)},
+    {"budget", "LIST",
+     "errors to allow: report the fastest configuration within each (default: 1e-2,1e-4,1e-6)", budgets_read,
+     0, NUMBERS_ABOVE(0, INFINITY)},
+    {"save", "FOLDER", "write all compared arrays there, as .npy", option_folder,
+     offsetof(AccuracyOptions, folder)},
+    {"html", "FILE", "self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
+    {"precision", "LIST", "of single, strict, double, certified (default: the first three)", option_set,
+     offsetof(AccuracyOptions, variants.precisions), NAMES(precision_names)}};
+
+static const CommandLine command_line = {
+    .usage = "usage: glint accuracy SCENE... [OPTIONS]\n\n"
+             "Measures speed and error of scenes in every requested configuration. The reference takes the "
+             "largest of --samples.\n",
+    .groups = {OPTIONS(options_own), VARIANT_GROUPS(AccuracyOptions, variants),
+               OPTIONS_WITHIN(perturb_option, AccuracyOptions, variants.common),
+               OPTIONS_WITHIN(report_options, AccuracyOptions, report)}};
 
 typedef struct {
     AccuracyOptions options;
@@ -64,49 +60,13 @@ typedef struct {
     MessageList messages;
 } Accuracy;
 
-static bool budget_read(const char *option, const char *value, void *limit)
-{
-    char *end;
-    const double number = strtod(value, &end);
-    *(double *)limit = number;
-    if (end != value && *end == '\0' && number > 0 && isfinite(number)) return true;
-    fprintf(stderr, "glint: --%s: expected a positive number, not \"%s\"\n", option, value);
-    return false;
-}
-
-static bool option_take(AccuracyOptions *options, int option, const char *value)
-{
-    bool valid = true;
-    if (variant_option(&options->variants, option, value, &valid)) return valid;
-    if (option_report(&options->report, option, value, &valid)) return valid;
-    switch (option) {
-    case OPTION_REFERENCE:
-        options->reference_path = value;
-        return true;
-    case OPTION_BUDGET:
-        return option_list("budget", value, budget_read, options->budgets.limits,
-                           sizeof *options->budgets.limits, BUDGETS_MAX, &options->budgets.count);
-    case OPTION_SAVE:
-        options->folder = value;
-        return true;
-        return true;
-    case OPTION_HTML:
-        options->page_path = value;
-        return true;
-    default:
-        return false;
-    }
-}
-
 static int options_read(AccuracyOptions *options, int argument_count, char **arguments)
 {
     *options = (AccuracyOptions){.variants = variant_options_default,
                                  .budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3}};
     options->variants.precisions = (1u << ARITHMETIC_COUNT) - 1;
-    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
-    }
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind == argument_count) return option_usage_fault("accuracy", "no scene given");
     if (options->page_path && strcmp(options->page_path, "-") == 0)
         return option_usage_fault("accuracy", "--html needs the name of a file");
@@ -307,13 +267,6 @@ static void scenes_prepare(Accuracy *accuracy)
     }
 }
 
-static bool folder_make(Accuracy *accuracy)
-{
-    const char *folder = accuracy->options.folder;
-    if (!folder || mkdir(folder, 0777) == 0 || errno == EEXIST) return true;
-    return message_error(&accuracy->messages, "cannot create the folder '%s': %s", folder, strerror(errno));
-}
-
 static bool has_reference(Accuracy *accuracy)
 {
     const AccuracyOptions *options = &accuracy->options;
@@ -346,7 +299,7 @@ static int accuracy_run(Accuracy *accuracy)
 {
     VariantSet *set = &accuracy->set;
     const char *page_path = accuracy->options.page_path;
-    if (!has_reference(accuracy) || !folder_make(accuracy) ||
+    if (!has_reference(accuracy) ||
         (page_path && !output_open(&accuracy->page, page_path, &accuracy->messages)))
         return EXIT_USER;
     Progress progress;

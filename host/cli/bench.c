@@ -7,71 +7,10 @@
 #include "host/cli/variants.h"
 #include "host/measure/baseline.h"
 #include <ctype.h>
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/utsname.h>
-
-enum {
-    OPTION_COMPARE = OPTION_BEYOND_VARIANTS,
-    OPTION_AGAINST,
-    OPTION_WORKER,
-    OPTION_TOLERANCE,
-    OPTION_LAUNCHES,
-    OPTION_NO_BUILD_TIMES,
-    OPTION_VARIANT
-};
-
-static const struct option long_options[] = {
-    FORMAT_LONG_OPTIONS,
-    {"compare", required_argument, NULL, OPTION_COMPARE},
-    {"against", required_argument, NULL, OPTION_AGAINST},
-    {"worker", no_argument, NULL, OPTION_WORKER},
-    {"tolerance", required_argument, NULL, OPTION_TOLERANCE},
-    {"launches", no_argument, NULL, OPTION_LAUNCHES},
-    {"no-build-times", no_argument, NULL, OPTION_NO_BUILD_TIMES},
-    {"variant", required_argument, NULL, OPTION_VARIANT},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    VARIANT_LONG_OPTIONS,
-    DRIVER_LONG_OPTIONS,
-    KEEP_KERNELS_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-// The options that --variant takes.
-static const struct option variant_long_options[] = {
-    {"precision", required_argument, NULL, OPTION_PRECISION},
-    {"lanes", required_argument, NULL, OPTION_LANES},
-    {"bvh", required_argument, NULL, OPTION_BVH},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    DRIVER_LONG_OPTIONS,
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint bench SCENE... [OPTIONS]\n\n"
-    "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 same or "
-    "faster,\n3 slower, 4 too noisy to decide.\n\n"
-    "      --against GLINT   compare with another build, run alternately; default of --seconds: 30 per row\n"
-    "      --compare FILE    compare with an earlier report (--json); claims less than --against\n"
-    "      --tolerance R     ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 "
-    "with --compare)\n"
-    "      --worker          answer another glint's --against\n"
-    "      --launches        list the kernel launches of each row's last run\n"
-    "      --no-build-times  take kernels from the cache instead of timing their builds\n"
-    "      --variant OPTIONS\n"
-    "                        rows with these options, as in \"--lanes 8 --work-group 8x8\";\n"
-    "                        any of --precision, --lanes, --bvh, --samples, --bounces,\n"
-    "                        --work-group and --build-options; may be repeated. A row is compared\n"
-    "                        with the first variant's row of the same precision, lanes, BVH and\n"
-    "                        samples, unless the variants differ in these\n"
-    "      --precision LIST  of single, strict, double, certified (default: single)\n"
-    "      --samples LIST    per pixel, one row each (default: 1)\n" //
-    HELP_BOUNCES HELP_VARIANTS HELP_DRIVER HELP_KEEP_KERNELS HELP_FORMAT HELP_HELP;
 
 enum { VARIANTS_MAX = 32 };
 
@@ -88,49 +27,60 @@ typedef struct {
     size_t variant_count;
 } BenchOptions;
 
+static bool variant_keep(const Option *option, const char *value, void *options)
+{
+    BenchOptions *bench = options;
+    if (bench->variant_count == VARIANTS_MAX) {
+        fprintf(stderr, "glint: --%s: may be given at most %d times\n", option->name, VARIANTS_MAX);
+        return false;
+    }
+    bench->variant_texts[bench->variant_count++] = value;
+    return true;
+}
+
+static const Option options_own[] = {
+    {"against", "GLINT", "compare with another build, run alternately; default of --seconds: 30 per row",
+     option_text, offsetof(BenchOptions, against)},
+    {"compare", "FILE", "compare with an earlier report (--json); claims less than --against", option_text,
+     offsetof(BenchOptions, baseline)},
+    {"tolerance", "R",
+     "ratio of times up to which rows are the same (default: 1.02 with --against, 1.1 with --compare)",
+     option_number, offsetof(BenchOptions, tolerance), NUMBERS(1, INFINITY)},
+    {"worker", NULL, "answer another glint's --against", option_flag, offsetof(BenchOptions, is_worker)},
+    {"launches", NULL, "list the kernel launches of each row's last run", option_flag,
+     offsetof(BenchOptions, launches)},
+    {"no-build-times", NULL, "take kernels from the cache instead of timing their builds", option_flag,
+     offsetof(BenchOptions, variants.no_build_times)},
+    {"variant", "OPTIONS",
+     "rows with these options, as in \"--lanes 8 --work-group 8x8\"; any of --precision, --lanes, --bvh, "
+     "--samples, --bounces, --work-group and --build-options; may be repeated. A row is compared with the "
+     "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
+     variant_keep, 0}};
+static const Option precisions_option[] = {
+    {"precision", "LIST", "of single, strict, double, certified (default: single)", option_set,
+     offsetof(VariantOptions, precisions), NAMES(precision_names)}};
+
+static const CommandLine command_line = {
+    .usage =
+        "usage: glint bench SCENE... [OPTIONS]\n\n"
+        "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 "
+        "same or faster,\n3 slower, 4 too noisy to decide.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precisions_option, BenchOptions, variants),
+               VARIANT_GROUPS(BenchOptions, variants),
+               OPTIONS_WITHIN(driver_options, BenchOptions, variants.common),
+               OPTIONS_WITHIN(keep_kernels_option, BenchOptions, variants.common),
+               OPTIONS_WITHIN(report_options, BenchOptions, report)}};
+
+// What --variant takes.
+static const CommandLine variant_line = {.groups = {OPTIONS(precisions_option),
+                                                    OPTIONS(variant_choice_options),
+                                                    OPTIONS_WITHIN(driver_options, VariantOptions, common)}};
+
 typedef struct {
     BenchOptions options;
     OpenDevice open;
     VariantSet set;
 } Bench;
-
-static bool option_take(BenchOptions *options, int option, const char *value)
-{
-    bool valid = true;
-    if (variant_option(&options->variants, option, value, &valid)) return valid;
-    if (option_report(&options->report, option, value, &valid)) return valid;
-    switch (option) {
-    case OPTION_TOLERANCE:
-        if (option_positive("tolerance", value, &options->tolerance) && options->tolerance >= 1) return true;
-        if (options->tolerance > 0)
-            fprintf(stderr, "glint: --tolerance: expected a ratio of at least 1, not \"%s\"\n", value);
-        return false;
-    case OPTION_COMPARE:
-        options->baseline = value;
-        return true;
-    case OPTION_AGAINST:
-        options->against = value;
-        return true;
-    case OPTION_WORKER:
-        options->is_worker = true;
-        return true;
-    case OPTION_LAUNCHES:
-        options->launches = true;
-        return true;
-    case OPTION_NO_BUILD_TIMES:
-        options->variants.no_build_times = true;
-        return true;
-    case OPTION_VARIANT:
-        if (options->variant_count == VARIANTS_MAX) {
-            fprintf(stderr, "glint: --variant: may be given at most %d times\n", VARIANTS_MAX);
-            return false;
-        }
-        options->variant_texts[options->variant_count++] = value;
-        return true;
-    default:
-        return false;
-    }
-}
 
 // Splits a text in place at its blanks outside of quotes, and removes the quotes, ' or ". Adds each word to
 // `words`. Returns false if a quote is not closed.
@@ -158,12 +108,7 @@ static bool words_split(char *text, char **words, int *count)
 // Reads a variant's options from its words, of which the first heads getopt's messages.
 static bool words_read(VariantOptions *variant, char **words, int count)
 {
-    optind = 0; // restarts getopt
-    for (int option; (option = getopt_long(count, words, "", variant_long_options, NULL)) != -1;) {
-        bool is_valid = option != '?';
-        if (is_valid) variant_option(variant, option, optarg, &is_valid);
-        if (!is_valid) return false;
-    }
+    if (command_line_read(&variant_line, variant, count, words) != OPTIONS_READ) return false;
     if (optind < count) fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", words[optind]);
     return optind == count;
 }
@@ -341,10 +286,8 @@ int command_bench(int argument_count, char **arguments)
 {
     Bench bench = {.options = {.variants = variant_options_default}};
     const BenchOptions *options = &bench.options;
-    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?' || !option_take(&bench.options, option, optarg)) return EXIT_USER;
-    }
+    int status = command_line_read(&command_line, &bench.options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind == argument_count) return option_usage_fault("bench", "no scene given");
     if (options->against && options->baseline)
         return option_usage_fault("bench", "--against cannot be combined with --compare");
@@ -354,7 +297,7 @@ int command_bench(int argument_count, char **arguments)
                                       "--against reads each scene several times, so it cannot be '-'");
     if (!report_options_check(&bench.options.report, &bench_table)) return EXIT_USER;
 
-    int status = EXIT_USER;
+    status = EXIT_USER;
     const VariantOptions *choices =
         options->variant_count > 0 ? options->variant_options : &options->variants;
     const size_t choice_count = options->variant_count > 0 ? options->variant_count : 1;

@@ -4,23 +4,21 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_CLEAR = OPTION_OWN };
+typedef struct {
+    bool clears;
+} CacheOptions;
 
-static const struct option long_options[] = {
-    {"clear", no_argument, NULL, OPTION_CLEAR},
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
+static const Option options_own[] = {
+    {"clear", NULL, "remove them all", option_flag, offsetof(CacheOptions, clears)}};
 
-static const char help_text[] = "usage: glint cache [OPTIONS]\n\n"
-                                "Lists and checks the programs of the kernel cache, the least recently used "
-                                "first.\nExit status 3: one is damaged or not private.\n\n"
-                                "      --clear           remove them all\n" //
-    HELP_HELP;
+static const CommandLine command_line = {
+    .usage = "usage: glint cache [OPTIONS]\n\n"
+             "Lists and checks the programs of the kernel cache, the least recently used first.\nExit status "
+             "3: one is damaged or not private.\n",
+    .groups = {OPTIONS(options_own)}};
 
 // Returns whether all entries can be trusted.
 static bool entries_print(const CacheEntries *entries)
@@ -56,13 +54,9 @@ static int cache_print(const char *folder)
 
 int command_cache(int argument_count, char **arguments)
 {
-    bool clears = false;
-    int option;
-    while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?') return EXIT_USER;
-        clears = true;
-    }
+    CacheOptions options = {0};
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind != argument_count) return option_usage_fault("cache", "takes no arguments");
     char *folder = cache_folder_path();
     if (!folder) {
@@ -70,8 +64,8 @@ int command_cache(int argument_count, char **arguments)
               stderr);
         return EXIT_USER;
     }
-    int status = EXIT_DONE;
-    if (clears) {
+    status = EXIT_DONE;
+    if (options.clears) {
         MessageList messages = {0};
         status = cache_clear(&messages) ? EXIT_DONE : EXIT_USER;
         messages_print(&messages, NULL);

@@ -13,39 +13,10 @@
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/compile/features.h"
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_SIZE = OPTION_OWN, OPTION_PIXELS, OPTION_BOUNCES, OPTION_MIN_CONTRIBUTION };
 enum { PIXELS_DEFAULT = 2000, PIXELS_MOST = 1 << 24 };
-
-static const struct option long_options[] = {
-    {"size", required_argument, NULL, OPTION_SIZE},
-    {"pixels", required_argument, NULL, OPTION_PIXELS},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
-    FORMAT_LONG_OPTIONS,
-    COMMON_LONG_OPTIONS,
-    SET_LONG_OPTIONS,
-    PERTURB_LONG_OPTION,
-    REFERENCE_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint certify SCENE [OPTIONS]\n\n"
-    "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
-    "pixels: "
-    "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not list as "
-    "undecided.\n\n"
-    "      --size WxH        image size (default: as glint render)\n"
-    "      --pixels N        compare about N pixels (default: 2000)\n"
-    "      --precision LIST  of single, strict, double, certified (default: all that fit)\n" //
-    HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_SET HELP_DEVICE HELP_REFERENCE HELP_LANES        //
-    "      --bvh B           auto, on or off; does not change the image (default: auto)\n"   //
-    HELP_NO_CACHE HELP_LENIENT HELP_MAX_PIXELS HELP_PERTURB HELP_FORMAT HELP_HELP;
 
 static const ResultTable certify_table = {
     .command = "certify",
@@ -71,40 +42,41 @@ static const ResultTable certify_table = {
 typedef struct {
     CommonOptions common;
     const char *scene;
-    uint32_t width, height; // 0 if not given
+    uint32_t size[2]; // 0 if not given
     uint32_t pixels, bounce_count;
     double min_contribution;
     unsigned precisions; // a set, empty if not given
     ReportOptions report;
 } CertifyOptions;
 
-static bool option_take(CertifyOptions *options, int option, const char *value)
-{
-    bool valid = true;
-    if (option_report(&options->report, option, value, &valid)) return valid;
-    switch (option) {
-    case OPTION_SIZE:
-        return option_size("size", value, &options->width, &options->height);
-    case OPTION_PIXELS:
-        return option_count("pixels", value, 1, PIXELS_MOST, &options->pixels);
-    case OPTION_BOUNCES:
-        return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
-    case OPTION_MIN_CONTRIBUTION:
-        return option_fraction("min-contribution", value, &options->min_contribution);
-    case OPTION_PRECISION:
-        return option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
-    default:
-        return option_common(&options->common, option, value, &valid) && valid;
-    }
-}
+static const Option options_own[] = {
+    {"size", "WxH", "image size (default: as glint render)", option_size, offsetof(CertifyOptions, size)},
+    {"pixels", "N", "compare about N pixels (default: 2000)", option_count, offsetof(CertifyOptions, pixels),
+     NUMBERS(1, PIXELS_MOST)},
+    {"precision", "LIST", "of single, strict, double, certified (default: all that fit)", option_set,
+     offsetof(CertifyOptions, precisions), NAMES(precision_names)},
+    BOUNCES_OPTION(CertifyOptions, bounce_count),
+    MIN_CONTRIBUTION_OPTION(CertifyOptions, min_contribution)};
+
+static const CommandLine command_line = {
+    .usage =
+        "usage: glint certify SCENE [OPTIONS]\n\n"
+        "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
+        "pixels: "
+        "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not "
+        "list as undecided.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CertifyOptions, common),
+               OPTIONS_WITHIN(device_option, CertifyOptions, common),
+               OPTIONS_WITHIN(reference_option, CertifyOptions, common),
+               OPTIONS_WITHIN(common_options, CertifyOptions, common),
+               OPTIONS_WITHIN(perturb_option, CertifyOptions, common),
+               OPTIONS_WITHIN(report_options, CertifyOptions, report)}};
 
 static int options_read(CertifyOptions *options, int argument_count, char **arguments)
 {
     *options = (CertifyOptions){.pixels = PIXELS_DEFAULT, .bounce_count = BOUNCES_DEFAULT};
-    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
-    }
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (!option_only_scene("certify", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
     if (!report_options_check(&options->report, &certify_table)) return EXIT_USER;
@@ -325,7 +297,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     const char *selector = options->common.reference_device;
     if (is_certified && !reference_open(compute, &open->devices, selector) && selector) return EXIT_USER;
     Certification certification = {.options = options, .scene = scene, .compute = compute};
-    uint32_t width = options->width, height = options->height;
+    uint32_t width = options->size[0], height = options->size[1];
     scene_choose_image_size(scene, &width, &height);
     const double start = clock_seconds();
     if (!certify_sample_open(&certification.sample, scene, width, height, options->pixels, path_of(options),

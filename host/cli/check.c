@@ -12,28 +12,27 @@
 #include "host/import/report.h"
 #include "host/scene/describe.h"
 #include <ctype.h>
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
-enum { OPTION_JSON = OPTION_OWN, OPTION_OBJECT };
+typedef struct {
+    CommonOptions common;
+    bool as_json, is_one_of_several;
+    uint32_t object; // UINT32_MAX if not given
+} CheckOptions;
 
-static const struct option long_options[] = {
-    {"json", no_argument, NULL, OPTION_JSON},
-    {"object", required_argument, NULL, OPTION_OBJECT},
-    {"lenient", no_argument, NULL, OPTION_LENIENT},
-    SET_LONG_OPTIONS,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
+static const Option options_own[] = {
+    {"object", "ID", "print one object and its line; IDs are those of glint trace", option_count,
+     offsetof(CheckOptions, object), NUMBERS(0, UINT32_MAX - 1)},
+    {"json", NULL, "print JSON", option_flag, offsetof(CheckOptions, as_json)}};
 
-static const char help_text[] = "usage: glint check SCENE... [OPTIONS]\n\n"
-                                "Reports a scene's objects, lights, materials, bounds and kernel features, "
-                                "and warns of what is ignored. Of several scenes it prints one line each.\n\n"
-                                "      --object ID       print one object and its line; IDs are those of "
-                                "glint trace\n" //
-    HELP_SET HELP_JSON HELP_LENIENT HELP_HELP;
+static const CommandLine command_line = {
+    .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
+             "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
+             "ignored. Of several scenes it prints one line each.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CheckOptions, common),
+               COMMON_OPTION(COMMON_LENIENT, CheckOptions, common)}};
 
 typedef struct {
     size_t shapes[SHAPE_COUNT], mesh_triangle_count, unbounded_count;
@@ -204,12 +203,6 @@ static void line_print(const char *path, const Scene *scene, bool loaded, const 
     printf("\n");
 }
 
-typedef struct {
-    CommonOptions common;
-    bool as_json, is_one_of_several;
-    uint32_t object; // UINT32_MAX if not given
-} CheckOptions;
-
 // Reports a scene. Returns false, with messages printed, if it is not valid.
 static bool scene_check(const CheckOptions *options, const char *path)
 {
@@ -237,29 +230,15 @@ static bool scene_check(const CheckOptions *options, const char *path)
 int command_check(int argument_count, char **arguments)
 {
     CheckOptions options = {.object = UINT32_MAX};
-    bool valid;
-    int option;
-    while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
-        switch (option) {
-        case OPTION_JSON:
-            options.as_json = true;
-            break;
-        case OPTION_OBJECT:
-            if (!option_count("object", optarg, 0, UINT32_MAX - 1, &options.object)) return EXIT_USER;
-            break;
-        case 'h':
-            return option_help(help_text);
-        default:
-            if (!option_common(&options.common, option, optarg, &valid) || !valid) return EXIT_USER;
-        }
-    }
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind == argument_count) return option_usage_fault("check", "no scene given");
     if (options.as_json && options.object != UINT32_MAX)
         return option_usage_fault("check", "--object cannot be combined with --json");
     options.is_one_of_several = argument_count - optind > 1;
     if (options.is_one_of_several && (options.as_json || options.object != UINT32_MAX))
         return option_usage_fault("check", "--json and --object take one scene, but several are given");
-    int status = EXIT_DONE;
+    status = EXIT_DONE;
     for (int i = optind; i < argument_count; i++)
         if (!scene_check(&options, arguments[i])) status = EXIT_USER;
     return status;

@@ -9,25 +9,23 @@
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/opencl/device.h"
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OPTION_JSON = OPTION_OWN, OPTION_PROBE };
+typedef struct {
+    CommonOptions common;
+    bool as_json, probes;
+} DevicesOptions;
 
-static const struct option long_options[] = {
-    {"probe", no_argument, NULL, OPTION_PROBE},
-    {"json", no_argument, NULL, OPTION_JSON},
-    KEEP_KERNELS_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
+static const Option options_own[] = {
+    {"probe", NULL, "measure it now", option_flag, offsetof(DevicesOptions, probes)},
+    {"json", NULL, "print JSON", option_flag, offsetof(DevicesOptions, as_json)}};
 
-static const char help_text[] = "usage: glint devices [OPTIONS]\n\n"
-                                "Lists every OpenCL device of every platform; * marks the default. Then\n"
-                                "what the arithmetic of each really does, where that was measured.\n\n"
-                                "      --probe           measure it now\n" //
-    HELP_KEEP_KERNELS HELP_JSON HELP_HELP;
+static const CommandLine command_line = {
+    .usage = "usage: glint devices [OPTIONS]\n\n"
+             "Lists every OpenCL device of every platform; * marks the default. Then\n"
+             "what the arithmetic of each really does, where that was measured.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)}};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
@@ -186,38 +184,29 @@ static bool passports_find(const DeviceList *list, bool probes)
 
 int command_devices(int argument_count, char **arguments)
 {
-    bool as_json = false, probes = false;
-    const char *kernel_folder = NULL;
-    optind = 1;
-    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?') return EXIT_USER;
-        as_json = as_json || option == OPTION_JSON;
-        probes = probes || option == OPTION_PROBE;
-        if (option != OPTION_KEEP_KERNELS) continue;
-        if (!option_folder("keep-kernels", optarg)) return EXIT_USER;
-        kernel_folder = optarg;
-    }
+    DevicesOptions options = {0};
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind < argument_count) return option_usage_fault("devices", "takes no arguments");
 
     DeviceList list;
     device_list_open(&list);
     for (size_t i = 0; i < list.count; i++)
-        list.items[i].kernel_folder = kernel_folder;
+        list.items[i].kernel_folder = options.common.kernel_folder;
     MessageList messages = {0};
     const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
-    const bool is_probed = passports_find(&list, probes);
-    if (as_json)
+    const bool is_probed = passports_find(&list, options.probes);
+    if (options.as_json)
         devices_print_json(&list, chosen);
     else if (list.count > 0)
         devices_print_table(&list, chosen);
-    for (size_t i = 0; i < list.count && !as_json; i++)
+    for (size_t i = 0; i < list.count && !options.as_json; i++)
         passports_print(&list.items[i]);
     char *failure = device_list_failure_text(&list);
     if (chosen && failure) message_warning(&messages, "%s", failure);
     message_list_print(&messages, stderr);
     message_list_free(&messages);
-    int status = !is_probed ? EXIT_MACHINE : chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
+    status = !is_probed ? EXIT_MACHINE : chosen ? EXIT_DONE : failure ? EXIT_MACHINE : EXIT_USER;
     free(failure);
     device_list_close(&list);
     return status;

@@ -9,7 +9,6 @@
 #include "host/image/flip.h"
 #include "host/image/heatmap.h"
 #include "host/image/image_metrics.h"
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -25,39 +24,33 @@ static const struct {
     [LIMIT_ULP] = {"ulp", "ulp", "floating-point values"},
 };
 
-enum { OPTION_HEATMAP = OPTION_OWN, OPTION_LAYER, OPTION_LIMIT };
-
-static const struct option long_options[] = {
-    {"max-rmse", required_argument, NULL, OPTION_LIMIT + LIMIT_RMSE},
-    {"max-flip", required_argument, NULL, OPTION_LIMIT + LIMIT_FLIP},
-    {"max-off", required_argument, NULL, OPTION_LIMIT + LIMIT_OFF},
-    {"max-ulp", required_argument, NULL, OPTION_LIMIT + LIMIT_ULP},
-    {"heatmap", required_argument, NULL, OPTION_HEATMAP},
-    {"layer", required_argument, NULL, OPTION_LAYER},
-    {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},
-    FORMAT_LONG_OPTIONS,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
-    "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: equal, or "
-    "within\nall limits that are given; 3: different, or beyond a limit.\n\n"
-    "      --max-rmse E      allow this RMSE, in linear light or in the units of other arrays\n"
-    "      --max-flip E      allow this mean FLIP\n"
-    "      --max-off N       allow N differing 8-bit sRGB values; a color pixel has three\n"
-    "      --max-ulp N       allow N units in the last place of any value of EXR or NPY, such as distances\n"
-    "      --heatmap FILE    write an image of the differences: .png, .ppm, .exr or .npy\n"
-    "      --layer NAME      compare this layer of EXR files, not the default or only "
-    "one\n" HELP_MAX_PIXELS HELP_FORMAT HELP_HELP;
-
 typedef struct {
     const char *reference_path, *test_path, *heatmap_path, *layer;
     ReportOptions report;
-    bool has_limits, has_limit[LIMIT_COUNT];
-    double limits[LIMIT_COUNT];
+    double limits[LIMIT_COUNT]; // below 0 if not given
 } DiffOptions;
+
+static const Option options_own[] = {
+    {"max-rmse", "E", "allow this RMSE, in linear light or in the units of other arrays", option_number,
+     offsetof(DiffOptions, limits[LIMIT_RMSE]), NUMBERS(0, INFINITY)},
+    {"max-flip", "E", "allow this mean FLIP", option_number, offsetof(DiffOptions, limits[LIMIT_FLIP]),
+     NUMBERS(0, INFINITY)},
+    {"max-off", "N", "allow N differing 8-bit sRGB values; a color pixel has three", option_number,
+     offsetof(DiffOptions, limits[LIMIT_OFF]), NUMBERS(0, INFINITY)},
+    {"max-ulp", "N", "allow N units in the last place of any value of EXR or NPY, such as distances",
+     option_number, offsetof(DiffOptions, limits[LIMIT_ULP]), NUMBERS(0, INFINITY)},
+    {"heatmap", "FILE", "write an image of the differences: .png, .ppm, .exr or .npy", option_text,
+     offsetof(DiffOptions, heatmap_path)},
+    {"layer", "NAME", "compare this layer of EXR files, not the default or only one", option_text,
+     offsetof(DiffOptions, layer)}};
+
+static const CommandLine command_line = {
+    .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
+             "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
+             "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
+    .groups = {OPTIONS(options_own),
+               {&common_options[COMMON_MAX_PIXELS], 1},
+               OPTIONS_WITHIN(report_options, DiffOptions, report)}};
 
 typedef struct {
     Image reference, test;
@@ -106,20 +99,33 @@ static bool limit_is_met(const DiffOptions *options, const ImageMetrics *metrics
     return metrics->unmatched_count == 0 && limited_value(metrics, type) <= options->limits[type];
 }
 
+static bool has_limit(const DiffOptions *options, LimitType type)
+{
+    return options->limits[type] >= 0;
+}
+
+static bool has_limits(const DiffOptions *options)
+{
+    bool has_any = false;
+    for (unsigned i = 0; i < LIMIT_COUNT; i++)
+        has_any |= has_limit(options, i);
+    return has_any;
+}
+
 static bool limits_are_met(const DiffOptions *options, const ImageMetrics *metrics)
 {
     bool met = true;
     for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        met &= !options->has_limit[i] || limit_is_met(options, metrics, i);
+        met &= !has_limit(options, i) || limit_is_met(options, metrics, i);
     return met;
 }
 
 static void limits_json(Json *json, const DiffOptions *options, const ImageMetrics *metrics)
 {
-    if (!options->has_limits) return;
+    if (!has_limits(options)) return;
     json_begin_object(json, "limits");
     for (unsigned i = 0; i < LIMIT_COUNT; i++) {
-        if (!options->has_limit[i]) continue;
+        if (!has_limit(options, i)) continue;
         json_begin_object(json, limit_types[i].name);
         json_number(json, "limit", options->limits[i]);
         json_number(json, "value", limited_value(metrics, i));
@@ -133,11 +139,11 @@ static void limits_json(Json *json, const DiffOptions *options, const ImageMetri
 static void limits_print(const DiffOptions *options, const ImageMetrics *metrics)
 {
     for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        if (options->has_limit[i])
+        if (has_limit(options, i))
             printf("  %-10s --max-%s %.6g: %s %.6g\n", limit_is_met(options, metrics, i) ? "met" : "exceeded",
                    limit_types[i].name, options->limits[i], limit_types[i].quantity,
                    limited_value(metrics, i));
-    if (options->has_limits && metrics->unmatched_count > 0)
+    if (has_limits(options) && metrics->unmatched_count > 0)
         printf("  exceeded   every limit: %zu %s not finite and not the same in both\n",
                metrics->unmatched_count, metrics->unmatched_count == 1 ? "value is" : "values are");
 }
@@ -302,58 +308,18 @@ static bool images_compare(const DiffOptions *options, ComparedImages *compariso
         return false;
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
     for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        if (options->has_limit[i] && !limit_applies(&comparison->metrics, i))
+        if (has_limit(options, i) && !limit_applies(&comparison->metrics, i))
             return message_error(messages, "--max-%s: \"%s\" and \"%s\" do not both have %s",
                                  limit_types[i].name, options->reference_path, options->test_path,
                                  limit_types[i].needed);
     return !options->heatmap_path || heatmap_make(options, comparison, messages);
 }
 
-static bool limit_read(DiffOptions *options, LimitType type, const char *value)
-{
-    char *end;
-    const double limit = strtod(value, &end);
-    if (end == value || *end != '\0' || !(limit >= 0 && isfinite(limit))) {
-        fprintf(stderr, "glint: --max-%s: expected a number, 0 or more, not \"%s\"\n", limit_types[type].name,
-                value);
-        return false;
-    }
-    options->limits[type] = limit;
-    options->has_limits = options->has_limit[type] = true;
-    return true;
-}
-
 int command_diff(int argument_count, char **arguments)
 {
-    DiffOptions options = {0};
-    bool valid;
-    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option_report(&options.report, option, optarg, &valid)) {
-            if (!valid) return EXIT_USER;
-            continue;
-        }
-        switch (option) {
-        case OPTION_HEATMAP:
-            options.heatmap_path = optarg;
-            break;
-        case OPTION_LAYER:
-            options.layer = optarg;
-            break;
-        case OPTION_MAX_PIXELS:
-            if (!option_max_pixels(optarg)) return EXIT_USER;
-            break;
-        case OPTION_LIMIT + LIMIT_RMSE:
-        case OPTION_LIMIT + LIMIT_FLIP:
-        case OPTION_LIMIT + LIMIT_OFF:
-        case OPTION_LIMIT + LIMIT_ULP:
-            if (!limit_read(&options, (LimitType)(option - OPTION_LIMIT), optarg)) return EXIT_USER;
-            break;
-        case 'h':
-            return option_help(help_text);
-        default:
-            return EXIT_USER;
-        }
-    }
+    DiffOptions options = {.limits = {-1, -1, -1, -1}};
+    const int status = command_line_read(&command_line, &options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind + 2 != argument_count) return option_usage_fault("diff", "takes two images");
     if (!report_options_check(&options.report, &diff_table)) return EXIT_USER;
     options.reference_path = arguments[optind];
@@ -371,7 +337,7 @@ int command_diff(int argument_count, char **arguments)
     image_free(&comparison.reference);
     image_free(&comparison.test);
     if (!compared || !is_written) return EXIT_USER;
-    const bool passes = options.has_limits ? limits_are_met(&options, &comparison.metrics)
-                                           : comparison.metrics.differing_count == 0;
+    const bool passes = has_limits(&options) ? limits_are_met(&options, &comparison.metrics)
+                                             : comparison.metrics.differing_count == 0;
     return passes ? EXIT_DONE : EXIT_CHECK;
 }

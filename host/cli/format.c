@@ -13,25 +13,21 @@
 static const char *const format_names[FORMAT_COUNT] = {"text",     "json",  "csv",
                                                        "markdown", "junit", "benchmark"};
 
-bool option_report(ReportOptions *options, int option, const char *value, bool *valid)
+static bool json_choose(const Option *option, const char *value, void *options)
 {
-    unsigned choice = 0;
-    *valid = true;
-    switch (option) {
-    case OPTION_REPORT_JSON:
-        options->format = FORMAT_JSON;
-        return true;
-    case OPTION_FORMAT:
-        *valid = option_choice("format", value, format_names, FORMAT_COUNT, &choice);
-        if (*valid) options->format = (ReportFormat)choice;
-        return true;
-    case OPTION_REPORT_OUTPUT:
-        options->output = value;
-        return true;
-    default:
-        return false;
-    }
+    (void)option, (void)value;
+    ((ReportOptions *)options)->format = FORMAT_JSON;
+    return true;
 }
+
+const Option report_options[] = {{"format", "F",
+                                  "text, json, csv, markdown, junit or benchmark (default: text, with "
+                                  "--output by the file's ending: .json "
+                                  ".csv .md .xml)",
+                                  option_choice, offsetof(ReportOptions, format), NAMES(format_names)},
+                                 {"output", "FILE", "write the report to a file and print the text",
+                                  option_text, offsetof(ReportOptions, output)},
+                                 {"json", NULL, "print JSON", json_choose, 0}};
 
 // The file of the report, of which a command writes one. It is opened before anything is measured.
 static OutputFile report_file;

@@ -48,21 +48,8 @@ typedef struct {
     const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL
 } ResultTable;
 
-enum { OPTION_FORMAT = 0x500, OPTION_REPORT_JSON, OPTION_REPORT_OUTPUT };
-#define FORMAT_LONG_OPTIONS                                                                                  \
-    {"json", no_argument, NULL, OPTION_REPORT_JSON}, {"format", required_argument, NULL, OPTION_FORMAT},     \
-    {                                                                                                        \
-        "output", required_argument, NULL, OPTION_REPORT_OUTPUT                                              \
-    }
-#define HELP_FORMAT                                                                                          \
-    "      --format F        text, json, csv, markdown, junit or benchmark (default: text, with --output "   \
-    "by the\n                        file's ending: .json .csv .md .xml)\n"                                  \
-    "      --output FILE     write the report to a file and print the text\n"                                \
-    "      --json            print JSON\n"
+extern const Option report_options[3]; // in ReportOptions
 
-// Handles one of FORMAT_LONG_OPTIONS and sets *valid if its value is valid. Returns false if `option` is not
-// one of them.
-bool option_report(ReportOptions *options, int option, const char *value, bool *valid);
 // Checks the options together, after all others of a command, and opens the file. Returns false with a
 // message if the command has no times, if the file's format is unknown, or if the file cannot be written.
 bool report_options_check(ReportOptions *options, const ResultTable *table);

@@ -13,7 +13,6 @@
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/image/image.h"
-#include <getopt.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +20,6 @@
 #include <unistd.h>
 
 enum { TILE_COLUMNS = 12, TILE_ROWS = 8, TILES = TILE_COLUMNS * TILE_ROWS };
-enum { OPTION_FILE = OPTION_OWN, OPTION_SIZE, OPTION_SAMPLES, OPTION_BOUNCES };
 
 static const char file_head[] = "# glint golden 1: images at strict; glint golden check compares them. "
                                 "Hashes are of the scene as the device gets it,\n"
@@ -54,8 +52,8 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     const char *file;
-    uint32_t width, height, samples, bounces;
-    bool writes, has_size; // or samples, or bounces
+    uint32_t size[2], samples, bounces; // not given: 0, bounces UINT32_MAX
+    bool writes;
 } GoldenOptions;
 
 // The comparison of a scene. `first` is the first layer that differs, or HASHED_COUNT. The rectangle contains
@@ -68,30 +66,25 @@ typedef struct {
     char *crop;                        // the file that shows it, or NULL
 } Finding;
 
-static const struct option long_options[] = {
-    {"file", required_argument, NULL, OPTION_FILE},
-    {"size", required_argument, NULL, OPTION_SIZE},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    FORMAT_LONG_OPTIONS,
-    COMMON_LONG_OPTIONS,
-    DRIVER_LONG_OPTIONS,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
+static const Option options_own[] = {
+    {"file", "FILE", "of the lines (default: golden.txt)", option_text, offsetof(GoldenOptions, file)},
+    {"size", "WxH", "to write (default: 320x180)", option_size, offsetof(GoldenOptions, size)},
+    {"samples", "N", "per pixel, to write (default: 1)", option_count, offsetof(GoldenOptions, samples),
+     NUMBERS(1, SAMPLES_MAX)},
+    BOUNCES_OPTION(GoldenOptions, bounces)};
 
-static const char help_text[] =
-    "usage: glint golden write SCENE... [OPTIONS]\n"
-    "       glint golden check [SCENE...] [OPTIONS]\n\n"
-    "Renders scenes at strict, whose bits are the same on every device, and writes a line of hashes per "
-    "scene, or compares\n"
-    "them with their lines: all of the file without a SCENE. Where an image differs it names the layer that "
-    "differs first\n"
-    "and the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n\n"
-    "      --file FILE       of the lines (default: golden.txt)\n"
-    "      --size WxH        to write (default: 320x180)\n"
-    "      --samples N       per pixel, to write (default: 1)\n" //
-    HELP_BOUNCES HELP_DEVICE HELP_COMMON HELP_DRIVER HELP_FORMAT HELP_HELP;
+static const CommandLine command_line = {
+    .usage = "usage: glint golden write SCENE... [OPTIONS]\n"
+             "       glint golden check [SCENE...] [OPTIONS]\n\n"
+             "Renders scenes at strict, whose bits are the same on every device, and writes a line of hashes "
+             "per scene, or compares\n"
+             "them with their lines: all of the file without a SCENE. Where an image differs it names the "
+             "layer that differs first\n"
+             "and the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(device_option, GoldenOptions, common),
+               OPTIONS_WITHIN(common_options, GoldenOptions, common),
+               OPTIONS_WITHIN(driver_options, GoldenOptions, common),
+               OPTIONS_WITHIN(report_options, GoldenOptions, report)}};
 
 static const ResultTable golden_table = {
     .command = "golden",
@@ -423,8 +416,8 @@ static int scenes_write(GoldenList *list, const GoldenOptions *options, char **s
             array_push(*list, (Golden){.scene = memory_copy_text(scenes[i])});
             golden = &list->items[list->count - 1];
         }
-        golden->width = options->width;
-        golden->height = options->height;
+        golden->width = options->size[0];
+        golden->height = options->size[1];
         golden->samples = options->samples;
         golden->bounces = options->bounces;
         Film film = {0};
@@ -476,43 +469,25 @@ static int scenes_check(const GoldenList *list, GoldenOptions *options, char **s
 
 static int options_read(GoldenOptions *options, int argument_count, char **arguments)
 {
-    *options = (GoldenOptions){.common.precision = PRECISION_STRICT,
-                               .file = "golden.txt",
-                               .width = 320,
-                               .height = 180,
-                               .samples = 1,
-                               .bounces = BOUNCES_DEFAULT};
-    bool valid = true;
-    for (int option; (option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1;) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?') return EXIT_USER;
-        if (option == OPTION_FILE)
-            options->file = optarg;
-        else if (option == OPTION_SIZE)
-            valid = option_size("size", optarg, &options->width, &options->height);
-        else if (option == OPTION_SAMPLES)
-            valid = option_count("samples", optarg, 1, SAMPLES_MAX, &options->samples);
-        else if (option == OPTION_BOUNCES)
-            valid = option_count("bounces", optarg, 0, BOUNCES_MAX, &options->bounces);
-        else if (!option_report(&options->report, option, optarg, &valid))
-            option_common(&options->common, option, optarg, &valid);
-        if (!valid) return EXIT_USER;
-        options->has_size = options->has_size || (option >= OPTION_SIZE && option <= OPTION_BOUNCES);
-    }
+    *options =
+        (GoldenOptions){.common.precision = PRECISION_STRICT, .file = "golden.txt", .bounces = UINT32_MAX};
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     const char *verb = optind < argument_count ? arguments[optind++] : "";
     options->writes = strcmp(verb, "write") == 0;
     if (!options->writes && strcmp(verb, "check") != 0)
         return option_usage_fault("golden", "expected write or check");
-    if (options->common.precision != PRECISION_STRICT)
-        return option_usage_fault(
-            "golden", "images are rendered at strict: at other precisions bits differ between devices");
     if (options->writes && optind == argument_count) return option_usage_fault("golden", "no scene given");
     for (int i = optind; i < argument_count; i++)
         if (strpbrk(arguments[i], "\r\n"))
             return option_usage_fault("golden", "a scene's name has a line break");
-    if (!options->writes && options->has_size)
+    const bool has_any = options->size[0] > 0 || options->samples > 0 || options->bounces != UINT32_MAX;
+    if (!options->writes && has_any)
         return option_usage_fault(
             "golden", "--size, --samples and --bounces are for write; check takes those of the lines");
+    if (options->size[0] == 0) memcpy(options->size, (const uint32_t[2]){320, 180}, sizeof options->size);
+    if (options->samples == 0) options->samples = 1;
+    if (options->bounces == UINT32_MAX) options->bounces = BOUNCES_DEFAULT;
     if (options->writes && options->report.format != FORMAT_TEXT)
         return option_usage_fault("golden", "--format is for check");
     return options->writes || report_options_check(&options->report, &golden_table) ? OPTIONS_READ

@@ -5,304 +5,125 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
-#include <dirent.h>
-#include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 const char *const lanes_choice_names[LANES_CHOICE_COUNT] = {"1", "4", "8", "16"};
 const uint32_t lanes_choice_values[LANES_CHOICE_COUNT] = {1, 4, 8, 16};
 
-// Reads decimal digits only. *end receives the position after them.
-static bool digits_read(const char *value, const char **end, uint64_t *result)
-{
-    *result = 0;
-    const char *at = value;
-    for (; *at >= '0' && *at <= '9' && *result < 1u << 31; at++)
-        *result = *result * 10 + (uint64_t)(*at - '0');
-    *end = at;
-    return at > value;
-}
-
-bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
-                  uint32_t *result)
-{
-    const char *end;
-    uint64_t number;
-    if (!digits_read(value, &end, &number) || *end != '\0' || number < smallest || number > largest) {
-        fprintf(stderr, "glint: --%s: expected an integer from %u to %u, not \"%s\"\n", option, smallest,
-                largest, value);
-        return false;
-    }
-    *result = (uint32_t)number;
-    return true;
-}
-
-// Reads WIDTHxHEIGHT. Prints an error that shows `example` if the value is malformed.
-static bool sides_read(const char *option, const char *example, const char *value, uint32_t *width,
-                       uint32_t *height)
-{
-    const uint64_t largest = IMAGE_SIDE_MAX;
-    const char *at;
-    uint64_t w, h;
-    if (!digits_read(value, &at, &w) || (*at != 'x' && *at != 'X') || !digits_read(at + 1, &at, &h) ||
-        *at != '\0' || w < 1 || h < 1 || w > largest || h > largest) {
-        fprintf(stderr, "glint: --%s: expected WIDTHxHEIGHT, such as %s, each from 1 to %u, not \"%s\"\n",
-                option, example, (unsigned)largest, value);
-        return false;
-    }
-    *width = (uint32_t)w;
-    *height = (uint32_t)h;
-    return true;
-}
-
-bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height)
-{
-    return sides_read(option, "1280x720", value, width, height);
-}
-
-bool option_fraction(const char *option, const char *value, double *fraction)
+bool option_error_budget(const Option *option, const char *value, void *options)
 {
     char *end;
-    *fraction = strtod(value, &end);
-    if (end != value && *end == '\0' && *fraction >= 0 && *fraction <= 1) return true;
-    fprintf(stderr, "glint: --%s: expected a number from 0 to 1, not \"%s\"\n", option, value);
-    return false;
+    ErrorBudget *budget = option_field(option, options);
+    *budget = (ErrorBudget){.limit = strtod(value, &end), .metric = ERROR_RMSE};
+    if (end == value || !(budget->limit > 0 && isfinite(budget->limit)) || (*end != ':' && *end != '\0'))
+        return option_fault(option, value, "a number above 0, perhaps with a metric, such as 0.01:flip");
+    const Option metric = {option->name, NAMES(error_metric_names)};
+    return *end == '\0' || option_choice(&metric, end + 1, &budget->metric);
 }
 
-bool option_error_budget(const char *option, const char *value, ErrorBudget *budget)
+bool option_precision(const Option *option, const char *value, void *options)
 {
-    char *end;
-    *budget = (ErrorBudget){.limit = strtod(value, &end)};
-    if (end == value || !(budget->limit > 0 && isfinite(budget->limit)) || (*end != ':' && *end != '\0')) {
-        fprintf(stderr,
-                "glint: --%s: expected a number above 0, perhaps with a metric, such as 0.01:flip, "
-                "not \"%s\"\n",
-                option, value);
-        return false;
-    }
-    unsigned metric = ERROR_RMSE;
-    if (*end == ':' && !option_choice(option, end + 1, error_metric_names, ERROR_METRIC_COUNT, &metric))
-        return false;
-    budget->metric = (ErrorMetric)metric;
+    CommonOptions *common = options;
+    const Option names = {option->name, NAMES(precision_names)};
+    common->has_precision = true;
+    return option_choice(&names, value, &common->precision);
+}
+
+static bool lanes_read(const Option *option, const char *value, void *options)
+{
+    uint32_t *lanes = &((CommonOptions *)options)->lanes;
+    if (!option_choice(option, value, options)) return false;
+    *lanes = lanes_choice_values[*lanes];
     return true;
 }
 
-bool option_max_pixels(const char *value)
+static bool max_pixels_read(const Option *option, const char *value, void *options)
 {
+    (void)options;
     uint32_t largest;
-    if (!option_count("max-pixels", value, 1, UINT32_MAX, &largest)) return false;
+    if (!option_count(option, value, &largest)) return false;
     image_limit_pixels(largest);
     return true;
 }
 
-bool option_folder(const char *option, const char *path)
+static bool perturb_read(const Option *option, const char *value, void *options)
 {
-    if (mkdir(path, 0777) != 0 && errno != EEXIST) {
-        fprintf(stderr, "glint: --%s: cannot create the folder '%s': %s\n", option, path, strerror(errno));
-        return false;
-    }
-    if (access(path, W_OK | X_OK) == 0) return true;
-    fprintf(stderr, "glint: --%s: cannot write to '%s': %s\n", option, path, strerror(errno));
-    return false;
-}
-
-bool option_empty_folder(const char *option, const char *path)
-{
-    if (!option_folder(option, path)) return false;
-    DIR *folder = opendir(path);
-    if (!folder) {
-        fprintf(stderr, "glint: --%s: cannot read the folder '%s': %s\n", option, path, strerror(errno));
-        return false;
-    }
-    bool is_empty = true;
-    for (const struct dirent *item; (item = readdir(folder));)
-        is_empty &= strcmp(item->d_name, ".") == 0 || strcmp(item->d_name, "..") == 0;
-    closedir(folder);
-    if (!is_empty) fprintf(stderr, "glint: --%s: the folder '%s' is not empty\n", option, path);
-    return is_empty;
-}
-
-static bool perturb_read(const char *value, CommonOptions *common)
-{
+    CommonOptions *common = options;
     const char *at;
     uint64_t seed, scale = 1;
-    bool valid = digits_read(value, &at, &seed) && seed >= 1 && seed <= UINT32_MAX;
-    if (valid && *at == ':')
-        valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_MAX;
-    if (!valid || *at != '\0') {
-        fprintf(stderr,
-                "glint: --perturb: expected a seed from 1 to %u, or SEED:SCALE with a scale from 1 to %d, "
-                "not \"%s\"\n",
-                UINT32_MAX, PERTURB_SCALE_MAX, value);
-        return false;
-    }
+    bool is_valid = digits_read(value, &at, &seed) && seed >= 1 && seed <= UINT32_MAX;
+    if (is_valid && *at == ':')
+        is_valid = digits_read(at + 1, &at, &scale) && scale >= 1 && scale <= PERTURB_SCALE_MAX;
+    if (!is_valid || *at != '\0')
+        return option_fault(option, value, "a seed from 1 to %u, or SEED:SCALE with a scale from 1 to %d",
+                            UINT32_MAX, PERTURB_SCALE_MAX);
     common->perturb_seed = (uint32_t)seed;
     common->perturb_scale = (uint32_t)scale;
     return true;
 }
 
-static bool override_add(CommonOptions *common, const char *value)
+static bool override_add(const Option *option, const char *value, void *options)
 {
+    CommonOptions *common = options;
     if (common->override_count == OVERRIDES_MAX) {
-        fprintf(stderr, "glint: --set: may be given at most %d times\n", OVERRIDES_MAX);
+        fprintf(stderr, "glint: --%s: may be given at most %d times\n", option->name, OVERRIDES_MAX);
         return false;
     }
     common->overrides[common->override_count++] = value;
     return true;
 }
 
-static void choices_print(const char *const *names, size_t count, const char *value)
+static bool camera_read(const Option *option, const char *value, void *options)
 {
-    for (size_t i = 0; i < count; i++)
-        fprintf(stderr, "%s%s", i == 0 ? "" : i + 1 == count ? " or " : ", ", names[i]);
-    const char *near = text_nearest(value, names, count);
-    fprintf(stderr, ", not \"%s\"", value);
-    if (near) fprintf(stderr, "; did you mean %s?", near);
-    fputc('\n', stderr);
+    if (strcmp(value, "-") == 0) return option_fault(option, value, "the name of a file");
+    return option_text(option, value, options);
 }
 
-bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
-                   unsigned *result)
-{
-    for (size_t i = 0; i < count; i++)
-        if (strcmp(value, names[i]) == 0) {
-            *result = (unsigned)i;
-            return true;
-        }
-    fprintf(stderr, "glint: --%s: expected ", option);
-    choices_print(names, count, value);
-    return false;
-}
+#define FIELD(member) offsetof(CommonOptions, member)
 
-bool option_list(const char *option, const char *value, OptionItem read, void *items, size_t item_size,
-                 size_t most, size_t *count)
-{
-    *count = 0;
-    for (const char *at = value;; at++) {
-        const size_t length = strcspn(at, ",");
-        char *word = memory_copy_text(at);
-        word[length] = '\0';
-        const bool has_room = *count < most;
-        if (!has_room) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option, most);
-        const bool is_read = has_room && read(option, word, (char *)items + *count * item_size);
-        free(word);
-        if (!is_read) return false;
-        (*count)++;
-        at += length;
-        if (*at == '\0') return true;
-    }
-}
-
-bool option_set(const char *option, const char *value, const char *const *names, size_t count,
-                unsigned *result)
-{
-    *result = 0;
-    for (const char *at = value;; at++) {
-        size_t length = strcspn(at, ",");
-        size_t i = 0;
-        while (i < count && (strlen(names[i]) != length || strncmp(at, names[i], length) != 0))
-            i++;
-        if (i == count) {
-            char *word = memory_copy_part(at, length);
-            fprintf(stderr, "glint: --%s: expected names separated by commas, of ", option);
-            choices_print(names, count, word);
-            free(word);
-            return false;
-        }
-        *result |= 1u << i;
-        at += length;
-        if (*at == '\0') return true;
-    }
-}
-
-bool option_common(CommonOptions *common, int option, const char *value, bool *valid)
-{
-    unsigned choice = 0;
-    *valid = true;
-    switch (option) {
-    case OPTION_DEVICE:
-        common->device = value;
-        return true;
-    case OPTION_PRECISION:
-        *valid = option_choice("precision", value, precision_names, PRECISION_COUNT, &choice);
-        common->precision = (Precision)choice;
-        common->has_precision = true;
-        return true;
-    case OPTION_LANES:
-        *valid = option_choice("lanes", value, lanes_choice_names, LANES_CHOICE_COUNT, &choice);
-        common->lanes = lanes_choice_values[choice];
-        return true;
-    case OPTION_BVH:
-        *valid = option_choice("bvh", value, bvh_choice_names, BVH_CHOICE_COUNT, &choice);
-        common->bvh = (BvhChoice)choice;
-        return true;
-    case OPTION_NO_CACHE:
-        common->no_cache = true;
-        return true;
-    case OPTION_LENIENT:
-        common->lenient = true;
-        return true;
-    case OPTION_SET:
-        *valid = override_add(common, value);
-        return true;
-    case OPTION_CAMERA:
-        common->camera = value;
-        *valid = strcmp(value, "-") != 0;
-        if (!*valid) fputs("glint: --camera: expected the name of a file, not \"-\"\n", stderr);
-        return true;
-    case OPTION_MAX_PIXELS:
-        *valid = option_max_pixels(value);
-        return true;
-    case OPTION_REFERENCE_DEVICE:
-        common->reference_device = value;
-        return true;
-    case OPTION_WORK_GROUP:
-        *valid = sides_read("work-group", "16x4", value, &common->work_group[0], &common->work_group[1]);
-        return true;
-    case OPTION_BUILD_OPTIONS:
-        common->build_options = value;
-        return true;
-    case OPTION_KEEP_KERNELS:
-        *valid = option_folder("keep-kernels", value);
-        common->kernel_folder = value;
-        return true;
-    case OPTION_PERTURB:
-        *valid = perturb_read(value, common);
-        return true;
-    default:
-        return false;
-    }
-}
-
-int option_help(const char *text)
-{
-    fputs(text, stdout);
-    return EXIT_DONE;
-}
-
-int option_usage_fault(const char *command, const char *what)
-{
-    fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
-    return EXIT_USER;
-}
-
-bool option_only_scene(const char *command, int argument_count, char **arguments)
-{
-    if (optind + 1 == argument_count) return true;
-    if (optind == argument_count)
-        option_usage_fault(command, "no scene given");
-    else
-        fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", command,
-                arguments[optind + 1], command);
-    return false;
-}
+const Option device_option[] = {{"device", "D",
+                                 "index, part of the name, place on the PCI bus, cpu or gpu (default: "
+                                 "GLINT_DEVICE, else a GPU, else a CPU)",
+                                 option_text, FIELD(device)}};
+const Option devices_option[] = {
+    {"device", "LIST",
+     "all, or several: each an index, part of the name, place on the PCI bus, cpu or gpu, with commas "
+     "between (default: GLINT_DEVICE, else a GPU, else a CPU)",
+     option_text, FIELD(device)}};
+const Option reference_option[] = {{"reference-device", "D",
+                                    "renders references and the pixels that certified re-renders (default: "
+                                    "the device itself, else one with fp64)",
+                                    option_text, FIELD(reference_device)}};
+const Option precision_option[] = {
+    {"precision", "P", "single, strict, double or certified (default: single)", option_precision, 0}};
+const Option common_options[] = {
+    [COMMON_LANES] = {"lanes", "N",
+                      "rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)", lanes_read,
+                      FIELD(lanes), NAMES(lanes_choice_names)},
+    [COMMON_BVH] = {"bvh", "B", "auto, on or off; does not change the image (default: auto)", option_choice,
+                    FIELD(bvh), NAMES(bvh_choice_names)},
+    [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(no_cache)},
+    [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)},
+    [COMMON_MAX_PIXELS] = {"max-pixels", "N", "of an image that is read (default: 134217728)",
+                           max_pixels_read, 0, NUMBERS(1, UINT32_MAX)}};
+const Option set_options[] = {
+    {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable", override_add, 0},
+    {"camera", "FILE", "a scene whose camera is used", camera_read, FIELD(camera)}};
+const Option perturb_option[] = {{"perturb", "SEED[:SCALE]",
+                                  "inject the rounding error that OpenCL permits, times SCALE (default: 1)",
+                                  perturb_read, 0}};
+const Option driver_options[] = {
+    {"work-group", "WxH", "work-items of a group (default: 8x8, 1x1 for lanes on a CPU, or fewer)",
+     option_size, FIELD(work_group)},
+    {"build-options", "OPTIONS", "passed to the driver's compiler, such as \"-cl-opt-disable\"", option_text,
+     FIELD(build_options)}};
+const Option keep_kernels_option[] = {{"keep-kernels", "FOLDER",
+                                       "write the text and the build log of each kernel that is built",
+                                       option_folder, FIELD(kernel_folder)}};
 
 void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
 {

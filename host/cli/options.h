@@ -1,6 +1,7 @@
-// Reads option values, opens devices and loads scenes for all commands.
+// The options that commands share; opens devices and loads scenes for all commands.
 #pragma once
 
+#include "host/cli/command_line.h"
 #include "host/import/load.h"
 #include "host/measure/error_budget.h"
 #include "host/opencl/compute.h"
@@ -32,110 +33,34 @@ typedef struct {
     Stage *stage;       // records what takes time; may be NULL
 } CommonOptions;
 
-// getopt_long values of long options. A command's other options start at OPTION_OWN.
-enum {
-    OPTION_DEVICE = 256,
-    OPTION_PRECISION,
-    OPTION_LANES,
-    OPTION_BVH,
-    OPTION_NO_CACHE,
-    OPTION_LENIENT,
-    OPTION_SET,
-    OPTION_CAMERA,
-    OPTION_MAX_PIXELS,
-    OPTION_PERTURB,
-    OPTION_REFERENCE_DEVICE,
-    OPTION_WORK_GROUP,
-    OPTION_BUILD_OPTIONS,
-    OPTION_KEEP_KERNELS,
-    OPTION_OWN
-};
+// Options that several commands share, one table for each set that they share. Their fields are in
+// CommonOptions.
+extern const Option device_option[1], devices_option[1], reference_option[1], precision_option[1];
+enum { COMMON_LANES, COMMON_BVH, COMMON_NO_CACHE, COMMON_LENIENT, COMMON_MAX_PIXELS, COMMON_COUNT };
+extern const Option common_options[COMMON_COUNT];
+extern const Option set_options[2];         // of scenes whose values can be set
+extern const Option perturb_option[1];      // of commands that render or trace
+extern const Option driver_options[2];      // of commands that measure drivers
+extern const Option keep_kernels_option[1]; // of commands that examine drivers
+OptionReader option_precision;              // of CommonOptions
 
-#define COMMON_LONG_OPTIONS                                                                                  \
-    {"device", required_argument, NULL, OPTION_DEVICE},                                                      \
-        {"precision", required_argument, NULL, OPTION_PRECISION},                                            \
-        {"lanes", required_argument, NULL, OPTION_LANES}, {"bvh", required_argument, NULL, OPTION_BVH},      \
-        {"no-cache", no_argument, NULL, OPTION_NO_CACHE},                                                    \
-        {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
+// One of common_options. `common` is where the CommonOptions are in the command's struct.
+#define COMMON_OPTION(which, Type, common)                                                                   \
     {                                                                                                        \
-        "lenient", no_argument, NULL, OPTION_LENIENT                                                         \
+        &common_options[which], 1, offsetof(Type, common), NULL                                              \
     }
 
-// The options of commands whose scenes' values can be set.
-#define SET_LONG_OPTIONS                                                                                     \
-    {"set", required_argument, NULL, OPTION_SET},                                                            \
+// Rows of options that several commands have, each in its own struct.
+#define BOUNCES_OPTION(Type, field)                                                                          \
     {                                                                                                        \
-        "camera", required_argument, NULL, OPTION_CAMERA                                                     \
+        "bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)", option_count,        \
+            offsetof(Type, field), NUMBERS(0, BOUNCES_MAX)                                                   \
     }
-
-// The option of commands that render or trace.
-#define PERTURB_LONG_OPTION                                                                                  \
+#define MIN_CONTRIBUTION_OPTION(Type, field)                                                                 \
     {                                                                                                        \
-        "perturb", required_argument, NULL, OPTION_PERTURB                                                   \
+        "min-contribution", "W", "trace no bounced ray whose weight in its pixel is below W (default: 0)",   \
+            option_number, offsetof(Type, field), NUMBERS(0, 1)                                              \
     }
-
-// The options of commands that measure drivers.
-#define DRIVER_LONG_OPTIONS                                                                                  \
-    {"work-group", required_argument, NULL, OPTION_WORK_GROUP},                                              \
-    {                                                                                                        \
-        "build-options", required_argument, NULL, OPTION_BUILD_OPTIONS                                       \
-    }
-
-// The option of commands that examine drivers.
-#define KEEP_KERNELS_LONG_OPTION                                                                             \
-    {                                                                                                        \
-        "keep-kernels", required_argument, NULL, OPTION_KEEP_KERNELS                                         \
-    }
-
-// The option of commands that render at `certified`.
-#define REFERENCE_LONG_OPTION                                                                                \
-    {                                                                                                        \
-        "reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE                                 \
-    }
-
-// Help for options that several commands share; a command's help ends with HELP_HELP.
-#define HELP_DEVICE                                                                                          \
-    "      --device D        index, part of the name, place on the PCI bus, cpu or gpu\n"                    \
-    "                        (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
-#define HELP_DEVICES                                                                                         \
-    "      --device LIST     all, or several: each an index, part of the name, place on the PCI bus, cpu\n"  \
-    "                        or gpu, with commas between (default: GLINT_DEVICE, else a GPU, else a CPU)\n"
-#define HELP_LANES                                                                                           \
-    "      --lanes N         rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)\n"
-#define HELP_BOUNCES "      --bounces N       reflections and refractions of a ray, up to 255 (default: 5)\n"
-#define HELP_MIN_CONTRIBUTION                                                                                \
-    "      --min-contribution W\n"                                                                           \
-    "                        trace no bounced ray whose weight in its pixel is below W (default: 0)\n"
-#define HELP_NO_CACHE "      --no-cache        ignore the kernel cache\n"
-#define HELP_LENIENT  "      --lenient         read dialects of .rt files\n"
-#define HELP_SET                                                                                             \
-    "      --set PATH=VALUE  set a value in YAML, such as camera.fov=60; repeatable\n"                       \
-    "      --camera FILE     a scene whose camera is used\n"
-#define HELP_MAX_PIXELS "      --max-pixels N    of an image that is read (default: 134217728)\n"
-#define HELP_PERTURB                                                                                         \
-    "      --perturb SEED[:SCALE]\n"                                                                         \
-    "                        inject the rounding error that OpenCL permits, times SCALE (default: 1)\n"
-#define HELP_DRIVER                                                                                          \
-    "      --work-group WxH  work-items of a group (default: 8x8, 1x1 for lanes on a CPU, or "               \
-    "fewer)\n"                                                                                               \
-    "      --build-options OPTIONS\n"                                                                        \
-    "                        passed to the driver's compiler, such as \"-cl-opt-disable\"\n"
-#define HELP_KEEP_KERNELS                                                                                    \
-    "      --keep-kernels FOLDER\n"                                                                          \
-    "                        write the text and the build log of each kernel that is built\n"
-#define HELP_REFERENCE                                                                                       \
-    "      --reference-device D\n"                                                                           \
-    "                        renders references and the pixels that certified re-renders\n"                  \
-    "                        (default: the device itself, else one with fp64)\n"
-#define HELP_JSON "      --json            print JSON\n"
-#define HELP_HELP "  -h, --help            print this help\n"
-
-// Help on COMMON_LONG_OPTIONS, after HELP_DEVICE or HELP_DEVICES and a --precision.
-#define HELP_PRECISION "      --precision P     single, strict, double or certified (default: single)\n"
-#define HELP_COMMON                                                                                          \
-    HELP_LANES                                                                                               \
-    "      --bvh B           auto, on or off; does not change the image (default: auto)\n" HELP_NO_CACHE     \
-        HELP_LENIENT HELP_MAX_PIXELS
 
 enum { BOUNCES_DEFAULT = 5 };
 
@@ -146,46 +71,8 @@ extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 // Returns true with a message if writing `path` would overwrite a file that the scene was read from.
 bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path);
 
-// The result of reading a command line if the command is to run. Any other result is the exit status.
-enum { OPTIONS_READ = -1 };
-
-// The functions below read one value. On a mistake they print what `option` expects and return false.
-bool option_count(const char *option, const char *value, uint32_t smallest, uint32_t largest,
-                  uint32_t *result);
-// Reads a number from 0 to 1.
-bool option_fraction(const char *option, const char *value, double *fraction);
-bool option_size(const char *option, const char *value, uint32_t *width, uint32_t *height); // reads WxH
-bool option_choice(const char *option, const char *value, const char *const *names, size_t count,
-                   unsigned *result);
-// Reads E or E:METRIC. The default metric is the RMSE.
-bool option_error_budget(const char *option, const char *value, ErrorBudget *budget);
-// Creates the folder unless it exists. Returns false with a message if it cannot be written to.
-bool option_folder(const char *option, const char *path);
-// Creates the folder unless it exists. Returns false with a message if it cannot be written to or is not
-// empty.
-bool option_empty_folder(const char *option, const char *path);
-// Reads the limit of the pixels of an image that is read, and sets it.
-bool option_max_pixels(const char *value);
-// Reads one value of a list into `item`; on a mistake prints what `option` expects and returns false.
-typedef bool (*OptionItem)(const char *option, const char *value, void *item);
-// Reads values separated by commas, at most `most` of them, each into the next `item_size` bytes of `items`.
-bool option_list(const char *option, const char *value, OptionItem read, void *items, size_t item_size,
-                 size_t most, size_t *count);
-// Reads comma-separated names into a set with one bit per name.
-bool option_set(const char *option, const char *value, const char *const *names, size_t count,
-                unsigned *result);
-// Handles a common option and sets *valid if its value is valid. Returns false if `option` is not a common
-// one.
-bool option_common(CommonOptions *common, int option, const char *value, bool *valid);
-
-// Prints the help text and returns EXIT_DONE.
-int option_help(const char *text);
-// Prints a usage error that points to --help and returns EXIT_USER.
-int option_usage_fault(const char *command, const char *what);
-
-// Returns whether exactly one argument is left, from getopt's `optind` on. Otherwise prints what is missing
-// or superfluous.
-bool option_only_scene(const char *command, int argument_count, char **arguments);
+// Reads E or E:METRIC into an ErrorBudget. The default metric is the RMSE.
+OptionReader option_error_budget;
 
 // Returns the options that scenes are read with. They refer to `common`.
 SceneOptions scene_options_of(const CommonOptions *common);

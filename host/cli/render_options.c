@@ -1,135 +1,40 @@
 #include "host/cli/render_options.h"
 #include "host/cli/progress.h"
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 
-enum {
-    OPTION_SIZE = OPTION_OWN,
-    OPTION_SAMPLES,
-    OPTION_REGION,
-    OPTION_AOV,
-    OPTION_MAX_ERROR,
-    OPTION_TIMING,
-    OPTION_TRANSFER,
-    OPTION_BITS,
-    OPTION_EXPOSURE,
-    OPTION_TONE,
-    OPTION_DITHER,
-    OPTION_BOUNCES,
-    OPTION_MIN_CONTRIBUTION,
-    OPTION_ALPHA,
-    OPTION_CHECKPOINT,
-    OPTION_FRAMES,
-    OPTION_SKIP_EXISTING,
-    OPTION_CAPTURE,
-    OPTION_FORMAT,
-    OPTION_QUIET
-};
-
-static const struct option long_options[] = {
-    {"output", required_argument, NULL, 'o'},
-    {"size", required_argument, NULL, OPTION_SIZE},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"region", required_argument, NULL, OPTION_REGION},
-    {"aov", required_argument, NULL, OPTION_AOV},
-    {"max-error", required_argument, NULL, OPTION_MAX_ERROR},
-    {"timing", optional_argument, NULL, OPTION_TIMING},
-    {"transfer", required_argument, NULL, OPTION_TRANSFER},
-    {"bits", required_argument, NULL, OPTION_BITS},
-    {"exposure", required_argument, NULL, OPTION_EXPOSURE},
-    {"tone", required_argument, NULL, OPTION_TONE},
-    {"dither", no_argument, NULL, OPTION_DITHER},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
-    {"alpha", no_argument, NULL, OPTION_ALPHA},
-    {"checkpoint", required_argument, NULL, OPTION_CHECKPOINT},
-    {"frames", required_argument, NULL, OPTION_FRAMES},
-    {"skip-existing", no_argument, NULL, OPTION_SKIP_EXISTING},
-    {"capture", required_argument, NULL, OPTION_CAPTURE},
-    {"format", required_argument, NULL, OPTION_FORMAT},
-    {"quiet", no_argument, NULL, OPTION_QUIET},
-    COMMON_LONG_OPTIONS,
-    SET_LONG_OPTIONS,
-    PERTURB_LONG_OPTION,
-    DRIVER_LONG_OPTIONS,
-    REFERENCE_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-#define HELP_LAYER(NAME, name, type, components, note) "                          " #name ": " note "\n"
-
-static const char help_text[] =
-    "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n\n"
-    "  -o, --output FILE     .png, .ppm, .exr or .npy; a folder for several scenes; - with --format "
-    "(default:\n"
-    "                        the scene's name with .png)\n" HELP_SET
-    "      --size WxH        of the image (default: the scene's own, else 1280 wide)\n"
-    "      --samples N       per pixel (default: 1, at the center)\n"
-    "      --region X,Y,W,H  render these pixels only\n"
-    "      --aov LIST        more files, IMAGE.NAME.npy for each NAME of:\n" //
-    LAYER_LIST(
-        HELP_LAYER) "      --max-error E[:METRIC]\n"
-                    "                        choose the fastest precision within this error in linear light; "
-                    "METRIC: rmse,\n"
-                    "                        max or flip (default: rmse)\n"
-                    "      --timing[=STYLE]  report times of stages and launches: text, json or trace\n"
-                    "      --transfer T      srgb or none (default: srgb; none for .rt, .cfg, .nff and "
-                    ".dat)\n"
-                    "      --bits N          8 or 16 per channel of a PNG or PPM (default: 8)\n"
-                    "      --exposure STOPS  of a PNG or PPM: twice as bright per stop (default: 0)\n"
-                    "      --tone T          curve of a PNG or PPM, none or filmic (default: none, which "
-                    "clips at 1)\n"
-                    "      --dither          hide the steps of 8 bits in a pattern\n"
-                    "      --alpha           transparent background, for PNG and EXR\n"
-                    "      --checkpoint FILE\n"
-                    "                        keep finished bands in FILE; the same command resumes there\n"
-                    "      --frames A[-B]    render these frames, or all; FILEs have %d or %04d for the "
-                    "number\n"
-                    "                        (default: NAME-%04d.png)\n"
-                    "      --skip-existing   leave out images that exist\n"
-                    "      --capture FOLDER  write launches to an empty folder, for glint locate\n"
-                    "      --format F        format of --output -: png, ppm or npy\n"
-                    "      --quiet           no progress\n" //
-    HELP_BOUNCES HELP_MIN_CONTRIBUTION HELP_DEVICES HELP_REFERENCE HELP_PRECISION HELP_COMMON HELP_DRIVER
-        HELP_PERTURB HELP_HELP;
-
-static bool region_read(const char *value, uint32_t region[4])
+static bool region_read(const Option *option, const char *value, void *options)
 {
+    RenderOptions *render = options;
+    uint32_t *region = render->region;
+    render->has_region = true;
     const char *at = value;
     for (int i = 0; i < 4; i++) {
-        char *end;
-        errno = 0;
-        unsigned long number = strtoul(at, &end, 10);
-        bool digit_first = *at >= '0' && *at <= '9';
-        if (!digit_first || errno != 0 || number > IMAGE_SIDE_MAX || *end != (i < 3 ? ',' : '\0')) break;
+        uint64_t number;
+        if (!digits_read(at, &at, &number) || number > IMAGE_SIDE_MAX || *at != (i < 3 ? ',' : '\0')) break;
         region[i] = (uint32_t)number;
-        at = end + 1;
+        at++;
         if (i == 3 && region[2] > 0 && region[3] > 0) return true;
     }
-    fprintf(stderr, "glint: --region: expected X,Y,WIDTH,HEIGHT in pixels from the top left, not \"%s\"\n",
-            value);
-    return false;
+    return option_fault(option, value, "X,Y,WIDTH,HEIGHT in pixels from the top left");
 }
 
 // Reads a frame's number and moves behind it.
 static bool frame_read(const char **at, uint32_t *frame)
 {
-    char *end;
-    const unsigned long number = strtoul(*at, &end, 10);
-    const bool is_valid = **at >= '0' && **at <= '9' && number < FRAMES_MAX;
+    uint64_t number;
+    const bool is_valid = digits_read(*at, at, &number) && number < FRAMES_MAX;
     *frame = (uint32_t)number;
-    *at = end;
     return is_valid;
 }
 
-static bool frames_read(const char *value, RenderOptions *options)
+static bool frames_read(const Option *option, const char *value, void *render_options)
 {
+    RenderOptions *options = render_options;
     options->has_all_frames = strcmp(value, "all") == 0;
     options->first_frame = 0;
     options->frame_count = 1; // until the scene is read
@@ -143,9 +48,7 @@ static bool frames_read(const char *value, RenderOptions *options)
     }
     options->frame_count = last - options->first_frame + 1;
     if (is_valid && *at == '\0' && last >= options->first_frame) return true;
-    fprintf(stderr, "glint: --frames: expected all, or A or A-B with 0 <= A <= B < %d, not \"%s\"\n",
-            FRAMES_MAX, value);
-    return false;
+    return option_fault(option, value, "all, or A or A-B with 0 <= A <= B < %d", FRAMES_MAX);
 }
 
 FramePlace frame_place_of(const char *pattern)
@@ -159,15 +62,32 @@ FramePlace frame_place_of(const char *pattern)
     return (FramePlace){0};
 }
 
-static bool exposure_read(const char *value, double *exposure)
+static bool transfer_read(const Option *option, const char *value, void *options)
 {
-    enum { STOPS_MAX = 64 };
-    char *end;
-    *exposure = strtod(value, &end);
-    if (end != value && *end == '\0' && fabs(*exposure) <= STOPS_MAX) return true;
-    fprintf(stderr, "glint: --exposure: expected a number of stops from -%d to %d, not \"%s\"\n", STOPS_MAX,
-            STOPS_MAX, value);
-    return false;
+    RenderOptions *render = options;
+    render->has_transfer = true;
+    return option_choice(option, value, options);
+}
+
+static bool bits_read(const Option *option, const char *value, void *options)
+{
+    static const uint32_t bits[] = {8, 16};
+    uint32_t *field = &((RenderOptions *)options)->output.bits;
+    if (!option_choice(option, value, options)) return false;
+    *field = bits[*field];
+    return true;
+}
+
+static bool format_read(const Option *option, const char *value, void *options)
+{
+    static const ImageFormat formats[] = {IMAGE_PNG, IMAGE_PPM, IMAGE_NPY};
+    RenderOptions *render = options;
+    unsigned choice;
+    Option names = *option;
+    names.offset = 0;
+    if (!option_choice(&names, value, &choice)) return false;
+    render->output.stdout_format = formats[choice];
+    return render->has_format = true;
 }
 
 static bool is_to_stdout(const ImageOutputOptions *output)
@@ -212,79 +132,6 @@ static bool display_fits(const ImageOutputOptions *output)
     else
         return true;
     return false;
-}
-
-static bool option_take(RenderOptions *options, int option, const char *value)
-{
-    static const char *const transfers[] = {"srgb", "none"};
-    unsigned choice;
-    bool valid = true;
-    if (option_common(&options->common, option, value, &valid)) return valid;
-    switch (option) {
-    case 'o':
-        options->output.path = value;
-        return true;
-    case OPTION_SIZE:
-        return option_size("size", value, &options->width, &options->height);
-    case OPTION_SAMPLES:
-        return option_count("samples", value, 1, SAMPLES_MAX, &options->sample_count);
-    case OPTION_REGION:
-        options->has_region = true;
-        return region_read(value, options->region);
-    case OPTION_AOV:
-        return option_set("aov", value, layer_names, LAYER_COUNT, &options->output.aovs);
-    case OPTION_MAX_ERROR:
-        return option_error_budget("max-error", value, &options->budget);
-    case OPTION_TIMING:
-        return timing_style_read(value, &options->timing);
-    case OPTION_TRANSFER:
-        if (!option_choice("transfer", value, transfers, 2, &choice)) return false;
-        options->output.transfer = choice == 0 ? TRANSFER_SRGB : TRANSFER_NONE;
-        options->has_transfer = true;
-        return true;
-    case OPTION_BITS:
-        if (!option_choice("bits", value, (const char *const[]){"8", "16"}, 2, &choice)) return false;
-        options->output.bits = choice == 0 ? 8 : 16;
-        return true;
-    case OPTION_EXPOSURE:
-        return exposure_read(value, &options->output.exposure);
-    case OPTION_TONE:
-        if (!option_choice("tone", value, tone_names, TONE_COUNT, &choice)) return false;
-        options->output.tone = (Tone)choice;
-        return true;
-    case OPTION_DITHER:
-        options->output.dither = true;
-        return true;
-    case OPTION_ALPHA:
-        options->output.alpha = true;
-        return true;
-    case OPTION_BOUNCES:
-        return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
-    case OPTION_MIN_CONTRIBUTION:
-        return option_fraction("min-contribution", value, &options->min_contribution);
-    case OPTION_CHECKPOINT:
-        options->checkpoint = value;
-        return true;
-    case OPTION_FRAMES:
-        return frames_read(value, options);
-    case OPTION_FORMAT:
-        if (!option_choice("format", value, (const char *const[]){"png", "ppm", "npy"}, 3, &choice))
-            return false;
-        options->output.stdout_format = (const ImageFormat[]){IMAGE_PNG, IMAGE_PPM, IMAGE_NPY}[choice];
-        options->has_format = true;
-        return true;
-    case OPTION_SKIP_EXISTING:
-        options->skips_existing = true;
-        return true;
-    case OPTION_CAPTURE:
-        options->common.capture_folder = value;
-        return option_empty_folder("capture", value);
-    case OPTION_QUIET:
-        options->quiet = true;
-        return true;
-    default:
-        return false;
-    }
 }
 
 bool output_is_folder(const char *path)
@@ -344,17 +191,70 @@ static bool frames_count(RenderOptions *options)
     return is_read && options->frame_count > 0;
 }
 
+#define HELP_LAYER(NAME, name, type, components, note) "\n" #name ": " note
+#define FIELD(member)                                  offsetof(RenderOptions, member)
+
+static const char *const transfer_names[] = {"srgb", "none"}, *const bits_names[] = {"8", "16"},
+                         *const format_names[] = {"png", "ppm", "npy"};
+
+static const Option options_own[] = {
+    {"output", "FILE",
+     ".png, .ppm, .exr or .npy; a folder for several scenes; - with --format (default: the scene's name with "
+     ".png)",
+     option_text, FIELD(output.path), .letter = 'o'},
+    {"size", "WxH", "of the image (default: the scene's own, else 1280 wide)", option_size, FIELD(size)},
+    {"samples", "N", "per pixel (default: 1, at the center)", option_count, FIELD(sample_count),
+     NUMBERS(1, SAMPLES_MAX)},
+    {"region", "X,Y,W,H", "render these pixels only", region_read, 0},
+    {"aov", "LIST", "more files, IMAGE.NAME.npy for each NAME of:" LAYER_LIST(HELP_LAYER), option_set,
+     FIELD(output.aovs), NAMES(layer_names)},
+    {"max-error", "E[:METRIC]",
+     "choose the fastest precision within this error in linear light; METRIC: rmse, max or flip (default: "
+     "rmse)",
+     option_error_budget, FIELD(budget)},
+    {"timing", "[=STYLE]", "report times of stages and launches: text, json or trace", timing_style_read,
+     FIELD(timing)},
+    {"transfer", "T", "srgb or none (default: srgb; none for .rt, .cfg, .nff and .dat)", transfer_read,
+     FIELD(output.transfer), NAMES(transfer_names)},
+    {"bits", "N", "8 or 16 per channel of a PNG or PPM (default: 8)", bits_read, FIELD(output.bits),
+     NAMES(bits_names)},
+    {"exposure", "STOPS", "of a PNG or PPM: twice as bright per stop (default: 0)", option_number,
+     FIELD(output.exposure), NUMBERS(-64, 64)},
+    {"tone", "T", "curve of a PNG or PPM, none or filmic (default: none, which clips at 1)", option_choice,
+     FIELD(output.tone), NAMES(tone_names)},
+    {"dither", NULL, "hide the steps of 8 bits in a pattern", option_flag, FIELD(output.dither)},
+    {"alpha", NULL, "transparent background, for PNG and EXR", option_flag, FIELD(output.alpha)},
+    {"checkpoint", "FILE", "keep finished bands in FILE; the same command resumes there", option_text,
+     FIELD(checkpoint)},
+    {"frames", "A[-B]",
+     "render these frames, or all; FILEs have %d or %04d for the number (default: NAME-%04d.png)",
+     frames_read, 0},
+    {"skip-existing", NULL, "leave out images that exist", option_flag, FIELD(skips_existing)},
+    {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_new_folder,
+     FIELD(common.capture_folder)},
+    {"format", "F", "format of --output -: png, ppm or npy", format_read, 0, NAMES(format_names)},
+    {"quiet", NULL, "no progress", option_flag, FIELD(quiet)},
+    BOUNCES_OPTION(RenderOptions, bounce_count),
+    MIN_CONTRIBUTION_OPTION(RenderOptions, min_contribution)};
+
+static const CommandLine command_line = {
+    .usage = "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, RenderOptions, common),
+               OPTIONS_WITHIN(devices_option, RenderOptions, common),
+               OPTIONS_WITHIN(reference_option, RenderOptions, common),
+               OPTIONS_WITHIN(precision_option, RenderOptions, common),
+               OPTIONS_WITHIN(common_options, RenderOptions, common),
+               OPTIONS_WITHIN(driver_options, RenderOptions, common),
+               OPTIONS_WITHIN(perturb_option, RenderOptions, common)}};
+
 int render_options_read(RenderOptions *options, int argument_count, char **arguments)
 {
     *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
                                .sample_count = 1,
                                .bounce_count = BOUNCES_DEFAULT,
                                .output.bits = 8};
-    int option;
-    while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
-    }
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (optind == argument_count) return option_usage_fault("render", "no scene given");
     if (options->budget.limit > 0 && options->common.has_precision)
         return option_usage_fault(
@@ -379,18 +279,19 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
 {
-    scene_choose_image_size(scene, &options->width, &options->height);
+    uint32_t *size = options->size;
+    scene_choose_image_size(scene, &size[0], &size[1]);
     if (!options->has_region) {
-        options->region[2] = options->width;
-        options->region[3] = options->height;
+        options->region[2] = size[0];
+        options->region[3] = size[1];
     }
     const uint32_t *region = options->region;
-    if (region[0] + region[2] > options->width || region[1] + region[3] > options->height) {
+    if (region[0] + region[2] > size[0] || region[1] + region[3] > size[1]) {
         fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the image of %ux%u pixels\n",
-                region[0], region[1], region[2], region[3], options->width, options->height);
+                region[0], region[1], region[2], region[3], size[0], size[1]);
         return false;
     }
-    *settings = settings_whole(&options->common, options->width, options->height);
+    *settings = settings_whole(&options->common, size[0], size[1]);
     settings->region_x = region[0];
     settings->region_y = region[1];
     settings->region_width = region[2];

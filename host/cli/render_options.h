@@ -12,7 +12,7 @@ typedef struct {
     const char *scene;         // the one that is rendered
     const char *checkpoint;    // with several frames, their pattern
     ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
-    uint32_t width, height;    // 0 if not given
+    uint32_t size[2];          // 0 if not given
     uint32_t sample_count, bounce_count;
     double min_contribution;
     uint32_t region[4];                // x, y, width, height

@@ -17,7 +17,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <ftw.h>
-#include <getopt.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdio.h>
@@ -27,36 +26,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { OPTION_HTML = OPTION_BEYOND_VARIANTS };
-
-static const struct option long_options[] = {
-    {"output", required_argument, NULL, 'o'},
-    {"device", required_argument, NULL, OPTION_DEVICE},
-    {"precision", required_argument, NULL, OPTION_PRECISION},
-    {"lanes", required_argument, NULL, OPTION_LANES},
-    DRIVER_LONG_OPTIONS,
-    {"seconds", required_argument, NULL, OPTION_SECONDS},
-    {"html", required_argument, NULL, OPTION_HTML},
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint report [CASE...] [OPTIONS]\n"
-    "       glint report REPORT.json... [--html FILE]\n\n"
-    "Writes an archive for a bug report: what glint devices, its passports, glint verify --quick and a small "
-    "glint bench\nprint, the text and build log of every kernel, and versions. All kernels are built, which "
-    "takes minutes. A step that\nfails or crashes is named in index.txt. Names of the user, the host and "
-    "folders are left out. With CASE, glint verify\nruns only these cases.\n\n"
-    "  -o, --output FILE     the archive (default: glint-report.tar.gz)\n"
-    "      --precision P     single, strict or double (default: all for verify, single for bench)\n"
-    "      --seconds MAX     time limit of each step (default: 1800)\n" //
-    HELP_DEVICE HELP_LANES HELP_DRIVER "\nWith reports of glint bench --json instead, shows their rows side "
-    "by side: of several devices, versions or days. "
-    "A\nrow is faster or slower than in the first report only where both are of the same device and host.\n\n"
-    "      --html FILE       self-contained HTML page of this comparison\n" //
-    HELP_HELP;
-
 static const char scene_text[] = "# What glint bench times for glint report.\n"
                                  "camera: {position: [0, 2, -6], look_at: [0, 0.5, 0], fov: 50}\n"
                                  "lights: [{point: {position: [3, 5, -4]}}]\n"
@@ -65,18 +34,46 @@ static const char scene_text[] = "# What glint bench times for glint report.\n"
                                  "  - sphere: {center: [-1, 1, 0], radius: 1, material: {reflection: 0.4}}\n"
                                  "  - triangle: {vertices: [[1, 0, 0], [2, 0, 1], [1.5, 1.5, 0.5]]}\n";
 
-enum { PASSED_MAX = 12, ARGUMENTS_MAX = 40 };
-static const double step_seconds_max = 1800;
+enum { PASSED_MAX = 5, ARGUMENTS_MAX = 40 };
 
 typedef struct {
+    CommonOptions common;
     const char *output, *page; // NULL if not given
     char *passed[PASSED_MAX];  // options for verify and bench
     size_t passed_count;
     char *const *cases;
     size_t case_count;
-    double seconds;
-    bool is_for_archive; // an option was given that only the archive has
+    double seconds; // 0 if not given
 } ReportChoice;
+
+static const Option archive_options[] = {{"output", "FILE", "the archive (default: glint-report.tar.gz)",
+                                          option_text, offsetof(ReportChoice, output), .letter = 'o'},
+                                         {"seconds", "MAX", "time limit of each step (default: 1800)",
+                                          option_number, offsetof(ReportChoice, seconds),
+                                          NUMBERS_ABOVE(0, SECONDS_MAX)}};
+static const Option precision_own[] = {
+    {"precision", "P", "single, strict or double (default: all for verify, single for bench)",
+     option_precision, 0}};
+static const Option page_option[] = {{"html", "FILE", "self-contained HTML page of this comparison",
+                                      option_text, offsetof(ReportChoice, page)}};
+
+static const CommandLine command_line = {
+    .usage =
+        "usage: glint report [CASE...] [OPTIONS]\n"
+        "       glint report REPORT.json... [--html FILE]\n\n"
+        "Writes an archive for a bug report: what glint devices, its passports, glint verify --quick and "
+        "a small glint bench\nprint, the text and build log of every kernel, and versions. All kernels "
+        "are built, which takes minutes. A step that\nfails or crashes is named in index.txt. Names of "
+        "the user, the host and folders are left out. With CASE, glint verify\nruns only these cases.\n",
+    .groups = {OPTIONS(archive_options),
+               OPTIONS_WITHIN(precision_own, ReportChoice, common),
+               OPTIONS_WITHIN(device_option, ReportChoice, common),
+               COMMON_OPTION(COMMON_LANES, ReportChoice, common),
+               OPTIONS_WITHIN(driver_options, ReportChoice, common),
+               {page_option, 1, 0,
+                "With reports of glint bench --json instead, shows their rows side by side: of several "
+                "devices, versions or days. A\nrow is faster or slower than in the first report only where "
+                "both are of the same device and host.\n"}}};
 
 // A command that the report runs in its folder. It prints to the file `name`.`prints`.
 typedef struct {
@@ -125,33 +122,18 @@ static const struct {
     {".log", "options, status and log of each build of this kernel"},
 };
 
-static bool option_take(ReportChoice *choice, int option, int index, char *value)
+// Lists the options for verify and bench.
+static void passed_list(ReportChoice *choice)
 {
-    CommonOptions checked = {0};
-    bool valid = true;
-    if (option == OPTION_HTML) {
-        choice->page = value;
-        return true;
-    }
-    choice->is_for_archive = true;
-    if (option == 'o') {
-        choice->output = value;
-    } else if (option == OPTION_SECONDS) {
-        valid = option_positive("seconds", value, &choice->seconds);
-    } else {
-        option_common(&checked, option, value, &valid);
-        if (checked.precision == PRECISION_CERTIFIED) {
-            option_usage_fault("report",
-                               "--precision certified is only for images; choose single, strict or double");
-            return false;
-        }
-        if (choice->passed_count == PASSED_MAX) {
-            option_usage_fault("report", "too many options");
-            return false;
-        }
-        choice->passed[choice->passed_count++] = text_format("--%s=%s", long_options[index].name, value);
-    }
-    return valid;
+    const CommonOptions *common = &choice->common;
+    char **next = choice->passed;
+    if (common->device) *next++ = text_format("--device=%s", common->device);
+    if (common->has_precision) *next++ = text_format("--precision=%s", precision_names[common->precision]);
+    if (common->lanes > 0) *next++ = text_format("--lanes=%u", common->lanes);
+    if (common->work_group[0] > 0)
+        *next++ = text_format("--work-group=%ux%u", common->work_group[0], common->work_group[1]);
+    if (common->build_options) *next++ = text_format("--build-options=%s", common->build_options);
+    choice->passed_count = (size_t)(next - choice->passed);
 }
 
 static int folder_entry_remove(const char *path, const struct stat *status, int type, struct FTW *walk)
@@ -414,9 +396,10 @@ static int reports_compare(const ReportChoice *choice)
         count += ending && strcmp(ending, ".json") == 0;
     }
     if (count == 0 && !choice->page) return OPTIONS_READ;
+    const bool is_for_archive = choice->output || choice->seconds > 0 || choice->passed_count > 0;
     const char *what = count == 0 ? "--html needs reports of glint bench, whose names end in .json"
                        : count < choice->case_count ? "reports (.json) and cases cannot be combined"
-                       : choice->is_for_archive     ? "--html is the only option for reports (.json)"
+                       : is_for_archive             ? "--html is the only option for reports (.json)"
                        : count > SIDE_REPORTS_MAX   ? "at most 26 reports can be compared"
                        : choice->page && strcmp(choice->page, "-") == 0 ? "--html needs the name of a file"
                                                                         : NULL;
@@ -426,17 +409,17 @@ static int reports_compare(const ReportChoice *choice)
 
 int command_report(int argument_count, char **arguments)
 {
-    ReportChoice choice = {.output = "glint-report.tar.gz", .seconds = step_seconds_max};
-    int option, index = 0, status = OPTIONS_READ;
-    while (status == OPTIONS_READ &&
-           (option = getopt_long(argument_count, arguments, "ho:", long_options, &index)) != -1)
-        status = option == 'h'                                 ? option_help(help_text)
-                 : option == '?'                               ? EXIT_USER
-                 : option_take(&choice, option, index, optarg) ? OPTIONS_READ
-                                                               : EXIT_USER;
+    ReportChoice choice = {0};
+    int status = command_line_read(&command_line, &choice, argument_count, arguments);
+    if (status == OPTIONS_READ && choice.common.precision == PRECISION_CERTIFIED)
+        status = option_usage_fault(
+            "report", "--precision certified is only for images; choose single, strict or double");
+    passed_list(&choice);
     choice.cases = arguments + optind;
     choice.case_count = (size_t)(argument_count - optind);
     if (status == OPTIONS_READ) status = reports_compare(&choice);
+    if (!choice.output) choice.output = "glint-report.tar.gz";
+    if (choice.seconds == 0) choice.seconds = 1800;
     OutputFile output;
     MessageList messages = {0};
     if (status == OPTIONS_READ && !output_open(&output, choice.output, &messages)) status = EXIT_USER;

@@ -8,12 +8,13 @@
 #include <math.h>
 #include <stdio.h>
 
-bool timing_style_read(const char *value, TimingStyle *style)
+bool timing_style_read(const Option *option, const char *value, void *options)
 {
     static const char *const names[] = {"text", "json", "trace"};
     unsigned choice = 0;
-    if (value && !option_choice("timing", value, names, 3, &choice)) return false;
-    *style = TIMING_TEXT + choice;
+    const Option styles = {option->name, NAMES(names)};
+    if (value && !option_choice(&styles, value, &choice)) return false;
+    *(TimingStyle *)option_field(option, options) = TIMING_TEXT + choice;
     return true;
 }
 

@@ -1,6 +1,7 @@
 // Reports the time of every stage and launch of a render, as text, JSON or a trace.
 #pragma once
 
+#include "host/cli/command_line.h"
 #include "host/cli/ranks.h"
 #include "host/measure/pilot.h"
 
@@ -12,7 +13,7 @@ static inline bool timing_uses_stdout(TimingStyle style)
     return style == TIMING_JSON || style == TIMING_TRACE;
 }
 
-bool timing_style_read(const char *value, TimingStyle *style); // a value of NULL means text
+OptionReader timing_style_read; // of a TimingStyle; without a value it is text
 
 typedef struct {
     const char *scene;

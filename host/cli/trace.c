@@ -9,43 +9,37 @@
 #include "host/image/image.h"
 #include "host/import/report.h"
 #include <float.h>
-#include <getopt.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { OPTION_RAYS = OPTION_OWN };
-
-static const struct option long_options[] = {
-    {"rays", required_argument, NULL, OPTION_RAYS},
-    {"output", required_argument, NULL, 'o'},
-    COMMON_LONG_OPTIONS,
-    SET_LONG_OPTIONS,
-    PERTURB_LONG_OPTION,
-    DRIVER_LONG_OPTIONS,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
-    "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays are not shifted to the "
-    "eye;\n"
-    "each number is rounded once to the precision. At certified also low,high,certainty: bounds of the exact "
-    "t,\n"
-    "and whether object and bounds are certain, certain in double, or uncertain.\n\n"
-    "      --rays FILE       one ray per line: ox oy oz dx dy dz [tmin tmax], "
-    "decimal or C hexadecimal; - is\n"
-    "                        standard input; # starts a comment\n"
-    "  -o, --output FILE     CSV file (default: standard output)\n" //
-    HELP_SET HELP_DEVICE HELP_PRECISION                             //
-        HELP_COMMON HELP_DRIVER HELP_PERTURB HELP_HELP;
-
 typedef struct {
     CommonOptions common;
     const char *scene, *rays, *output;
 } TraceOptions;
+
+static const Option options_own[] = {
+    {"rays", "FILE",
+     "one ray per line: ox oy oz dx dy dz [tmin tmax], decimal or C hexadecimal; - is standard input; # "
+     "starts a comment",
+     option_text, offsetof(TraceOptions, rays)},
+    {"output", "FILE", "CSV file (default: standard output)", option_text, offsetof(TraceOptions, output),
+     .letter = 'o'}};
+
+static const CommandLine command_line = {
+    .usage = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+             "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays are not shifted to "
+             "the eye;\n"
+             "each number is rounded once to the precision. At certified also low,high,certainty: bounds of "
+             "the exact t,\n"
+             "and whether object and bounds are certain, certain in double, or uncertain.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, TraceOptions, common),
+               OPTIONS_WITHIN(device_option, TraceOptions, common),
+               OPTIONS_WITHIN(precision_option, TraceOptions, common),
+               OPTIONS_WITHIN(common_options, TraceOptions, common),
+               OPTIONS_WITHIN(driver_options, TraceOptions, common),
+               OPTIONS_WITHIN(perturb_option, TraceOptions, common)}};
 
 typedef struct {
     TraceRay *items;
@@ -217,18 +211,8 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
 static int options_read(TraceOptions *options, int argument_count, char **arguments)
 {
     *options = (TraceOptions){.common.precision = PRECISION_SINGLE, .output = "-"};
-    int option;
-    bool valid;
-    while ((option = getopt_long(argument_count, arguments, "o:h", long_options, NULL)) != -1) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?') return EXIT_USER;
-        if (option == OPTION_RAYS)
-            options->rays = optarg;
-        else if (option == 'o')
-            options->output = optarg;
-        else if (option_common(&options->common, option, optarg, &valid) && !valid)
-            return EXIT_USER;
-    }
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (!option_only_scene("trace", argument_count, arguments)) return EXIT_USER;
     if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
     if (image_format_of(options->output) != IMAGE_UNKNOWN)

@@ -16,52 +16,25 @@ const double variants_opened_fraction = 0.4, variants_measured_fraction = 0.9;
 
 enum { WARM_UP_RUNS = 3, WARM_UP_SECONDS = 2, ENOUGH_RUNS = 20 };
 
-bool option_positive(const char *option, const char *value, double *result)
+static bool samples_read(const Option *option, const char *value, void *options)
 {
-    char *end;
-    double number = strtod(value, &end);
-    if (end == value || *end != '\0' || !(number > 0 && number < 1e9)) {
-        fprintf(stderr, "glint: --%s: expected a number above 0, not \"%s\"\n", option, value);
-        return false;
-    }
-    *result = number;
-    return true;
+    VariantOptions *variants = options;
+    return option_list(option, value, option_count, variants->samples, sizeof *variants->samples,
+                       SAMPLE_CHOICES_MAX, &variants->sample_choices);
 }
 
-static bool samples_read(const char *option, const char *value, void *samples)
-{
-    return option_count(option, value, 1, SAMPLES_MAX, samples);
-}
+#define FIELD(member) offsetof(VariantOptions, member)
 
-bool variant_option(VariantOptions *options, int option, const char *value, bool *valid)
-{
-    switch (option) {
-    case OPTION_PRECISION:
-        *valid = option_set("precision", value, precision_names, PRECISION_COUNT, &options->precisions);
-        return true;
-    case OPTION_LANES:
-        *valid = option_set("lanes", value, lanes_choice_names, LANES_CHOICE_COUNT, &options->lanes);
-        return true;
-    case OPTION_BVH:
-        *valid = option_set("bvh", value, bvh_choice_names, BVH_CHOICE_COUNT, &options->bvhs);
-        return true;
-    case OPTION_SIZE:
-        *valid = option_size("size", value, &options->width, &options->height);
-        return true;
-    case OPTION_SECONDS:
-        *valid = option_positive("seconds", value, &options->seconds);
-        return true;
-    case OPTION_SAMPLES:
-        *valid = option_list("samples", value, samples_read, options->samples, sizeof *options->samples,
-                             SAMPLE_CHOICES_MAX, &options->sample_choices);
-        return true;
-    case OPTION_BOUNCES:
-        *valid = option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
-        return true;
-    default:
-        return option_common(&options->common, option, value, valid);
-    }
-}
+const Option variant_choice_options[] = {
+    {"samples", "LIST", "per pixel, one row each (default: 1)", samples_read, 0, NUMBERS(1, SAMPLES_MAX)},
+    BOUNCES_OPTION(VariantOptions, bounce_count),
+    {"lanes", "LIST", "of 1, 4, 8, 16 (default and CPU maximum: vector width)", option_set, FIELD(lanes),
+     NAMES(lanes_choice_names)},
+    {"bvh", "LIST", "of auto, on, off (default: auto)", option_set, FIELD(bvhs), NAMES(bvh_choice_names)}};
+const Option variant_set_options[] = {
+    {"size", "WxH", "image size (default: as glint render)", option_size, FIELD(size)},
+    {"seconds", "MAX", "time limit of the measurement, converged or not (default: 5 per row)", option_number,
+     FIELD(seconds), NUMBERS_ABOVE(0, SECONDS_MAX)}};
 
 static void variant_add(VariantSet *set, const VariantOptions *options, size_t choice, const char *path,
                         uint64_t scene_hash, size_t scene_index, const RenderSettings *settings)
@@ -112,7 +85,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *choices, s
                                const char *path, size_t scene_index)
 {
     const VariantOptions *options = &choices[choice];
-    uint32_t width = options->width, height = options->height;
+    uint32_t width = options->size[0], height = options->size[1];
     scene_choose_image_size(&set->scenes[scene_index], &width, &height);
     RenderSettings settings = settings_whole(&options->common, width, height);
     settings.bounce_count = options->bounce_count;

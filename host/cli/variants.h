@@ -12,7 +12,7 @@ enum { SAMPLE_CHOICES_MAX = 16 };
 typedef struct {
     CommonOptions common;
     unsigned precisions, lanes, bvhs; // sets; empty lanes mean the device's default
-    uint32_t width, height;           // 0 for the default
+    uint32_t size[2];                 // 0 for the default
     uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0 for one sample
     uint32_t bounce_count;
@@ -23,37 +23,20 @@ typedef struct {
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
 
-enum {
-    OPTION_SIZE = OPTION_OWN,
-    OPTION_SECONDS,
-    OPTION_SAMPLES,
-    OPTION_BOUNCES,
-    OPTION_BEYOND_VARIANTS // a command's other options start here
-};
+// Their fields are in VariantOptions.
+extern const Option variant_choice_options[4]; // what --variant takes, too, as it takes --precision
+extern const Option variant_set_options[2];    // what all rows share
+enum { SECONDS_MAX = 1000000000 };
 
-#define VARIANT_LONG_OPTIONS                                                                                 \
-    {"precision", required_argument, NULL, OPTION_PRECISION},                                                \
-        {"lanes", required_argument, NULL, OPTION_LANES}, {"bvh", required_argument, NULL, OPTION_BVH},      \
-        {"size", required_argument, NULL, OPTION_SIZE},                                                      \
-        {"seconds", required_argument, NULL, OPTION_SECONDS},                                                \
-        {"device", required_argument, NULL, OPTION_DEVICE},                                                  \
-        {"reference-device", required_argument, NULL, OPTION_REFERENCE_DEVICE},                              \
-        {"max-pixels", required_argument, NULL, OPTION_MAX_PIXELS},                                          \
-        {"lenient", no_argument, NULL, OPTION_LENIENT}, SET_LONG_OPTIONS
-
-// The help of these options except --precision, whose default differs.
-#define HELP_VARIANTS                                                                                        \
-    "      --lanes LIST      of 1, 4, 8, 16 (default and CPU maximum: vector width)\n"                       \
-    "      --bvh LIST        of auto, on, off (default: auto)\n"                                             \
-    "      --size WxH        image size (default: as glint render)\n"                                        \
-    "      --seconds MAX     time limit of the measurement, converged or not (default: 5 per "               \
-    "row)\n" HELP_SET HELP_DEVICE HELP_REFERENCE HELP_LENIENT HELP_MAX_PIXELS
-
-// Handles one of these options and sets *valid if its value is valid, else prints a message. Returns false if
-// `option` is not one of them.
-bool variant_option(VariantOptions *options, int option, const char *value, bool *valid);
-// Reads a positive number. Returns false with a message if the value is not one.
-bool option_positive(const char *option, const char *value, double *result);
+// The groups of a command with VariantOptions, after its own.
+#define VARIANT_GROUPS(Type, variants)                                                                       \
+    OPTIONS_WITHIN(variant_choice_options, Type, variants),                                                  \
+        OPTIONS_WITHIN(variant_set_options, Type, variants),                                                 \
+        OPTIONS_WITHIN(set_options, Type, variants.common),                                                  \
+        OPTIONS_WITHIN(device_option, Type, variants.common),                                                \
+        OPTIONS_WITHIN(reference_option, Type, variants.common),                                             \
+        COMMON_OPTION(COMMON_LENIENT, Type, variants.common),                                                \
+        COMMON_OPTION(COMMON_MAX_PIXELS, Type, variants.common)
 
 typedef struct {
     Scene *scenes;

@@ -13,39 +13,11 @@
 #include "host/cli/report_json.h"
 #include "host/cli/verify_journal.h"
 #include "host/render/arithmetic.h"
-#include <getopt.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
-
-enum { OPTION_LEAN = OPTION_OWN, OPTION_QUICK };
-
-static const struct option long_options[] = {
-    {"device", required_argument, NULL, OPTION_DEVICE},
-    {"precision", required_argument, NULL, OPTION_PRECISION},
-    {"lanes", required_argument, NULL, OPTION_LANES},
-    {"no-cache", no_argument, NULL, OPTION_NO_CACHE},
-    {"quick", no_argument, NULL, OPTION_QUICK},
-    {"lean", no_argument, NULL, OPTION_LEAN},
-    FORMAT_LONG_OPTIONS,
-    PERTURB_LONG_OPTION,
-    DRIVER_LONG_OPTIONS,
-    KEEP_KERNELS_LONG_OPTION,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint verify [CASE...] [OPTIONS]\n\n"
-    "Runs the hard cases, or those named, on a device and checks each against its bound; exit status 3 if "
-    "any fails.\n\n"
-    "      --precision P     single, strict or double (default: all that the device has)\n"
-    "      --quick           a sixteenth of the random rays, and fewer pixels\n"
-    "      --lean            build kernels of what each scene needs alone: more of them, for a slow "
-    "compiler\n" //
-    HELP_DEVICE HELP_LANES HELP_NO_CACHE HELP_DRIVER HELP_KEEP_KERNELS HELP_PERTURB HELP_FORMAT HELP_HELP;
 
 static const ResultTable verify_table = {
     .command = "verify",
@@ -75,10 +47,31 @@ static const ResultTable verify_table = {
 typedef struct {
     CommonOptions common;
     ReportOptions report;
-    bool every_precision;
     bool quick, lean;   // see VerifySettings
     VerifyChoice cases; // all if none is named
 } VerifyOptions;
+
+static const Option options_own[] = {
+    {"quick", NULL, "a sixteenth of the random rays, and fewer pixels", option_flag,
+     offsetof(VerifyOptions, quick)},
+    {"lean", NULL, "build kernels of what each scene needs alone: more of them, for a slow compiler",
+     option_flag, offsetof(VerifyOptions, lean)}};
+static const Option precision_own[] = {
+    {"precision", "P", "single, strict or double (default: all that the device has)", option_precision, 0}};
+
+static const CommandLine command_line = {
+    .usage =
+        "usage: glint verify [CASE...] [OPTIONS]\n\n"
+        "Runs the hard cases, or those named, on a device and checks each against its bound; exit status "
+        "3 if any fails.\n",
+    .groups = {OPTIONS_WITHIN(precision_own, VerifyOptions, common), OPTIONS(options_own),
+               OPTIONS_WITHIN(device_option, VerifyOptions, common),
+               COMMON_OPTION(COMMON_LANES, VerifyOptions, common),
+               COMMON_OPTION(COMMON_NO_CACHE, VerifyOptions, common),
+               OPTIONS_WITHIN(driver_options, VerifyOptions, common),
+               OPTIONS_WITHIN(keep_kernels_option, VerifyOptions, common),
+               OPTIONS_WITHIN(perturb_option, VerifyOptions, common),
+               OPTIONS_WITHIN(report_options, VerifyOptions, report)}};
 
 typedef struct {
     const VerifyOptions *options;
@@ -343,17 +336,18 @@ static int device_verify(Verification *verification, Compute *compute)
 {
     const VerifyOptions *options = verification->options;
     VerifyJournal *journal = verification->journal;
-    Precision first = options->every_precision ? PRECISION_SINGLE : options->common.precision;
-    Precision last = options->every_precision ? PRECISION_DOUBLE : options->common.precision;
+    Precision first = options->common.has_precision ? options->common.precision : PRECISION_SINGLE;
+    Precision last = options->common.has_precision ? options->common.precision : PRECISION_DOUBLE;
     if (!compute->device->fp64 && last == PRECISION_DOUBLE) {
-        if (!options->every_precision) {
+        if (options->common.has_precision) {
             fprintf(stderr, "glint: precision double: the device \"%s\" has no 64-bit floating point\n",
                     compute->device->name);
             return EXIT_USER;
         }
         last = PRECISION_STRICT;
     }
-    if (!options->every_precision && !journal->is_headed && !arithmetic_is_suitable(compute, options, first))
+    if (options->common.has_precision && !journal->is_headed &&
+        !arithmetic_is_suitable(compute, options, first))
         return EXIT_USER;
     if (report_has_text(&options->report) && !journal->is_headed) {
         printf("%s; reference of %d bits%s\n", compute->device->name, verify_reference_bits(),
@@ -441,22 +435,9 @@ static int refuse_case(const char *name)
 
 static int options_read(VerifyOptions *options, int argument_count, char **arguments)
 {
-    *options = (VerifyOptions){.every_precision = true};
-    int option;
-    bool valid;
-    while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
-        if (option == 'h') return option_help(help_text);
-        if (option == '?') return EXIT_USER;
-        if (option == OPTION_PRECISION) options->every_precision = false;
-        if (option_report(&options->report, option, optarg, &valid)) {
-            if (!valid) return EXIT_USER;
-        } else if (option == OPTION_QUICK)
-            options->quick = true;
-        else if (option == OPTION_LEAN)
-            options->lean = true;
-        else if (option_common(&options->common, option, optarg, &valid) && !valid)
-            return EXIT_USER;
-    }
+    *options = (VerifyOptions){0};
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (options->common.precision == PRECISION_CERTIFIED)
         return option_usage_fault(
             "verify", "--precision certified is only for images; choose single, strict or double");
@@ -476,7 +457,7 @@ int command_verify(int argument_count, char **arguments)
     for (size_t i = 0; verify_case_name(i); i++)
         verification.case_count += is_chosen(&options, verify_case_name(i));
     const CommonOptions *common = &options.common;
-    if (options.every_precision && options.cases.count == 0 && !options.lean && !common->no_cache &&
+    if (!options.common.has_precision && options.cases.count == 0 && !options.lean && !common->no_cache &&
         !common->kernel_folder)
         builder_start(&options);
     return verify_journal_work(verification.journal, verification_work, &verification);

@@ -6,90 +6,52 @@
 #include "host/cli/progress.h"
 #include "host/view/keys.h"
 #include "host/view/window.h"
-#include <getopt.h>
 #include <stdio.h>
 #include <string.h>
 
-enum {
-    OPTION_SIZE = OPTION_OWN,
-    OPTION_SAMPLES,
-    OPTION_BOUNCES,
-    OPTION_MIN_CONTRIBUTION,
-    OPTION_WRITE_CAMERA
-};
-
 enum { SAMPLES_DEFAULT = 16 };
-
-static const struct option long_options[] = {
-    {"size", required_argument, NULL, OPTION_SIZE},
-    {"samples", required_argument, NULL, OPTION_SAMPLES},
-    {"bounces", required_argument, NULL, OPTION_BOUNCES},
-    {"min-contribution", required_argument, NULL, OPTION_MIN_CONTRIBUTION},
-    {"write-camera", no_argument, NULL, OPTION_WRITE_CAMERA},
-    COMMON_LONG_OPTIONS,
-    SET_LONG_OPTIONS,
-    {"help", no_argument, NULL, 'h'},
-    {0},
-};
-
-static const char help_text[] =
-    "usage: glint view SCENE [OPTIONS]\n\n"
-    "      --size WxH        of the window (default: the scene's own, else 1280 wide)\n"
-    "      --samples N       per pixel, once the camera rests (default: 16)\n" //
-    HELP_BOUNCES HELP_MIN_CONTRIBUTION
-    "      --write-camera    C and K write the camera into its file, which is YAML\n" //
-    HELP_SET HELP_DEVICE HELP_PRECISION HELP_COMMON HELP_HELP;
 
 typedef struct {
     CommonOptions common;
     const char *scene;
-    uint32_t width, height; // 0 if not given
+    uint32_t size[2]; // 0 if not given
     uint32_t sample_count, bounce_count;
     double min_contribution;
     bool writes_camera;
 } ViewOptions;
 
-static bool option_take(ViewOptions *options, int option, const char *value)
-{
-    bool valid = true;
-    if (option_common(&options->common, option, value, &valid)) return valid;
-    switch (option) {
-    case OPTION_SIZE:
-        return option_size("size", value, &options->width, &options->height);
-    case OPTION_SAMPLES:
-        return option_count("samples", value, 1, SAMPLES_MAX, &options->sample_count);
-    case OPTION_BOUNCES:
-        return option_count("bounces", value, 0, BOUNCES_MAX, &options->bounce_count);
-    case OPTION_MIN_CONTRIBUTION:
-        return option_fraction("min-contribution", value, &options->min_contribution);
-    case OPTION_WRITE_CAMERA:
-        return options->writes_camera = true;
-    default:
-        return false;
-    }
-}
+static const Option options_own[] = {
+    {"size", "WxH", "of the window (default: the scene's own, else 1280 wide)", option_size,
+     offsetof(ViewOptions, size)},
+    {"samples", "N", "per pixel, once the camera rests (default: 16)", option_count,
+     offsetof(ViewOptions, sample_count), NUMBERS(1, SAMPLES_MAX)},
+    BOUNCES_OPTION(ViewOptions, bounce_count),
+    MIN_CONTRIBUTION_OPTION(ViewOptions, min_contribution),
+    {"write-camera", NULL, "C and K write the camera into its file, which is YAML", option_flag,
+     offsetof(ViewOptions, writes_camera)}};
 
-// Prints the keys and the options.
-static int help_print(void)
+static void keys_print(void)
 {
-    const char *options = strchr(help_text, '\n') + 2;
-    printf("%.*s", (int)(options - help_text), help_text);
 #define HELP_KEY(input, effect) printf("  %-12s  %s\n", input, effect);
     VIEW_KEY_LIST(HELP_KEY)
-    printf("\n%s", options);
-    return EXIT_DONE;
+    putchar('\n');
 }
+
+static const CommandLine command_line = {.usage = "usage: glint view SCENE [OPTIONS]\n",
+                                         .usage_print = keys_print,
+                                         .groups = {OPTIONS(options_own),
+                                                    OPTIONS_WITHIN(set_options, ViewOptions, common),
+                                                    OPTIONS_WITHIN(device_option, ViewOptions, common),
+                                                    OPTIONS_WITHIN(precision_option, ViewOptions, common),
+                                                    OPTIONS_WITHIN(common_options, ViewOptions, common)}};
 
 static int options_read(ViewOptions *options, int argument_count, char **arguments)
 {
     *options = (ViewOptions){.common.precision = PRECISION_SINGLE,
                              .sample_count = SAMPLES_DEFAULT,
                              .bounce_count = BOUNCES_DEFAULT};
-    int option;
-    while ((option = getopt_long(argument_count, arguments, "h", long_options, NULL)) != -1) {
-        if (option == 'h') return help_print();
-        if (option == '?' || !option_take(options, option, optarg)) return EXIT_USER;
-    }
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
     options->scene = arguments[optind];
     const char *camera = options->common.camera ? options->common.camera : options->scene;
@@ -126,10 +88,10 @@ static int scene_view(ViewOptions *options, const Device *device)
         .frames = {.device = device,
                    .scene_path = options->scene,
                    .scene_options = scene_options_of(&options->common),
-                   .settings = settings_whole(&options->common, options->width, options->height),
+                   .settings = settings_whole(&options->common, options->size[0], options->size[1]),
                    .save = image_save,
                    .save_context = options},
-        .size = {options->width, options->height},
+        .size = {options->size[0], options->size[1]},
         .writes_camera = options->writes_camera,
         .stop = progress_interrupted,
     };

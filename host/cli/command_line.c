@@ -1,0 +1,308 @@
+#include "host/cli/command_line.h"
+
+#include "host/base/fault.h"
+#include "host/base/memory.h"
+#include "host/base/text.h"
+#include "host/image/image.h"
+#include "host/scene/scene.h"
+#include <assert.h>
+#include <dirent.h>
+#include <errno.h>
+#include <getopt.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { HELP_COLUMN = 24, HELP_WIDTH = 110, LIST_INDENT = 2, FIRST_CODE = 256, OPTIONS_MAX = 64 };
+
+static const Option help_option[] = {{"help", NULL, "print this help", NULL, .letter = 'h'}};
+
+void *option_field(const Option *option, void *options)
+{
+    return (char *)options + option->offset;
+}
+
+bool option_fault(const Option *option, const char *value, const char *expected, ...)
+{
+    va_list arguments;
+    va_start(arguments, expected);
+    fprintf(stderr, "glint: --%s: expected ", option->name);
+    vfprintf(stderr, expected, arguments);
+    va_end(arguments);
+    fprintf(stderr, ", not \"%s\"\n", value);
+    return false;
+}
+
+bool option_flag(const Option *option, const char *value, void *options)
+{
+    (void)value;
+    return *(bool *)option_field(option, options) = true;
+}
+
+bool option_text(const Option *option, const char *value, void *options)
+{
+    *(const char **)option_field(option, options) = value;
+    return true;
+}
+
+bool digits_read(const char *value, const char **end, uint64_t *result)
+{
+    *result = 0;
+    const char *at = value;
+    for (; *at >= '0' && *at <= '9' && *result < 1u << 31; at++)
+        *result = *result * 10 + (uint64_t)(*at - '0');
+    *end = at;
+    return at > value;
+}
+
+bool option_count(const Option *option, const char *value, void *options)
+{
+    const char *end;
+    uint64_t number;
+    if (!digits_read(value, &end, &number) || *end != '\0' || (double)number < option->low ||
+        (double)number > option->high)
+        return option_fault(option, value, "an integer from %.0f to %.0f", option->low, option->high);
+    *(uint32_t *)option_field(option, options) = (uint32_t)number;
+    return true;
+}
+
+bool option_number(const Option *option, const char *value, void *options)
+{
+    char *end;
+    const double number = strtod(value, &end);
+    const bool has_low = option->is_above ? number > option->low : number >= option->low;
+    if (end != value && *end == '\0' && has_low && number <= option->high && isfinite(number)) {
+        *(double *)option_field(option, options) = number;
+        return true;
+    }
+    if (option->is_above) return option_fault(option, value, "a number above %g", option->low);
+    if (option->high == INFINITY) return option_fault(option, value, "a number of at least %g", option->low);
+    return option_fault(option, value, "a number from %g to %g", option->low, option->high);
+}
+
+bool option_size(const Option *option, const char *value, void *options)
+{
+    const uint64_t largest = IMAGE_SIDE_MAX;
+    const char *at;
+    uint64_t width, height;
+    if (!digits_read(value, &at, &width) || (*at != 'x' && *at != 'X') ||
+        !digits_read(at + 1, &at, &height) || *at != '\0' || width < 1 || height < 1 || width > largest ||
+        height > largest)
+        return option_fault(option, value, "WIDTHxHEIGHT, such as 16x4, each from 1 to %u",
+                            (unsigned)largest);
+    uint32_t *size = option_field(option, options);
+    size[0] = (uint32_t)width;
+    size[1] = (uint32_t)height;
+    return true;
+}
+
+// Prints the names and, if one is near the value, the guess that it was meant. Returns false.
+static bool names_fault(const Option *option, const char *value, const char *expected)
+{
+    fprintf(stderr, "glint: --%s: expected %s", option->name, expected);
+    for (size_t i = 0; i < option->name_count; i++)
+        fprintf(stderr, "%s%s", i == 0 ? "" : i + 1 == option->name_count ? " or " : ", ", option->names[i]);
+    const char *near = text_nearest(value, option->names, option->name_count);
+    fprintf(stderr, ", not \"%s\"", value);
+    if (near) fprintf(stderr, "; did you mean %s?", near);
+    fputc('\n', stderr);
+    return false;
+}
+
+// Returns the index of the name, or name_count.
+static size_t name_find(const Option *option, const char *name)
+{
+    size_t i = 0;
+    while (i < option->name_count && strcmp(option->names[i], name) != 0)
+        i++;
+    return i;
+}
+
+bool option_choice(const Option *option, const char *value, void *options)
+{
+    const size_t index = name_find(option, value);
+    if (index == option->name_count) return names_fault(option, value, "");
+    *(unsigned *)option_field(option, options) = (unsigned)index;
+    return true;
+}
+
+bool option_list(const Option *option, const char *value, OptionReader *read, void *items, size_t item_size,
+                 size_t most, size_t *count)
+{
+    Option item = *option;
+    item.offset = 0;
+    *count = 0;
+    for (const char *at = value;; at++) {
+        const size_t length = strcspn(at, ",");
+        char *word = memory_copy_part(at, length);
+        const bool has_room = *count < most;
+        if (!has_room) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option->name, most);
+        const bool is_read = has_room && read(&item, word, (char *)items + *count * item_size);
+        free(word);
+        if (!is_read) return false;
+        (*count)++;
+        at += length;
+        if (*at == '\0') return true;
+    }
+}
+
+static bool name_read(const Option *option, const char *value, void *index)
+{
+    *(size_t *)index = name_find(option, value);
+    return *(size_t *)index < option->name_count ||
+           names_fault(option, value, "names separated by commas, of ");
+}
+
+bool option_set(const Option *option, const char *value, void *options)
+{
+    enum { NAMES_MAX = 64 };
+    size_t indices[NAMES_MAX], count;
+    if (!option_list(option, value, name_read, indices, sizeof *indices, NAMES_MAX, &count)) return false;
+    unsigned set = 0;
+    for (size_t i = 0; i < count; i++)
+        set |= 1u << indices[i];
+    *(unsigned *)option_field(option, options) = set;
+    return true;
+}
+
+bool option_folder(const Option *option, const char *path, void *options)
+{
+    if (mkdir(path, 0777) != 0 && errno != EEXIST) {
+        fprintf(stderr, "glint: --%s: cannot create the folder '%s': %s\n", option->name, path,
+                strerror(errno));
+        return false;
+    }
+    if (access(path, W_OK | X_OK) == 0) return option_text(option, path, options);
+    fprintf(stderr, "glint: --%s: cannot write to '%s': %s\n", option->name, path, strerror(errno));
+    return false;
+}
+
+bool option_new_folder(const Option *option, const char *path, void *options)
+{
+    if (!option_folder(option, path, options)) return false;
+    DIR *folder = opendir(path);
+    if (!folder) {
+        fprintf(stderr, "glint: --%s: cannot read the folder '%s': %s\n", option->name, path,
+                strerror(errno));
+        return false;
+    }
+    bool is_empty = true;
+    for (const struct dirent *item; (item = readdir(folder));)
+        is_empty &= strcmp(item->d_name, ".") == 0 || strcmp(item->d_name, "..") == 0;
+    closedir(folder);
+    if (!is_empty) fprintf(stderr, "glint: --%s: the folder '%s' is not empty\n", option->name, path);
+    return is_empty;
+}
+
+// Prints the text from HELP_COLUMN on, wrapped; the items of a list are indented.
+static void help_wrap(const char *text)
+{
+    size_t column = HELP_COLUMN;
+    for (const char *at = text; *at != '\0';) {
+        if (*at == '\n') {
+            column = HELP_COLUMN + LIST_INDENT;
+            printf("\n%*s", (int)column, "");
+            at++;
+        }
+        const size_t length = strcspn(at, " \n");
+        if (column + 1 + length > HELP_WIDTH) {
+            printf("\n%*s", HELP_COLUMN, "");
+            column = HELP_COLUMN;
+        } else if (at > text && at[-1] == ' ') {
+            putchar(' ');
+            column++;
+        }
+        printf("%.*s", (int)length, at);
+        column += length;
+        at += length;
+        if (*at == ' ') at++;
+    }
+    putchar('\n');
+}
+
+static void options_print(const Option *options, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const Option *option = &options[i];
+        const char letter[] = {'-', option->letter, ',', '\0'};
+        const char *argument = option->argument ? option->argument : "";
+        const int length = printf("  %3s --%s%s%s", option->letter ? letter : "", option->name,
+                                  *argument && *argument != '[' ? " " : "", argument);
+        if (length + 2 > HELP_COLUMN)
+            printf("\n%*s", HELP_COLUMN, "");
+        else
+            printf("%*s", HELP_COLUMN - length, "");
+        help_wrap(option->help);
+    }
+}
+
+static int help_print(const CommandLine *line)
+{
+    printf("%s\n", line->usage);
+    if (line->usage_print) line->usage_print();
+    for (const OptionGroup *group = line->groups; group->items; group++) {
+        if (group->heading) printf("\n%s\n", group->heading);
+        options_print(group->items, group->count);
+    }
+    options_print(help_option, 1);
+    return EXIT_DONE;
+}
+
+int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments)
+{
+    struct {
+        const Option *option;
+        void *fields;
+    } listed[OPTIONS_MAX];
+    struct option long_options[OPTIONS_MAX + 2] = {0};
+    char letters[2 * OPTIONS_MAX + 2] = "", *letter = letters;
+    size_t count = 0;
+    for (const OptionGroup *group = line->groups; group->items; group++)
+        for (size_t i = 0; i < group->count; i++, count++) {
+            assert(count < OPTIONS_MAX);
+            const Option *option = listed[count].option = &group->items[i];
+            listed[count].fields = (char *)options + group->offset;
+            const int has_argument = !option->argument          ? no_argument
+                                     : *option->argument == '[' ? optional_argument
+                                                                : required_argument;
+            const int code = option->letter ? option->letter : FIRST_CODE + (int)count;
+            long_options[count] = (struct option){option->name, has_argument, NULL, code};
+            if (option->letter) *letter++ = option->letter;
+            if (option->letter && has_argument == required_argument) *letter++ = ':';
+        }
+    if (line->usage) {
+        long_options[count] = (struct option){"help", no_argument, NULL, 'h'};
+        *letter = 'h';
+    }
+    optind = 0; // restarts getopt
+    for (int code; (code = getopt_long(argument_count, arguments, letters, long_options, NULL)) != -1;) {
+        if (code == 'h') return help_print(line);
+        if (code == '?') return EXIT_USER;
+        size_t i = 0;
+        while (long_options[i].val != code)
+            i++;
+        if (!listed[i].option->read(listed[i].option, optarg, listed[i].fields)) return EXIT_USER;
+    }
+    return OPTIONS_READ;
+}
+
+int option_usage_fault(const char *command, const char *what)
+{
+    fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
+    return EXIT_USER;
+}
+
+bool option_only_scene(const char *command, int argument_count, char **arguments)
+{
+    if (optind + 1 == argument_count) return true;
+    if (optind == argument_count)
+        option_usage_fault(command, "no scene given");
+    else
+        fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", command,
+                arguments[optind + 1], command);
+    return false;
+}
