@@ -50,7 +50,7 @@ static inline ObjectRange object_range(const Scene *scene, uint id)
 {
     ObjectRange range = outside_instances();
     if (!HAS_INSTANCES) return range;
-    const uint count = ((global const uint *)scene->header->counts)[KIND_INSTANCES];
+    const uint count = ((global const uint *)scene->header->counts)[TYPE_INSTANCES];
     uint low = 0, high = count; // `low` instances begin no later than the id
     while (low < high) {
         const uint middle = (low + high) >> 1;
@@ -70,11 +70,11 @@ static inline ObjectRange object_range(const Scene *scene, uint id)
     return instance_range(scene, ids.x, ids.y, ids.w);
 }
 
-// Returns kind_index_material of an id in the range.
+// Returns type_index_material of an id in the range.
 static inline uint4 range_entry(const Scene *scene, const ObjectRange *range, scalar_integer id)
 {
-    if (!HAS_INSTANCES) return scene->objects[id].kind_index_material;
-    uint4 entry = scene->objects[range->entry + ((uint)id - range->first)].kind_index_material;
+    if (!HAS_INSTANCES) return scene->objects[id].type_index_material;
+    uint4 entry = scene->objects[range->entry + ((uint)id - range->first)].type_index_material;
     if (range->material != 0) entry.z = range->material - 1;
     return entry;
 }

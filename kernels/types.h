@@ -142,7 +142,7 @@ typedef struct {
     // cone the radius at the base and the slope, of a torus both radii, of a paraboloid k. Rays that start
     // beyond twice inverses[1].w from 0 are moved to be mapped.
     scalar4 sizes;
-    uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED, z: the unit shape's KIND_…
+    uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED, z: the unit shape's TYPE_…
 } Oval;
 
 // Every shape: feature, struct, name, name of its array. Adding a shape begins here (docs/adding-a-shape.md).
@@ -176,18 +176,18 @@ enum { INSTANCE_CONDITION_MAX = 32 };
 // (docs/numerics.md).
 enum { INSTANCE_RAY_SLACK = 10 };
 
-// Every kind of primitive: the shapes and the instance.
+// Every type of primitive: the shapes and the instance.
 // clang-format off
 #define PRIMITIVE_LIST(PRIMITIVE) \
     SHAPE_LIST(PRIMITIVE)         \
     PRIMITIVE(INSTANCES, Instance, instance, instances)
 // clang-format on
 
-#define SHAPE_KIND(feature, Type, name, names) KIND_##feature,
-enum { PRIMITIVE_LIST(SHAPE_KIND) KIND_COUNT, KIND_QUARTETS = (KIND_COUNT + 3) / 4 };
+#define SHAPE_TYPE(feature, Type, name, names) TYPE_##feature,
+enum { PRIMITIVE_LIST(SHAPE_TYPE) TYPE_COUNT, TYPE_QUARTETS = (TYPE_COUNT + 3) / 4 };
 
 // A BVH node: the boxes of up to BVH_WIDTH children, as arrays of low x, low y, low z, high x, high y and
-// high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one kind. With
+// high z. A child is another node, or a leaf of the primitives first .. first + count - 1 of one type. With
 // several lanes a leaf of triangles or spheres is a block. The box of an empty slot is inverted, low above
 // high.
 //
@@ -200,7 +200,7 @@ enum { BVH_LOW = 0, BVH_HIGH = 3, BVH_PLANES = 6 };
 typedef struct {
     scalar4 planes[BVH_PLANES * BVH_QUARTER];
     uint4 child_index[BVH_QUARTER]; // the child's node, first primitive, or its block
-    uint4 child_kind[BVH_QUARTER];  // BVH_NODE, BVH_EMPTY, or a leaf's count << 8 | kind, at most 16 bits
+    uint4 child_type[BVH_QUARTER];  // BVH_NODE, BVH_EMPTY, or a leaf's count << 8 | type, at most 16 bits
 } BvhNode;
 #endif
 
@@ -236,7 +236,7 @@ typedef struct {
 
 // A bounding sphere as seen from a common origin: a point that all rays of a packet pass through, such as the
 // eye or a point or spot light. Each common origin has a row of SceneHeader's cull_spheres.x spheres: one for
-// the whole BVH, then one for each primitive outside it, kind by kind. Planes have none.
+// the whole BVH, then one for each primitive outside it, type by type. Planes have none.
 //
 // xyz is v, from the common origin to the center. w is the origin's power |v|^2 - radius^2, lowered by
 // CULL_SPHERE_SLACK u |v|^2. With v = 0, -CULL_SPHERE_MAX is never culled (unbounded, or out of float's
@@ -271,7 +271,7 @@ typedef struct {
 
 // The shape and the material that an object's id refers to. Ids are indices unless there are instances.
 typedef struct {
-    uint4 kind_index_material; // x: KIND_…, y: index in that shape's array, z: index of the material
+    uint4 type_index_material; // x: TYPE_…, y: index in that shape's array, z: index of the material
 } ObjectEntry;
 
 typedef struct {
@@ -365,7 +365,7 @@ enum {
 // The ray counters of a counting build.
 enum { RAYS_CAMERA, RAYS_CAMERA_HITS, RAYS_REFLECTED, RAYS_REFRACTED, RAYS_SHADOW, RAYS_COUNT };
 
-enum { LIGHT_KIND_POINT, LIGHT_KIND_DIRECTIONAL, LIGHT_KIND_SPOT };
+enum { LIGHT_TYPE_POINT, LIGHT_TYPE_DIRECTIONAL, LIGHT_TYPE_SPOT };
 
 // The area that a light shines from: a rectangle or an ellipse around its position, the half of a sphere that
 // faces the surface, a triangle, or the sky.
@@ -400,7 +400,7 @@ typedef struct {
     // position - (across_u + across_v) / 4. across_u.w: a sphere's radius; of the sky, the factor by which
     // its color and both ranges of a cell are multiplied to give a part of `color`.
     scalar4 across_u, across_v;
-    uint4 kind; // x: LIGHT_KIND_…, y: LIGHT_AREA_…
+    uint4 type; // x: LIGHT_TYPE_…, y: LIGHT_AREA_…
 } Light;
 
 enum { CAMERA_ORTHOGRAPHIC = 1, CAMERA_EQUIRECTANGULAR };
@@ -439,8 +439,8 @@ typedef struct {
     uint4 bounces;                   // x: largest depth
     uint4 cull_spheres;              // x: number per common origin, 0 if there are none
     uint4 sky_texture;               // as a material's texture
-    uint4 counts[KIND_QUARTETS];     // primitives by KIND_…
-    uint4 bvh_counts[KIND_QUARTETS]; // those of them in the BVH, which come first
+    uint4 counts[TYPE_QUARTETS];     // primitives by TYPE_…
+    uint4 bvh_counts[TYPE_QUARTETS]; // those of them in the BVH, which come first
 } SceneHeader;
 
 // The arena is one buffer with the header followed by these arrays, because devices may allow a kernel only 8

@@ -108,5 +108,5 @@ static inline Scene scene_seen_from(Vector3 from, double tangent)
 static inline void point_light_add(Scene *scene, Vector3 position, double intensity)
 {
     const Color color = {intensity, intensity, intensity};
-    array_push(scene->lights, ((Light){.kind = LIGHT_POINT, .color = color, .position = position}));
+    array_push(scene->lights, ((Light){.type = LIGHT_POINT, .color = color, .position = position}));
 }

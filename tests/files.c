@@ -19,9 +19,9 @@ static char *folder_make(void)
     return memory_copy_text(folder);
 }
 
-static int remove_one(const char *path, const struct stat *status, int kind, struct FTW *place)
+static int remove_one(const char *path, const struct stat *status, int type, struct FTW *place)
 {
-    (void)status, (void)kind, (void)place;
+    (void)status, (void)type, (void)place;
     return remove(path);
 }
 

@@ -59,7 +59,7 @@ RandomRay random_ray(const RandomShape *shape, Random *random)
     Vector3 eye = vector_add(center, vector_scale(random_unit_vector(random), distance));
     Vector3 near = vector_add(center, vector_scale(random_in_sphere(random), 1.1 * radius));
     Vector3 axis;
-    if (shape->object.kind == SHAPE_TORUS && random_coin(random)) return torus_ray(shape, random);
+    if (shape->object.type == SHAPE_TORUS && random_coin(random)) return torus_ray(shape, random);
     switch (random_bits(random) % 8) {
     case 0:
         return ray_between(vector_add(center, vector_scale(random_in_sphere(random), 0.3 * radius)), eye,

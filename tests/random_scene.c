@@ -41,10 +41,10 @@ static Material random_material(Random *random, size_t index)
     return material;
 }
 
-// Makes a shape an oval around the same point, if it is a kind that can be one.
+// Makes a shape an oval around the same point, if it is a type that can be one.
 static void object_stretch(Scene *scene, Object *object, Vector3 center)
 {
-    if (object->kind == SHAPE_BOX || object->kind == SHAPE_PLANE || object->kind == SHAPE_TRIANGLE) return;
+    if (object->type == SHAPE_BOX || object->type == SHAPE_PLANE || object->type == SHAPE_TRIANGLE) return;
     const Affine stretch = {
         {{1, 0.3, 0, -0.3 * center.y}, {0, 0.75, 0, 0.25 * center.y}, {0, 0, 1.25, -0.25 * center.z}}};
     const char *why = object_transform(scene, object, &stretch);
@@ -63,10 +63,10 @@ static Object random_object(Scene *scene, Random *random, size_t index)
         if (shape.radius > 3 || (!form->bounded && !first)) continue;
         Object *object = &shape.object;
         // a plane behind the objects and a narrow cone next to them, not across the view
-        if (form->kind == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
-        if (form->kind == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
+        if (form->type == SHAPE_PLANE) object->as.plane.point = vector_scale(object->as.plane.normal, 0x1p5);
+        if (form->type == SHAPE_CONE && !form->bounded) object->as.cone.slope *= 0x1p-4;
         // the order of a triangle's vertices distinguishes glass from air, and the mirror reverses it
-        object->material = (uint32_t)index % (form->kind == SHAPE_TRIANGLE ? 2 : 4);
+        object->material = (uint32_t)index % (form->type == SHAPE_TRIANGLE ? 2 : 4);
         if (!first && index % 4 == 0) object_stretch(scene, object, shape.center);
         return *object;
     }
@@ -82,7 +82,7 @@ Scene random_scene(uint64_t seed, size_t object_count)
         array_push(scene.objects, random_object(&scene, &random, i));
     // from where the plane is not in the way
     size_t plane = 0;
-    while (scene.objects.items[plane].kind != SHAPE_PLANE)
+    while (scene.objects.items[plane].type != SHAPE_PLANE)
         plane++;
     Vector3 up = vector_normalize(scene.objects.items[plane].as.plane.normal);
     Vector3 position = vector_subtract(random_point(&random, 10, 13), vector_scale(up, 6));
@@ -91,13 +91,13 @@ Scene random_scene(uint64_t seed, size_t object_count)
                             .up = random_point(&random, 1, 1),
                             .half_tangent = random_between(&random, 0.4, 0.8)};
     for (int i = 0; i < 4; i++) {
-        static const LightKind kinds[] = {LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT, LIGHT_POINT};
-        Light light = {.kind = kinds[i], .color = random_color(&random)};
+        static const LightType types[] = {LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT, LIGHT_POINT};
+        Light light = {.type = types[i], .color = random_color(&random)};
         light.position = vector_subtract(random_point(&random, 5, 15), vector_scale(up, 8));
         light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
         light.half_angle = random_between(&random, 15, 40);
         light.penumbra = random_between(&random, 0, 10);
-        if (light.kind == LIGHT_POINT) {
+        if (light.type == LIGHT_POINT) {
             light.color = vector_scale(light.color, 100);
             light.fading[0] = random_between(&random, 0, 1);
             light.fading[2] = 1;

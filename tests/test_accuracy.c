@@ -1,4 +1,4 @@
-// Checks the errors of images made by hand, in which the count of each kind is known, and the conclusions
+// Checks the errors of images made by hand, in which the count of each type is known, and the conclusions
 // from errors and times. tests/test_accuracy.py checks the same figures of rendered images against an
 // independent implementation.
 #include "host/base/memory.h"
@@ -86,8 +86,8 @@ TEST(test_equal)
     assert_int_equal(errors.image.count, 3 * PIXELS);
     assert_true(errors.shading.rmse == 0 && errors.image.rmse == 0 && isinf(errors.image.psnr));
     assert_true(errors.t_relative.largest == 0 && errors.normal.largest == 0);
-    for (size_t kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
-        assert_false(errors.worst[kind].found);
+    for (size_t type = 0; type < ACCURACY_MEASURE_COUNT; type++)
+        assert_false(errors.worst[type].found);
     film_free(&reference);
     film_free(&variant);
 }

@@ -47,13 +47,13 @@ static Object aligned_object(size_t index, Vector3 center, double size)
     const Vector3 up = {0, size, 0};
     switch (index % 4) {
     case 0:
-        return (Object){.kind = SHAPE_BOX, .as.box = {center, vector_add(center, (Vector3){size, size, 0})}};
+        return (Object){.type = SHAPE_BOX, .as.box = {center, vector_add(center, (Vector3){size, size, 0})}};
     case 1:
-        return (Object){.kind = SHAPE_DISC, .as.disc = {center, up, size / 2}};
+        return (Object){.type = SHAPE_DISC, .as.disc = {center, up, size / 2}};
     case 2:
-        return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {center, up, size / 3, true, true, false}};
+        return (Object){.type = SHAPE_CYLINDER, .as.cylinder = {center, up, size / 3, true, true, false}};
     default:
-        return (Object){.kind = SHAPE_CONE, .as.cone = {center, up, {size / 2, 0}, 0, true, true, false}};
+        return (Object){.type = SHAPE_CONE, .as.cone = {center, up, {size / 2, 0}, 0, true, true, false}};
     }
 }
 
@@ -62,7 +62,7 @@ static Scene random_scene(size_t count)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
-    const ShapeForm triangle = {.kind = SHAPE_TRIANGLE};
+    const ShapeForm triangle = {.type = SHAPE_TRIANGLE};
     Scene scene = {0};
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
     // what a ray crosses twice attenuates it twice
@@ -77,7 +77,7 @@ static Scene random_scene(size_t count)
         object.material = random_bits(&random_state) % 3 == 0;
         array_push(scene.objects, object);
     }
-    array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, -14, 0}, {0, 1, 0}}}));
+    array_push(scene.objects, ((Object){.type = SHAPE_PLANE, .as.plane = {{0, -14, 0}, {0, 1, 0}}}));
     return scene;
 }
 
@@ -87,12 +87,12 @@ static Vector3 delicate_point(const Scene *scene)
 {
     const Object *object = &scene->objects.items[random_bits(&random_state) % scene->objects.count];
     double part = random_coin(&random_state) ? 0 : random_between(&random_state, 0, 1);
-    if (object->kind == SHAPE_TRIANGLE) {
+    if (object->type == SHAPE_TRIANGLE) {
         const Vector3 *vertices = object->as.triangle.vertices;
         return vector_add(vertices[0], vector_scale(vector_subtract(vertices[1], vertices[0]), part));
     }
     Bounds box;
-    if (!shape_ops[object->kind]->bounds(scene, object, &box)) return random_cube_point(&random_state, 10);
+    if (!shape_ops[object->type]->bounds(scene, object, &box)) return random_cube_point(&random_state, 10);
     if (random_coin(&random_state)) return (Vector3){box.max.x, box.min.y, box.max.z};
     Vector3 center = vector_scale(vector_add(box.min, box.max), 0.5);
     return (Vector3){box.max.x, center.y, center.z};
@@ -161,7 +161,7 @@ TEST(no_hit_depends_on_the_tree)
                 precision_names[runs[run].precision], i, ray->origin[0], ray->origin[1], ray->origin[2],
                 ray->direction[0], ray->direction[1], ray->direction[2], (int)on[i].object, on[i].t,
                 (int)off[i].object,
-                off[i].object == UINT32_MAX ? "miss" : shape_names[scene.objects.items[off[i].object].kind],
+                off[i].object == UINT32_MAX ? "miss" : shape_names[scene.objects.items[off[i].object].type],
                 off[i].t);
         }
         assert_true(hit_count > count / 3);
@@ -318,7 +318,7 @@ static Scene closed_scene(Vector3 center, double radius)
     Scene scene = {0};
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
     array_push(scene.meshes, mesh);
-    array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+    array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
     return scene;
 }
 

@@ -16,7 +16,7 @@ static Random random_state;
 typedef struct {
     const Bvh *bvh;
     const Bounds *boxes;
-    const uint8_t *kinds;
+    const uint8_t *types;
     uint8_t *seen;
     unsigned depth;
     unsigned wide_depth;
@@ -33,10 +33,10 @@ static void leaf_check(TreeCheck *check, const BvhChild *leaf)
 {
     assert_true(leaf->first + leaf->count <= check->bvh->primitive_count);
     const uint32_t *order = check->bvh->order + leaf->first;
-    assert_true(leaf->count <= leaf_size_max(check->bvh->leaves, check->kinds[order[0]]));
+    assert_true(leaf->count <= leaf_size_max(check->bvh->leaves, check->types[order[0]]));
     for (uint32_t i = 0; i < leaf->count; i++) {
         assert_int_equal(check->seen[order[i]]++, 0);
-        assert_int_equal(check->kinds[order[i]], check->kinds[order[0]]);
+        assert_int_equal(check->types[order[i]], check->types[order[0]]);
         assert_contains(&leaf->box, &check->boxes[order[i]]);
     }
 }
@@ -84,11 +84,11 @@ static void wide_node_check(TreeCheck *check, const BvhWide *wide, unsigned widt
     }
 }
 
-static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, unsigned width)
+static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *types, unsigned width)
 {
     BvhWide wide;
     bvh_widen(&wide, bvh, width);
-    TreeCheck check = {bvh, boxes, kinds, memory_allocate_zeroed(bvh->primitive_count, 1), 1, 0};
+    TreeCheck check = {bvh, boxes, types, memory_allocate_zeroed(bvh->primitive_count, 1), 1, 0};
     wide_node_check(&check, &wide, width, 0, 1);
     for (size_t i = 0; i < bvh->primitive_count; i++)
         assert_int_equal(check.seen[i], 1);
@@ -98,39 +98,39 @@ static void wide_check(const Bvh *bvh, const Bounds *boxes, const uint8_t *kinds
     bvh_wide_free(&wide);
 }
 
-// Checks that every primitive is in exactly one leaf, that all are counted, that leaves have one kind, that
+// Checks that every primitive is in exactly one leaf, that all are counted, that leaves have one type, that
 // boxes contain everything below them, and that the depth is bounded.
-static void tree_check(const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves)
+static void tree_check(const Bounds *boxes, const uint8_t *types, size_t count, BvhLeaves leaves)
 {
     Bvh bvh;
     Stage *stage = stage_open(false);
     stage_begin(stage, "building", NULL, count + 1);
     stage_set(stage, 1);
-    bvh_build(&bvh, boxes, kinds, count, leaves, stage);
+    bvh_build(&bvh, boxes, types, count, leaves, stage);
     Text text = {0};
     double seconds;
     stage_write(stage, &text, &seconds);
     assert_string_equal(text_c(&text), "building 100%");
     text_free(&text);
     stage_close(stage);
-    TreeCheck check = {&bvh, boxes, kinds, memory_allocate_zeroed(count, 1), 0, 0};
+    TreeCheck check = {&bvh, boxes, types, memory_allocate_zeroed(count, 1), 0, 0};
     node_check(&check, 0, 1);
     for (size_t i = 0; i < count; i++)
         assert_int_equal(check.seen[i], 1);
     assert_true(check.depth <= BVH_DEPTH_MAX);
     assert_int_equal(check.depth, bvh.depth);
     for (unsigned width = BVH_WIDTH_MIN; width <= BVH_WIDTH_MAX; width *= 2)
-        wide_check(&bvh, boxes, kinds, width);
+        wide_check(&bvh, boxes, types, width);
     free(check.seen);
     bvh_free(&bvh);
 }
 
-static void trees_check(const Bounds *boxes, const uint8_t *kinds, size_t count)
+static void trees_check(const Bounds *boxes, const uint8_t *types, size_t count)
 {
     static const BvhLeaves leaves[] = {{8, 0, false}, {4, 0, false},  {8, 4, false},
                                        {8, 4, true},  {8, 16, false}, {8, 16, true}};
     for (size_t i = 0; i < COUNT_OF(leaves); i++)
-        tree_check(boxes, kinds, count, leaves[i]);
+        tree_check(boxes, types, count, leaves[i]);
 }
 
 static Bounds cube_around(Vector3 center, double half)
@@ -175,28 +175,28 @@ TEST(any_boxes_make_a_tree)
     for (int set = 0; set < SET_COUNT; set++) {
         size_t count = counts[set];
         Bounds *boxes = memory_allocate(count, sizeof *boxes);
-        uint8_t *kinds = memory_allocate_zeroed(count, 1);
+        uint8_t *types = memory_allocate_zeroed(count, 1);
         for (size_t i = 0; i < count; i++)
             boxes[i] = box_of_set(set, i, count);
-        trees_check(boxes, kinds, count);
+        trees_check(boxes, types, count);
         for (size_t i = 0; i < count; i++)
-            kinds[i] = (uint8_t)(random_bits(&random_state) % KIND_COUNT);
-        trees_check(boxes, kinds, count);
+            types[i] = (uint8_t)(random_bits(&random_state) % TYPE_COUNT);
+        trees_check(boxes, types, count);
         free(boxes);
-        free(kinds);
+        free(types);
     }
 }
 
 TEST(few_boxes_make_a_tree)
 {
     Bounds boxes[20];
-    uint8_t kinds[20];
+    uint8_t types[20];
     for (size_t count = 1; count <= 20; count++) {
         for (size_t i = 0; i < count; i++) {
             boxes[i] = cube_around(random_cube_point(&random_state, 1), 0.1);
-            kinds[i] = (uint8_t)(i % 3);
+            types[i] = (uint8_t)(i % 3);
         }
-        trees_check(boxes, kinds, count);
+        trees_check(boxes, types, count);
     }
 }
 
@@ -205,15 +205,15 @@ typedef struct {
     size_t leaf_count;
 } CylinderLeaves;
 
-static CylinderLeaves cylinder_leaves(const Bounds *boxes, const uint8_t *kinds, size_t count,
+static CylinderLeaves cylinder_leaves(const Bounds *boxes, const uint8_t *types, size_t count,
                                       BvhLeaves leaves)
 {
     CylinderLeaves found = {0};
     Bvh bvh;
-    bvh_build(&bvh, boxes, kinds, count, leaves, NULL);
+    bvh_build(&bvh, boxes, types, count, leaves, NULL);
     for (size_t i = 0; i < 2 * bvh.node_count; i++) {
         const BvhChild *child = &bvh.nodes[i / 2].children[i % 2];
-        if (child->count == 0 || bvh.kinds[child->first] != KIND_CYLINDERS) continue;
+        if (child->count == 0 || bvh.types[child->first] != TYPE_CYLINDERS) continue;
         found.cost += child->count * bounds_half_area(child->box);
         found.leaf_count++;
     }
@@ -226,17 +226,17 @@ TEST(blocks_keep_other_leaves)
 {
     enum { COUNT = 8000 };
     static Bounds boxes[COUNT];
-    static uint8_t kinds[COUNT];
+    static uint8_t types[COUNT];
     for (size_t part = 2; part <= 32; part *= 2) { // one primitive in `part` is a cylinder
         for (size_t i = 0; i < COUNT; i++) {
             boxes[i] =
                 cube_around(random_cube_point(&random_state, 10), random_between(&random_state, 0, 0.5));
-            kinds[i] = i % part == 0 ? KIND_CYLINDERS : KIND_SPHERES;
+            types[i] = i % part == 0 ? TYPE_CYLINDERS : TYPE_SPHERES;
         }
-        const CylinderLeaves without = cylinder_leaves(boxes, kinds, COUNT, (BvhLeaves){8});
+        const CylinderLeaves without = cylinder_leaves(boxes, types, COUNT, (BvhLeaves){8});
         for (int counts_blocks = 0; counts_blocks < 2; counts_blocks++) {
             const CylinderLeaves with =
-                cylinder_leaves(boxes, kinds, COUNT, (BvhLeaves){8, 16, counts_blocks});
+                cylinder_leaves(boxes, types, COUNT, (BvhLeaves){8, 16, counts_blocks});
             assert_true(with.cost <= 1.2 * without.cost);
             assert_true((double)with.leaf_count <= 1.2 * (double)without.leaf_count);
         }
@@ -265,11 +265,11 @@ TEST(planets_stay_outside_the_tree)
         CompiledScene compiled;
         MessageList messages = {0};
         assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-        assert_int_equal(compiled.bvh_counts[KIND_SPHERES], HOUSES + skies[i].in_tree);
+        assert_int_equal(compiled.bvh_counts[TYPE_SPHERES], HOUSES + skies[i].in_tree);
         // the first two objects, the larger one last
         const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
         for (uint32_t k = 0; k < 2; k++)
-            assert_int_equal(entries[k].kind_index_material.y < HOUSES + skies[i].in_tree,
+            assert_int_equal(entries[k].type_index_material.y < HOUSES + skies[i].in_tree,
                              k < skies[i].in_tree);
         compiled_scene_free(&compiled);
         scene_free(&scene);
@@ -285,13 +285,13 @@ TEST(points_make_a_tree)
                                                "objects:\n"
                                                "  - sphere: {center: [0, -3, 0], radius: 2}\n");
     for (int i = 0; i < POINTS; i++)
-        array_push(scene.objects, ((Object){.kind = SHAPE_TRIANGLE}));
+        array_push(scene.objects, ((Object){.type = SHAPE_TRIANGLE}));
     const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
     CompiledScene compiled;
     MessageList messages = {0};
     assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-    assert_int_equal(compiled.bvh_counts[KIND_TRIANGLES], POINTS);
-    assert_int_equal(compiled.bvh_counts[KIND_SPHERES], 0);
+    assert_int_equal(compiled.bvh_counts[TYPE_TRIANGLES], POINTS);
+    assert_int_equal(compiled.bvh_counts[TYPE_SPHERES], 0);
     compiled_scene_free(&compiled);
     scene_free(&scene);
 }

@@ -98,7 +98,7 @@ TEST(mesh_edges_are_certain)
     for (size_t i = 0; i + 1 < SIDE; i++)
         for (size_t k = 0; k + 1 < SIDE; k++)
             for (size_t half = 0; half < 2; half++)
-                objects[count++] = (Object){.kind = SHAPE_TRIANGLE,
+                objects[count++] = (Object){.type = SHAPE_TRIANGLE,
                                             .as.triangle.vertices = {vertices[i][k + 1], vertices[i + 1][k],
                                                                      vertices[i + half][k + half]}};
     Material material;
@@ -125,9 +125,9 @@ TEST(mesh_edges_are_certain)
 TEST(least_and_largest_numbers)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
-    Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {.normal = {0, 1, 0}}},
-                        {.kind = SHAPE_PLANE, .as.plane = {.normal = {1, 0, 0}}},
-                        {.kind = SHAPE_PLANE, .as.plane = {.point = {0, 0, 1}, .normal = {0, 0, 1}}}};
+    Object objects[] = {{.type = SHAPE_PLANE, .as.plane = {.normal = {0, 1, 0}}},
+                        {.type = SHAPE_PLANE, .as.plane = {.normal = {1, 0, 0}}},
+                        {.type = SHAPE_PLANE, .as.plane = {.point = {0, 0, 1}, .normal = {0, 0, 1}}}};
     Material material;
     Scene scene = scene_of_shapes(objects, 3, &material);
     enum { RAYS = 6000 };
@@ -167,9 +167,9 @@ TEST(open_questions_are_uncertain)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     Object objects[] = {
-        {.kind = SHAPE_SPHERE, .as.sphere = {.center = {0, 0, 5}, .radius = 1}},
-        {.kind = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},
-        {.kind = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},
+        {.type = SHAPE_SPHERE, .as.sphere = {.center = {0, 0, 5}, .radius = 1}},
+        {.type = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},
+        {.type = SHAPE_SPHERE, .as.sphere = {.center = {9, 0, 5}, .radius = 1}},
     };
     Material material;
     Scene scene = scene_of_shapes(objects, 3, &material);

@@ -70,27 +70,27 @@ static Object flat_in_view(size_t index)
     const Vector3 center = vector_add(point, vector_scale(aside, size));
     switch (index % 5) {
     case 0:
-        return (Object){.kind = SHAPE_SPHERE,
+        return (Object){.type = SHAPE_SPHERE,
                         .as.sphere = {vector_nudge(center), nudge(size), .only_inside = index % 20 == 0}};
     case 1: { // an edge through the point
         const Vector3 way = vector_scale(random_unit_vector(&random_state), size);
-        return (Object){.kind = SHAPE_TRIANGLE,
+        return (Object){.type = SHAPE_TRIANGLE,
                         .as.triangle.vertices = {vector_nudge(vector_add(point, way)),
                                                  vector_nudge(vector_subtract(point, way)),
                                                  vector_nudge(vector_add(center, way))}};
     }
     case 2: // a triangle seen nearly edge-on
-        return (Object){.kind = SHAPE_TRIANGLE,
+        return (Object){.type = SHAPE_TRIANGLE,
                         .as.triangle.vertices = {
                             vector_nudge(point), vector_nudge(vector_add(point, vector_scale(along, size))),
                             vector_nudge(vector_add(center, vector_scale(along, 0.5 * size)))}};
     case 3: { // a rim through the point
         const Vector3 normal = vector_cross(aside, random_unit_vector(&random_state));
-        return (Object){.kind = SHAPE_DISC, .as.disc = {vector_nudge(center), normal, nudge(size)}};
+        return (Object){.type = SHAPE_DISC, .as.disc = {vector_nudge(center), normal, nudge(size)}};
     }
     default: // a corner at the point, whose edges the ray hits
         return (Object){
-            .kind = SHAPE_BOX,
+            .type = SHAPE_BOX,
             .as.box = {vector_nudge(point), vector_add(point, (Vector3){size, 0.5 * size, size})}};
     }
 }
@@ -115,7 +115,7 @@ static Object round_in_view(size_t index)
     case 1: {
         const Vector3 from = vector_subtract(vector_subtract(point, vector_scale(normal, radius)),
                                              vector_scale(across, length * back));
-        return (Object){.kind = SHAPE_CYLINDER,
+        return (Object){.type = SHAPE_CYLINDER,
                         .as.cylinder = {vector_nudge(from), vector_nudge(vector_scale(across, length)),
                                         nudge(radius), true, caps, !caps && index % 12 == 0}};
     }
@@ -123,7 +123,7 @@ static Object round_in_view(size_t index)
         const double height = radius / slope; // to the apex
         const Vector3 from = vector_subtract(vector_subtract(point, vector_scale(radial, radius)),
                                              vector_scale(axis, height * back));
-        return (Object){.kind = SHAPE_CONE,
+        return (Object){.type = SHAPE_CONE,
                         .as.cone = {.from = vector_nudge(from),
                                     .axis = vector_nudge(vector_scale(axis, -height)),
                                     .radius = {nudge(radius * (1 + back)), 0},
@@ -134,7 +134,7 @@ static Object round_in_view(size_t index)
         const double k = 2 * radius * slope, height = radius * radius / k;
         const Vector3 apex =
             vector_subtract(vector_subtract(point, vector_scale(radial, radius)), vector_scale(axis, height));
-        return (Object){.kind = SHAPE_PARABOLOID,
+        return (Object){.type = SHAPE_PARABOLOID,
                         .as.paraboloid = {.apex = vector_nudge(apex),
                                           .axis = vector_nudge(axis),
                                           .focal_length = nudge(k / 4),
@@ -146,7 +146,7 @@ static Object round_in_view(size_t index)
         const double minor = radius * random_between(&random_state, 0.2, 0.7);
         const Vector3 outward = index % 6 == 4 ? radial : vector_scale(radial, -1);
         const Vector3 circle = vector_subtract(point, vector_scale(normal, minor));
-        return (Object){.kind = SHAPE_TORUS,
+        return (Object){.type = SHAPE_TORUS,
                         .as.torus = {vector_nudge(vector_subtract(circle, vector_scale(outward, radius))),
                                      vector_nudge(axis), nudge(radius), nudge(minor)}};
     }
@@ -224,17 +224,17 @@ static Object ground(Family family, unsigned seed)
     const double radius = random_power(&random_state, 4, 7.5), depth = radius - floor_y;
     const Vector3 aside = {random_between(&random_state, -1, 1), 0, random_between(&random_state, -1, 1)};
     if (family == PLANETS && seed % 2 == 0)
-        return (Object){.kind = SHAPE_SPHERE, .as.sphere = {{0, -depth, 0}, radius, false}};
+        return (Object){.type = SHAPE_SPHERE, .as.sphere = {{0, -depth, 0}, radius, false}};
     if (family == PLANETS)
-        return (Object){.kind = SHAPE_CYLINDER,
+        return (Object){.type = SHAPE_CYLINDER,
                         .as.cylinder = {.from = {0, -depth, 0}, .axis = aside, .radius = radius}};
     if (family == ROUND && seed % 3 == 1)
-        return (Object){.kind = SHAPE_CYLINDER,
+        return (Object){.type = SHAPE_CYLINDER,
                         .as.cylinder = {.from = {0, floor_y - 7, 0}, .axis = aside, .radius = 7}};
     if (family == ROUND && seed % 3 == 2)
-        return (Object){.kind = SHAPE_CONE,
+        return (Object){.type = SHAPE_CONE,
                         .as.cone = {.from = {0.3, floor_y, 0.2}, .axis = {0.1, 1, 0.2}, .slope = 2}};
-    return (Object){.kind = SHAPE_PLANE, .as.plane = {{0, floor_y, 0}, {0, 1, 0}}};
+    return (Object){.type = SHAPE_PLANE, .as.plane = {{0, floor_y, 0}, {0, 1, 0}}};
 }
 
 // Turns the light into a spot whose edge almost touches a pixel's view of the floor.
@@ -247,7 +247,7 @@ static void spot_light_attack(Light *spot)
     const Vector3 seen = vector_add(eye, vector_scale(direction, (floor_y - eye.y) / direction.y));
     const Vector3 axis = vector_normalize(vector_subtract((Vector3){0, floor_y, -2}, light)),
                   to_seen = vector_normalize(vector_subtract(seen, light));
-    spot->kind = LIGHT_SPOT;
+    spot->type = LIGHT_SPOT;
     spot->direction = axis;
     spot->half_angle = nudge(acos(vector_dot(axis, to_seen)) * 180 / 3.14159265358979323846);
     spot->penumbra = 0;
@@ -269,12 +269,12 @@ static Scene scene_attacking(Family family, unsigned seed)
     material.transmission = 0;
     material.reflection = 0.6;
     array_push(scene.materials, material);
-    array_push(scene.lights, ((Light){.kind = LIGHT_POINT, .color = {0.5, 0.4, 0.3}, .position = light}));
+    array_push(scene.lights, ((Light){.type = LIGHT_POINT, .color = {0.5, 0.4, 0.3}, .position = light}));
     random_state.state = seed + 1;
     if (family == OPTICS) spot_light_attack(&scene.lights.items[0]);
     for (size_t i = 0; i < OBJECTS; i++) {
         Object object = object_in_view(&scene, family, seed, i);
-        if (object.kind == SHAPE_BOX && !(object.as.box.min.x < object.as.box.max.x)) continue;
+        if (object.type == SHAPE_BOX && !(object.as.box.min.x < object.as.box.max.x)) continue;
         object.material =
             family == OPTICS ? (uint32_t)(i % 3) : (family == ROUND || family == OVALS) && i % 4 == 0;
         array_push(scene.objects, object);
@@ -284,7 +284,7 @@ static Scene scene_attacking(Family family, unsigned seed)
         scene.objects.items[10] = scene.objects.items[--scene.objects.count];
         scene.objects.count = 11;
         array_push(scene.meshes, mesh_in_view());
-        array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+        array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
     }
     return scene;
 }
@@ -393,9 +393,9 @@ TEST(horizons_are_decided)
         // within the image, but on no ray
         const double above = away * scene.camera.half_tangent * random_between(&random_state, -0.9, 0.9);
         const Vector3 center = {0, -radius - above, -away};
-        Object object = {.kind = SHAPE_SPHERE, .as.sphere = {center, radius}};
+        Object object = {.type = SHAPE_SPHERE, .as.sphere = {center, radius}};
         if (!is_planet)
-            object = (Object){.kind = SHAPE_CYLINDER,
+            object = (Object){.type = SHAPE_CYLINDER,
                               .as.cylinder = {.from = center, .axis = {1, 0, 0}, .radius = radius}};
         array_push(scene.objects, object);
         if (tests_are_long()) settings.perturb_seed = 1 + (uint32_t)i * PERTURB_SEEDS / (uint32_t)count;
@@ -417,13 +417,13 @@ static Object oval_before_eye(Scene *scene, unsigned seed)
     const Vector3 center = {eye.x, eye.y, eye.z - 2.5}, axis = random_unit_vector(&random_state);
     const Vector3 from = vector_subtract(center, vector_scale(axis, 0.5));
     const Object objects[] = {
-        {.kind = SHAPE_SPHERE, .as.sphere = {.center = center, .radius = 0.8}},
-        {.kind = SHAPE_CYLINDER,
+        {.type = SHAPE_SPHERE, .as.sphere = {.center = center, .radius = 0.8}},
+        {.type = SHAPE_CYLINDER,
          .as.cylinder = {.from = from, .axis = axis, .radius = 0.8, .finite = true, .caps = true}},
-        {.kind = SHAPE_CONE, .as.cone = {.from = from, .axis = axis, .radius = {0.9, 0.4}, .finite = true}},
-        {.kind = SHAPE_PARABOLOID,
+        {.type = SHAPE_CONE, .as.cone = {.from = from, .axis = axis, .radius = {0.9, 0.4}, .finite = true}},
+        {.type = SHAPE_PARABOLOID,
          .as.paraboloid = {.apex = from, .axis = axis, .focal_length = 0.2, .height = 1, .finite = true}},
-        {.kind = SHAPE_TORUS, .as.torus = {.center = center, .axis = axis, .major = 0.7, .minor = 0.3}},
+        {.type = SHAPE_TORUS, .as.torus = {.center = center, .axis = axis, .major = 0.7, .minor = 0.3}},
     };
     Object object = objects[seed % COUNT_OF(objects)];
     const Vector3 n = random_unit_vector(&random_state),
@@ -431,7 +431,7 @@ static Object oval_before_eye(Scene *scene, unsigned seed)
                                  vector_scale(random_unit_vector(&random_state), 0.2));
     const Affine affine = affine_along(w, n, center);
     assert_null(object_transform(scene, &object, &affine));
-    assert_int_equal(object.kind, SHAPE_OVAL);
+    assert_int_equal(object.type, SHAPE_OVAL);
     return object;
 }
 
@@ -463,7 +463,7 @@ TEST(terminators_of_ovals_are_decided)
                 point, vector_add(vector_scale(way, distance),
                                   vector_scale(normal, random_coin(&random_state) ? height : -height)));
             array_push(scene.lights,
-                       ((Light){.kind = LIGHT_POINT, .color = {0.1, 0.1, 0.1}, .position = place}));
+                       ((Light){.type = LIGHT_POINT, .color = {0.1, 0.1, 0.1}, .position = place}));
         }
         assert_int_equal(scene.lights.count, LIGHTS);
         CertifySample reference;
@@ -551,9 +551,9 @@ TEST(smooth_meshes_are_decided)
         for (size_t i = seed; i < mesh.vertex_count; i += 10)
             mesh.normals[i] = (Vector3){0, 0, 0}; // which makes the triangles around it flat
         array_push(scene.meshes, mesh);
-        array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+        array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
         point_light_add(&scene, vector_scale(random_unit_vector(&random_state), 4), 1);
-        array_push(scene.lights, ((Light){.kind = LIGHT_DIRECTIONAL,
+        array_push(scene.lights, ((Light){.type = LIGHT_DIRECTIONAL,
                                           .color = {0.5, 0.5, 0.5},
                                           .direction = {random_between(&random_state, -1, 1), 1, 0.3}}));
         undecided += check_small(&scene, 0, "a smooth mesh", seed);

@@ -16,7 +16,7 @@
 TEST(lights_on_surfaces_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
-    const Object wall = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 0, 1}}};
+    const Object wall = {.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 0, 1}}};
     const double heights[] = {1e-5, 1e-7, 1e-9, 1e-12, 1e-15, 1e-20, 1e-30};
     for (size_t i = 0; i < COUNT_OF(heights); i++) {
         Scene scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
@@ -25,7 +25,7 @@ TEST(lights_on_surfaces_are_decided)
         size_t undecided = check_small(&scene, 0, "a light above a wall", heights[i]);
         scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
         array_push(scene.objects, wall);
-        array_push(scene.objects, ((Object){.kind = SHAPE_SPHERE, .as.sphere = {{0.5, 0, 0}, 0.25}}));
+        array_push(scene.objects, ((Object){.type = SHAPE_SPHERE, .as.sphere = {{0.5, 0, 0}, 0.25}}));
         point_light_add(&scene, (Vector3){10, 0, heights[i]}, 1e6);
         undecided += check_small(&scene, 0, "a light that grazes a wall", heights[i]);
         if (heights[i] >= 1e-9) assert_int_equal(undecided, 0); // double tells them apart
@@ -34,7 +34,7 @@ TEST(lights_on_surfaces_are_decided)
         const double distance = pow(10, digits);
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         array_push(scene.objects,
-                   ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, -distance}, {0, 0, 1}}}));
+                   ((Object){.type = SHAPE_PLANE, .as.plane = {{0, 0, -distance}, {0, 0, 1}}}));
         point_light_add(&scene, (Vector3){0, 0, fmin(distance, 5e17)}, 1);
         assert_int_equal(check_small(&scene, 0, "a wall far from the light", distance), 0);
     }
@@ -59,10 +59,10 @@ TEST(checkers_far_out_are_decided)
             material->ambient = 1;
             const Vector3 point = {from.x, from.y, from.z - 1};
             const Vector3 normal = {form, 0.5 * form, 3};
-            Object object = {.kind = SHAPE_PLANE, .as.plane = {point, normal}};
+            Object object = {.type = SHAPE_PLANE, .as.plane = {point, normal}};
             if (form == 2)
                 object = (Object){
-                    .kind = SHAPE_BOX,
+                    .type = SHAPE_BOX,
                     .as.box = {{from.x - 5, from.y - 5, from.z - 2}, {from.x + 5, from.y + 5, from.z - 1}}};
             array_push(scene.objects, object);
             assert_true(check_small(&scene, 0, "a checker far out", far) < 2 * SMALL_SIDE);
@@ -79,16 +79,16 @@ TEST(faint_paths_are_decided)
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         scene.materials.items[0].reflection = parts[i];
         for (int side = -1; side <= 1; side += 2)
-            array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, side}, {0, 0, 1}}}));
+            array_push(scene.objects, ((Object){.type = SHAPE_PLANE, .as.plane = {{0, 0, side}, {0, 0, 1}}}));
         const uint32_t bounces = tests_are_long() ? 40 : 8; // with more, a kernel keeps more pending rays
         assert_true(check_small(&scene, bounces, "facing mirrors", parts[i]) < SMALL_SIDE);
         scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         point_light_add(&scene, (Vector3){0, 0, 3}, 1);
         array_push(scene.materials, scene.materials.items[0]);
         scene.materials.items[1].transmission = parts[i];
-        array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, 0, -9}, {0, 0, 1}}}));
+        array_push(scene.objects, ((Object){.type = SHAPE_PLANE, .as.plane = {{0, 0, -9}, {0, 0, 1}}}));
         for (int k = 0; k < 8; k++) // one after another in view, and on the way to the light
-            array_push(scene.objects, ((Object){.kind = SHAPE_PLANE,
+            array_push(scene.objects, ((Object){.type = SHAPE_PLANE,
                                                 .material = 1,
                                                 .as.plane = {{0, 0, k < 4 ? -1 - k : k / 4.0}, {0, 0, 1}}}));
         assert_true(check_small(&scene, 6, "panes of glass", parts[i]) < SMALL_SIDE);
@@ -103,7 +103,7 @@ TEST(skimming_rays_are_decided)
     for (int digits = 7; digits < 13; digits++) {
         const Vector3 normal = {0.1, 0.7, 0};
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, pow(10, -digits));
-        array_push(scene.objects, ((Object){.kind = SHAPE_PLANE, .as.plane = {{-3.5, -0.5, 0}, normal}}));
+        array_push(scene.objects, ((Object){.type = SHAPE_PLANE, .as.plane = {{-3.5, -0.5, 0}, normal}}));
         assert_true(check_small(&scene, 0, "a plane that rays skim", digits) < 2 * SMALL_SIDE);
     }
 }
@@ -124,9 +124,9 @@ TEST(thin_walls_are_decided)
         material->ior = 1.5;
         array_push(scene.materials, scene.materials.items[0]);
         scene.materials.items[1].ior = 1 / 1.5;
-        array_push(scene.objects, ((Object){.kind = SHAPE_SPHERE, .as.sphere = {center, 1}}));
+        array_push(scene.objects, ((Object){.type = SHAPE_SPHERE, .as.sphere = {center, 1}}));
         array_push(scene.objects,
-                   ((Object){.kind = SHAPE_SPHERE, .material = 1, .as.sphere = {center, 1 - wall}}));
+                   ((Object){.type = SHAPE_SPHERE, .material = 1, .as.sphere = {center, 1 - wall}}));
         CertifySample reference;
         assert_true(certify_sample_open(&reference, &scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
                                         (ReferencePath){.bounce_count = 6}, NULL));
@@ -152,7 +152,7 @@ TEST(needles_have_an_area)
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         scene.materials.items[0].ambient = 1;
         array_push(scene.objects,
-                   ((Object){.kind = SHAPE_TRIANGLE,
+                   ((Object){.type = SHAPE_TRIANGLE,
                              .as.triangle.vertices = {{far, far, -1}, {0, 0, -1}, {0.25, 0, -1}}}));
         RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_DOUBLE);
         Film film = film_render(&probe_compute, &scene, &settings, 0);
@@ -173,7 +173,7 @@ TEST(needles_have_an_area)
             const double off = random_power(&random_state, -20, -3);
             const Vector3 beyond = {nextafter(2 * end.x, 9), 2 * end.y, 2 * end.z};
             array_push(scene.objects,
-                       ((Object){.kind = SHAPE_TRIANGLE,
+                       ((Object){.type = SHAPE_TRIANGLE,
                                  .as.triangle.vertices = {
                                      vector_add(middle, vector_scale(random_unit_vector(&random_state), off)),
                                      end, beyond}}));
@@ -226,8 +226,8 @@ TEST(slim_triangles_are_seldom_repeated)
         wall->checker_colors[0] = (Color){1, 1, 1};
         wall->ambient = 1;
         array_push(scene.meshes, ribbons_in_view());
-        array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
-        array_push(scene.objects, ((Object){.kind = SHAPE_PLANE,
+        array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
+        array_push(scene.objects, ((Object){.type = SHAPE_PLANE,
                                             .material = 1,
                                             .as.plane = {{0, 0, is_mirror ? 20 : -20}, {0.1, 0.2, 1}}}));
         point_light_add(&scene, (Vector3){3, 5, 0}, 1);
@@ -268,7 +268,7 @@ TEST(fine_meshes_are_seldom_repeated)
     mesh_make_normals(&mesh);
     Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.25);
     array_push(scene.meshes, mesh);
-    array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+    array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
     point_light_add(&scene, (Vector3){6, 5, -3}, 1);
     RenderSettings settings = small_settings(0);
     settings.width = settings.height = settings.region_width = settings.region_height = 100;
@@ -288,23 +288,23 @@ static Object shape_of_size(unsigned form, double size)
     const Vector3 center = {0.3 * size, 0.2 * size, -4 * size}, axis = {0.3 * size, size, 0.7 * size};
     switch (form) {
     case 0:
-        return (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, size}};
+        return (Object){.type = SHAPE_SPHERE, .as.sphere = {center, size}};
     case 1:
-        return (Object){.kind = SHAPE_DISC, .as.disc = {center, axis, size}};
+        return (Object){.type = SHAPE_DISC, .as.disc = {center, axis, size}};
     case 2:
-        return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {center, axis, size, true, true}};
+        return (Object){.type = SHAPE_CYLINDER, .as.cylinder = {center, axis, size, true, true}};
     case 3:
-        return (Object){.kind = SHAPE_CONE, .as.cone = {center, axis, {size, 0.3 * size}, 0, true, true}};
+        return (Object){.type = SHAPE_CONE, .as.cone = {center, axis, {size, 0.3 * size}, 0, true, true}};
     case 4:
-        return (Object){.kind = SHAPE_PARABOLOID,
+        return (Object){.type = SHAPE_PARABOLOID,
                         .as.paraboloid = {center, axis, 0.25 * size, 1.5 * size, .finite = true}};
     case 5:
-        return (Object){.kind = SHAPE_TORUS, .as.torus = {center, axis, size, 0.4 * size}};
+        return (Object){.type = SHAPE_TORUS, .as.torus = {center, axis, size, 0.4 * size}};
     case 6:
-        return (Object){.kind = SHAPE_TRIANGLE,
+        return (Object){.type = SHAPE_TRIANGLE,
                         .as.triangle.vertices = {center, vector_add(center, axis), {0, 0, center.z}}};
     default:
-        return (Object){.kind = SHAPE_BOX, .as.box = {vector_subtract(center, vector_all(size)), center}};
+        return (Object){.type = SHAPE_BOX, .as.box = {vector_subtract(center, vector_all(size)), center}};
     }
 }
 enum { FORMS = 8 };
@@ -324,10 +324,10 @@ TEST(mixed_sizes_are_decided)
                 Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
                 array_push(scene.objects, shape_of_size(form, size));
                 if (other != exponent) array_push(scene.objects, shape_of_size(FORMS - 1, pow(10, other)));
-                array_push(scene.lights, ((Light){.kind = LIGHT_DIRECTIONAL,
+                array_push(scene.lights, ((Light){.type = LIGHT_DIRECTIONAL,
                                                   .color = {0.5, 0.5, 0.5},
                                                   .direction = {-3, -5, -1}}));
-                undecided += check_small(&scene, 0, shape_names[scene.objects.items[0].kind], exponent);
+                undecided += check_small(&scene, 0, shape_names[scene.objects.items[0].type], exponent);
                 count++;
             }
     print_message("%zu pixels undecided of %zu\n", undecided, count * SMALL_SIDE * SMALL_SIDE);

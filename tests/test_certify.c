@@ -37,7 +37,7 @@ static size_t wrong_pixels(const CertifyErrors *errors)
     return errors->object + errors->shadow + errors->path + errors->color;
 }
 
-// Scenes of every shape, light and kind of bounce. The largest error of double is 3e-12.
+// Scenes of every shape, light and type of bounce. The largest error of double is 3e-12.
 TEST(the_best_precision_is_right)
 {
     const bool has_double = probe_has(PRECISION_DOUBLE);

@@ -75,7 +75,7 @@ static void line_make(Trial *trial, size_t index, bool from_eye)
     Vector3 point = vector_add(trial->common_origin, vector_scale(vector_normalize(direction), along));
     Vector3 center =
         trial_vector_rounded(trial, vector_add(point, vector_scale(across, radius * fmax(0, 1 + off))));
-    ((Sphere *)trial->flat.arrays[FLAT_FIRST_SHAPE + KIND_SPHERES].items)[index].center_radius =
+    ((Sphere *)trial->flat.arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES].items)[index].center_radius =
         (scalar4){center.x, center.y, center.z, radius};
 }
 
@@ -83,7 +83,7 @@ static void trial_make(Trial *trial, bool from_eye)
 {
     FlatArray *arrays = trial->flat.arrays;
     flat_array_renew(&trial->flat, FLAT_LIGHTS, 1);
-    flat_array_renew(&trial->flat, FLAT_FIRST_SHAPE + KIND_SPHERES, SPHERES_PER_ORIGIN);
+    flat_array_renew(&trial->flat, FLAT_FIRST_SHAPE + TYPE_SPHERES, SPHERES_PER_ORIGIN);
     // elsewhere float's fourth powers of lengths vanish or are infinite, and no sphere is culled
     trial->scale = ldexp(1, (int)random_between(&trial->random, -16, 16));
     Vector3 common_origin =
@@ -155,7 +155,7 @@ static long double dot(const long double *a, const long double *b)
 static void line_judge(Trial *trial, size_t index, bool from_eye)
 {
     const double *line = trial->lines + 6 * index;
-    const Sphere *sphere = flat_array_at(&trial->flat.arrays[FLAT_FIRST_SHAPE + KIND_SPHERES], index);
+    const Sphere *sphere = flat_array_at(&trial->flat.arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES], index);
     scalar4 c = sphere->center_radius;
     const long double d[3] = {line[3], line[4], line[5]};
     const long double f[3] = {(long double)c.x - line[0], (long double)c.y - line[1],

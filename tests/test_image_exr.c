@@ -48,14 +48,14 @@ typedef struct {
     exr_compression_t compression;
     exr_pixel_type_t type;
     bool is_tiled;
-} Kind;
+} Type;
 
-static const Kind plain = {EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, false};
+static const Type plain = {EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, false};
 
 // Opens a file of scan lines or tiles with its channels, one part for each item of `names`, and returns its
 // context. A part's channels are separated by commas and in the order of EXR, which is that of the alphabet.
 // A name of a part precedes them, ended by a colon.
-static exr_context_t exr_open(const char *const *names, int part_count, Kind kind)
+static exr_context_t exr_open(const char *const *names, int part_count, Type type)
 {
     exr_context_t context;
     must(exr_start_write(&context, path, EXR_WRITE_FILE_DIRECTLY, NULL));
@@ -64,20 +64,20 @@ static exr_context_t exr_open(const char *const *names, int part_count, Kind kin
         snprintf(text, sizeof text, "%s", names[i]);
         const char *part_name = strchr(text, ':') ? strsep(&rest, ":") : "";
         int part;
-        must(exr_add_part(context, part_name, kind.is_tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE,
+        must(exr_add_part(context, part_name, type.is_tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE,
                           &part));
-        must(exr_initialize_required_attr_simple(context, part, WIDTH, HEIGHT, kind.compression));
-        if (kind.is_tiled)
+        must(exr_initialize_required_attr_simple(context, part, WIDTH, HEIGHT, type.compression));
+        if (type.is_tiled)
             must(exr_set_tile_descriptor(context, part, TILE, TILE, EXR_TILE_ONE_LEVEL, EXR_TILE_ROUND_DOWN));
         for (const char *name; (name = strsep(&rest, ","));)
-            must(exr_add_channel(context, part, name, kind.type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+            must(exr_add_channel(context, part, name, type.type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
         if (part_count > 1) must(exr_set_version(context, part, 1));
     }
     return context;
 }
 
 // Writes the pixels of all parts and closes the file.
-static void exr_close(exr_context_t context, int part_count, Kind kind)
+static void exr_close(exr_context_t context, int part_count, Type type)
 {
     static float pixels[HEIGHT][WIDTH][CHANNELS];
     must(exr_write_header(context));
@@ -89,7 +89,7 @@ static void exr_close(exr_context_t context, int part_count, Kind kind)
             }
         }
         exr_chunk_info_t chunk;
-        if (kind.is_tiled) {
+        if (type.is_tiled) {
             for (int y = 0; y * TILE < HEIGHT; y++) {
                 for (int x = 0; x * TILE < WIDTH; x++) {
                     must(exr_write_tile_chunk_info(context, part, x, y, 0, 0, &chunk));
@@ -108,9 +108,9 @@ static void exr_close(exr_context_t context, int part_count, Kind kind)
     must(exr_finish(&context));
 }
 
-static void exr_write(const char *names, Kind kind)
+static void exr_write(const char *names, Type type)
 {
-    exr_close(exr_open(&names, 1, kind), 1, kind);
+    exr_close(exr_open(&names, 1, type), 1, type);
 }
 
 static bool layer_read(Image *image, const char *layer, MessageList *messages)
@@ -142,12 +142,12 @@ static void check_values(const char *layer, const char *expected, const char *wh
     image_free(&image);
 }
 
-static void check_read(const char *names, const char *expected, Kind kind)
+static void check_read(const char *names, const char *expected, Type type)
 {
     char what[128];
-    snprintf(what, sizeof what, "%s, compression %d, type %d, tiled %d", names, (int)kind.compression,
-             (int)kind.type, kind.is_tiled);
-    exr_write(names, kind);
+    snprintf(what, sizeof what, "%s, compression %d, type %d, tiled %d", names, (int)type.compression,
+             (int)type.type, type.is_tiled);
+    exr_write(names, type);
     check_values(NULL, expected, what);
 }
 
@@ -167,8 +167,8 @@ TEST(test_compressions)
                                               EXR_COMPRESSION_ZIP, EXR_COMPRESSION_PIZ};
     for (size_t i = 0; i < COUNT_OF(compressions); i++) {
         for (int is_tiled = 0; is_tiled < 2; is_tiled++) {
-            check_read("A,B,G,R", "321", (Kind){compressions[i], EXR_PIXEL_HALF, is_tiled});
-            check_read("A,B,G,R", "321", (Kind){compressions[i], EXR_PIXEL_FLOAT, is_tiled});
+            check_read("A,B,G,R", "321", (Type){compressions[i], EXR_PIXEL_HALF, is_tiled});
+            check_read("A,B,G,R", "321", (Type){compressions[i], EXR_PIXEL_FLOAT, is_tiled});
         }
     }
 }
@@ -195,10 +195,10 @@ TEST(test_choice_of_channels)
     };
     for (size_t i = 0; i < COUNT_OF(files); i++) {
         for (int is_tiled = 0; is_tiled < 2; is_tiled++) {
-            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_ZIPS, EXR_PIXEL_HALF, is_tiled});
-            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_NONE, EXR_PIXEL_HALF, is_tiled});
-            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_ZIPS, EXR_PIXEL_FLOAT, is_tiled});
-            check_read(files[i][0], files[i][1], (Kind){EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, is_tiled});
+            check_read(files[i][0], files[i][1], (Type){EXR_COMPRESSION_ZIPS, EXR_PIXEL_HALF, is_tiled});
+            check_read(files[i][0], files[i][1], (Type){EXR_COMPRESSION_NONE, EXR_PIXEL_HALF, is_tiled});
+            check_read(files[i][0], files[i][1], (Type){EXR_COMPRESSION_ZIPS, EXR_PIXEL_FLOAT, is_tiled});
+            check_read(files[i][0], files[i][1], (Type){EXR_COMPRESSION_NONE, EXR_PIXEL_FLOAT, is_tiled});
         }
     }
 }

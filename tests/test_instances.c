@@ -358,7 +358,7 @@ static CompiledScene compiled_make(const Scene *scene, const CompileSettings *se
 static size_t instance_count(const Scene *scene, const CompileSettings *settings)
 {
     CompiledScene compiled = compiled_make(scene, settings);
-    const size_t count = compiled.arrays[FLAT_FIRST_SHAPE + KIND_INSTANCES].count;
+    const size_t count = compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count;
     compiled_scene_free(&compiled);
     return count;
 }
@@ -387,8 +387,8 @@ TEST(an_uneven_transform_makes_a_copy)
     CompileSettings settings = plain_settings;
     settings.instances = INSTANCES_SHARED;
     CompiledScene compiled = compiled_make(&scene, &settings);
-    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + KIND_INSTANCES].count, 2);
-    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES].count, 2 * TRIANGLES);
+    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count, 2);
+    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].count, 2 * TRIANGLES);
     compiled_scene_free(&compiled);
     scene_free(&scene);
 }
@@ -466,9 +466,9 @@ TEST(instances_take_little_memory)
         settings.lanes = lanes;
         CompiledScene compiled = compiled_make(&scene, &settings);
         size_t device = 0, host = 0;
-        for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-            device += flat_array_size(&compiled.arrays[kind], false);
-            host += compiled.arrays[kind].count * compiled.arrays[kind].layout.size;
+        for (size_t type = 0; type < FLAT_COUNT; type++) {
+            device += flat_array_size(&compiled.arrays[type], false);
+            host += compiled.arrays[type].count * compiled.arrays[type].layout.size;
         }
         assert_true(device > 0 && device <= 10 << 20);
         assert_true(host > 0 && host <= 16 << 20);

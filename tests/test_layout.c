@@ -10,7 +10,7 @@
 // The widths of nodes and blocks are their kernel's: these are those of one lane.
 typedef struct {
     scalar4 planes[BVH_PLANES];
-    uint4 child_index[1], child_kind[1];
+    uint4 child_index[1], child_type[1];
 } HostBvhNode;
 
 typedef struct {
@@ -22,7 +22,7 @@ typedef struct {
     uint4 ids[1], places[1];
 } HostSphereBlock;
 
-// Every member of every struct: its kind in the flat arrays, the kernels' name of the struct, the host's, the
+// Every member of every struct: its type in the flat arrays, the kernels' name of the struct, the host's, the
 // member. REALS are scalar4, INTEGERS uint4. In a shape only the last member, its id, is listed.
 // clang-format off
 #define MEMBER_LIST(REALS, INTEGERS)                                             \
@@ -50,11 +50,11 @@ typedef struct {
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, cull_spheres)                       \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, sky_texture)                 \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[0])                   \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[KIND_QUARTETS - 1])   \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, counts[TYPE_QUARTETS - 1])   \
     INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[0])               \
-    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[KIND_QUARTETS - 1]) \
-    REALS(FLAT_FIRST_SHAPE + KIND_OVALS, Oval, Oval, inverses[2])                \
-    REALS(FLAT_FIRST_SHAPE + KIND_OVALS, Oval, Oval, sizes)                      \
+    INTEGERS(FLAT_HEADER, SceneHeader, SceneHeader, bvh_counts[TYPE_QUARTETS - 1]) \
+    REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, Oval, inverses[2])                \
+    REALS(FLAT_FIRST_SHAPE + TYPE_OVALS, Oval, Oval, sizes)                      \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, a)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, b)            \
     REALS(FLAT_TRIANGLE_NORMALS, TriangleNormals, TriangleNormals, c)            \
@@ -68,7 +68,7 @@ typedef struct {
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[4])                           \
     REALS(FLAT_NODES, BvhNode, HostBvhNode, planes[5])                           \
     INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_index[0])                   \
-    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_kind[0])                    \
+    INTEGERS(FLAT_NODES, BvhNode, HostBvhNode, child_type[0])                    \
     REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[0])       \
     REALS(FLAT_TRIANGLE_BLOCKS, TriangleBlock, HostTriangleBlock, rows[BLOCK_ROWS - 1]) \
     REALS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, rows[0])             \
@@ -77,7 +77,7 @@ typedef struct {
     INTEGERS(FLAT_SPHERE_BLOCKS, SphereBlock, HostSphereBlock, places[0])        \
     INTEGERS(FLAT_BLOCK_PLACES, BlockPlaces, BlockPlaces, triangles)             \
     REALS(FLAT_CULL_SPHERES, CullSphere, CullSphere, center_power)                                  \
-    INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, kind_index_material)        \
+    INTEGERS(FLAT_OBJECTS, ObjectEntry, ObjectEntry, type_index_material)        \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, color)                         \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, diffuse)                       \
     REALS(FLAT_MATERIALS, Material, FlatMaterial, other_color)                   \
@@ -105,7 +105,7 @@ typedef struct {
     REALS(FLAT_LIGHTS, Light, FlatLight, fading)                                 \
     REALS(FLAT_LIGHTS, Light, FlatLight, across_u)                               \
     REALS(FLAT_LIGHTS, Light, FlatLight, across_v)                               \
-    INTEGERS(FLAT_LIGHTS, Light, FlatLight, kind)                                \
+    INTEGERS(FLAT_LIGHTS, Light, FlatLight, type)                                \
     REALS(FLAT_SKY_CELLS, SkyCell, FlatSkyCell, place)                           \
     INTEGERS(FLAT_TEXTURE_LEVELS, TextureLevel, TextureLevel, place)             \
     INTEGERS(FLAT_TEXELS, Texel, Texel, color)                                   \
@@ -115,18 +115,18 @@ typedef struct {
 // clang-format on
 
 typedef struct {
-    size_t kind;
-    const char *type, *name;
+    size_t type;
+    const char *structure, *name;
     size_t host_offset, host_size; // in the host's struct, which is the double kernels'
     bool integers;
 } Member;
 
-#define REALS_ENTRY(kind, Type, HostType, member)                                                            \
-    {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), false},
-#define INTEGERS_ENTRY(kind, Type, HostType, member)                                                         \
-    {kind, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), true},
+#define REALS_ENTRY(type, Type, HostType, member)                                                            \
+    {type, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), false},
+#define INTEGERS_ENTRY(type, Type, HostType, member)                                                         \
+    {type, #Type, #member, offsetof(HostType, member), sizeof(((HostType *)0)->member), true},
 #define SHAPE_ENTRY(feature, Type, name, names)                                                              \
-    INTEGERS_ENTRY(FLAT_FIRST_SHAPE + KIND_##feature, Type, Type, id)
+    INTEGERS_ENTRY(FLAT_FIRST_SHAPE + TYPE_##feature, Type, Type, id)
 static const Member members[] = {MEMBER_LIST(REALS_ENTRY, INTEGERS_ENTRY) PRIMITIVE_LIST(SHAPE_ENTRY)};
 enum { MEMBER_COUNT = COUNT_OF(members) };
 
@@ -168,8 +168,8 @@ static void layouts_of_scene(FlatLayout layouts[FLAT_COUNT], const char *text, b
                                       .shift_to_eye = true};
     MessageList messages = {0};
     assert_true(scene_compile(&compiled, &scene, &settings, &messages));
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        if (compiled.arrays[kind].count > 0) layouts[kind] = compiled.arrays[kind].layout;
+    for (size_t type = 0; type < FLAT_COUNT; type++)
+        if (compiled.arrays[type].count > 0) layouts[type] = compiled.arrays[type].layout;
     compiled_scene_free(&compiled);
     scene_free(&scene);
 }
@@ -180,8 +180,8 @@ static void layouts_of_host(FlatLayout layouts[FLAT_COUNT], bool is_double)
     memset(layouts, 0, FLAT_COUNT * sizeof *layouts);
     layouts_of_scene(layouts, instance_text, is_double, false);
     layouts_of_scene(layouts, scene_text, is_double, true);
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        assert_true(layouts[kind].size > 0);
+    for (size_t type = 0; type < FLAT_COUNT; type++)
+        assert_true(layouts[type].size > 0);
 }
 
 // Writes kernels that follow lanes.h and types.h and return the device's layout of each member, and its value
@@ -194,14 +194,14 @@ static void kernels_write(Text *text)
         text_appendf(text,
                      "    { %s s; sizes[%zu] = sizeof(s);\n"
                      "      offsets[%zu] = (uint)((private char *)&s.%s - (private char *)&s); }\n",
-                     members[i].type, i, i, members[i].name);
+                     members[i].structure, i, i, members[i].name);
     text_appendf(text, "}\n"
                        "kernel void member(global const uint4 *items, global void *values, uint which)\n{\n"
                        "    switch (which) {\n");
     for (size_t i = 0; i < MEMBER_COUNT; i++)
         text_appendf(
             text, "    case %zu: vstore4(((global const %s *)items)[1].%s, 0, (global %s *)values); break;\n",
-            i, members[i].type, members[i].name, members[i].integers ? "uint" : "scalar");
+            i, members[i].structure, members[i].name, members[i].integers ? "uint" : "scalar");
     text_appendf(text, "    }\n}\n");
 }
 
@@ -255,14 +255,14 @@ static void layout_check(void **state)
     uint32_t sizes[MEMBER_COUNT] = {0}, offsets[MEMBER_COUNT] = {0};
     kernel_run(program, "layout", sizes, sizeof sizes, offsets, sizeof offsets, 0);
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
-        const FlatArray one = {NULL, 1, layouts[members[i].kind]};
+        const FlatArray one = {NULL, 1, layouts[members[i].type]};
         size_t size = flat_array_size(&one, is_double),
                offset = member_offset(&members[i], &one.layout, is_double);
         if (sizes[i] != size)
-            fail_msg("sizeof(%s): %u on the device, %zu here", members[i].type, sizes[i], size);
+            fail_msg("sizeof(%s): %u on the device, %zu here", members[i].structure, sizes[i], size);
         if (offsets[i] != offset)
-            fail_msg("%s.%s: at %u on the device, at %zu here", members[i].type, members[i].name, offsets[i],
-                     offset);
+            fail_msg("%s.%s: at %u on the device, at %zu here", members[i].structure, members[i].name,
+                     offsets[i], offset);
     }
     clReleaseProgram(program);
 }
@@ -278,14 +278,14 @@ static uint32_t integer_at(size_t member, size_t component)
     return (uint32_t)(0x80000000u + 8 * member + component);
 }
 
-// Two structs with every member of the kind set in the second.
-static FlatArray array_fill(size_t kind, const FlatLayout *layout)
+// Two structs with every member of the type set in the second.
+static FlatArray array_fill(size_t type, const FlatLayout *layout)
 {
     FlatArray array = {aligned_alloc(64, (2 * layout->size + 63) / 64 * 64), 2, *layout};
     assert_non_null(array.items);
     memset(array.items, 0, 2 * layout->size);
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
-        if (members[i].kind != kind) continue;
+        if (members[i].type != type) continue;
         // reals that the host keeps as floats: those of blocks
         const bool is_narrow = !members[i].integers && layout->scalar4_count == 0;
         char *place = (char *)array.items + layout->size + members[i].host_offset / (is_narrow ? 2 : 1);
@@ -315,7 +315,7 @@ static void member_check(cl_program program, size_t index, void *bytes, size_t s
                                              : (double)values.narrow[k] == real_at(index, k);
         if (!equal)
             fail_msg("%s.%s, component %zu: what the host uploaded is not what the device reads",
-                     members[index].type, members[index].name, k);
+                     members[index].structure, members[index].name, k);
     }
 }
 
@@ -326,13 +326,13 @@ static void values_check(void **state)
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, is_double);
     cl_program program = program_make(is_double);
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        FlatArray array = array_fill(kind, &layouts[kind]);
+    for (size_t type = 0; type < FLAT_COUNT; type++) {
+        FlatArray array = array_fill(type, &layouts[type]);
         size_t size = flat_array_size(&array, is_double);
         char *bytes = memory_allocate(size, 1);
         flat_array_write(&array, is_double, bytes);
         for (size_t i = 0; i < MEMBER_COUNT; i++)
-            if (members[i].kind == kind) member_check(program, i, bytes, size, is_double);
+            if (members[i].type == type) member_check(program, i, bytes, size, is_double);
         free(bytes);
         free(array.items);
     }
@@ -345,19 +345,19 @@ TEST(list_is_complete)
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
     // between the ends
-    size_t filled[FLAT_COUNT] = {[FLAT_HEADER] = 2 * (KIND_QUARTETS - 2) * sizeof(uint4),
+    size_t filled[FLAT_COUNT] = {[FLAT_HEADER] = 2 * (TYPE_QUARTETS - 2) * sizeof(uint4),
                                  [FLAT_TRIANGLE_BLOCKS] = (BLOCK_ROWS - 2) * sizeof(scalar4),
                                  [FLAT_SPHERE_BLOCKS] = (SPHERE_ROWS - 2) * sizeof(scalar4)};
     for (size_t i = 0; i < MEMBER_COUNT; i++) {
-        size_t *bytes = &filled[members[i].kind];
-        bool is_shape = members[i].kind - FLAT_FIRST_SHAPE < KIND_COUNT;
+        size_t *bytes = &filled[members[i].type];
+        bool is_shape = members[i].type - FLAT_FIRST_SHAPE < TYPE_COUNT;
         *bytes = is_shape ? members[i].host_offset + members[i].host_size : *bytes + members[i].host_size;
     }
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        size_t padding = layouts[kind].size - filled[kind];
-        if (filled[kind] > layouts[kind].size || padding >= sizeof(scalar4))
-            fail_msg("flat kind %zu: members of %zu bytes listed, the struct has %zu", kind, filled[kind],
-                     layouts[kind].size);
+    for (size_t type = 0; type < FLAT_COUNT; type++) {
+        size_t padding = layouts[type].size - filled[type];
+        if (filled[type] > layouts[type].size || padding >= sizeof(scalar4))
+            fail_msg("flat type %zu: members of %zu bytes listed, the struct has %zu", type, filled[type],
+                     layouts[type].size);
     }
 }
 
@@ -368,8 +368,8 @@ static void threads_write_what_one_does(void **state)
     enum { COUNT = 2 * FLAT_RANGE_MIN + 1 };
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        const FlatLayout *layout = &layouts[kind];
+    for (size_t type = 0; type < FLAT_COUNT; type++) {
+        const FlatLayout *layout = &layouts[type];
         const size_t words = COUNT * layout->size / sizeof(uint32_t);
         FlatArray array = {memory_allocate_large(COUNT, layout->size), COUNT, *layout};
         for (size_t i = 0; i < words; i++) // doubles that are floats, about 1

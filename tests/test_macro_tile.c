@@ -77,7 +77,7 @@ static Object flat_triangle_in_view(void)
         if (fabs(*component(&way, axis)) > fabs(*component(&way, w_axis))) w_axis = axis;
     double along = layers[random_bits(&random_state) % 4] / fabs(*component(&way, w_axis));
     Vector3 corner = vector_nudge(point_in_view(origin, seen, along));
-    Object object = {.kind = SHAPE_TRIANGLE, .as.triangle.vertices = {corner, corner, corner}};
+    Object object = {.type = SHAPE_TRIANGLE, .as.triangle.vertices = {corner, corner, corner}};
     for (size_t i = 1; i < 3; i++) {
         double side = random_power(&random_state, -2, 0) * (random_coin(&random_state) ? 1 : -1);
         *component(&object.as.triangle.vertices[i], (w_axis + i) % 3) += side;
@@ -101,7 +101,7 @@ static Object triangle_in_view(size_t index)
     Vector3 b = point_in_view(origin, point_behind(second), along + size * 0.1);
     Vector3 c = index % 3 == 0 ? point_in_view(origin, point_behind(first), along + size * 0.2)
                                : vector_add(a, vector_scale(random_unit_vector(&random_state), size));
-    return (Object){.kind = SHAPE_TRIANGLE,
+    return (Object){.type = SHAPE_TRIANGLE,
                     .as.triangle.vertices = {vector_nudge(a), vector_nudge(b), vector_nudge(c)}};
 }
 
@@ -115,12 +115,12 @@ static Object sphere_in_view(void)
     Vector3 aside = vector_normalize(vector_cross(along, random_unit_vector(&random_state)));
     double radius = random_power(&random_state, -4, -0.5); // from less than a pixel on
     Vector3 center = vector_add(touched, vector_scale(aside, radius));
-    return (Object){.kind = SHAPE_SPHERE, .as.sphere = {vector_nudge(center), nudge(radius), false}};
+    return (Object){.type = SHAPE_SPHERE, .as.sphere = {vector_nudge(center), nudge(radius), false}};
 }
 
 static void object_scale(Object *object, double scale)
 {
-    if (object->kind == SHAPE_SPHERE) {
+    if (object->type == SHAPE_SPHERE) {
         object->as.sphere.center = vector_scale(object->as.sphere.center, scale);
         object->as.sphere.radius *= scale;
         return;
@@ -141,7 +141,7 @@ static Scene scene_attacking(double scale)
         array_push(scene.materials, material);
     }
     for (size_t i = 1; i < ORIGINS; i++)
-        array_push(scene.lights, ((Light){.kind = LIGHT_POINT,
+        array_push(scene.lights, ((Light){.type = LIGHT_POINT,
                                           .color = {0.5, 0.4, 0.3},
                                           .position = vector_scale(origins[i], scale)}));
     for (size_t i = 0; i < OBJECTS; i++) {
@@ -153,7 +153,7 @@ static Scene scene_attacking(double scale)
         array_push(scene.objects, object);
     }
     array_push(scene.objects,
-               ((Object){.kind = SHAPE_PLANE, .as.plane = {{0, floor_y * scale, 0}, {0, 1, 0}}}));
+               ((Object){.type = SHAPE_PLANE, .as.plane = {{0, floor_y * scale, 0}, {0, 1, 0}}}));
     return scene;
 }
 
@@ -164,7 +164,7 @@ static void count_seen(const Film *film, const Scene *scene, size_t *seen, size_
     *seen = *shadowed = 0;
     for (size_t i = 0; i < (size_t)WIDTH * HEIGHT; i++) {
         *seen += film->object[i] < scene->objects.count &&
-                 scene->objects.items[film->object[i]].kind != SHAPE_PLANE;
+                 scene->objects.items[film->object[i]].type != SHAPE_PLANE;
         for (size_t light = 0; light < light_count; light++)
             *shadowed += film->shadow[i * light_count + light] == 1;
     }
@@ -220,7 +220,7 @@ static void sheet_add(Scene *scene, double z, bool has_holes)
         for (int half = 0; half < 2; half++) {
             if (has_holes && random_coin(&random_state)) continue;
             array_push(scene->objects,
-                       ((Object){.kind = SHAPE_TRIANGLE,
+                       ((Object){.type = SHAPE_TRIANGLE,
                                  .as.triangle.vertices = {half ? d : a, half ? c : b, half ? b : c}}));
         }
     }
@@ -239,7 +239,7 @@ TEST(no_shadow_of_a_far_lamp_depends_on_the_bvh)
                                   .half_tangent = half_tangent}};
         array_push(scene.materials, material_default());
         array_push(scene.lights,
-                   ((Light){.kind = LIGHT_POINT, .color = {1, 1, 1}, .position = {9e3, 3e3, 3.5e3}}));
+                   ((Light){.type = LIGHT_POINT, .color = {1, 1, 1}, .position = {9e3, 3e3, 3.5e3}}));
         sheet_add(&scene, -1.5, false);
         sheet_add(&scene, -1.498, true);
         assert_same_with_the_bvh(&scene, precision);

@@ -500,8 +500,8 @@ TEST(ids_count_the_triangles)
     assert_int_equal(flat.arrays[FLAT_OBJECTS].count, 11);
     const ObjectEntry *entries = flat.arrays[FLAT_OBJECTS].items;
     for (uint32_t id = 0; id < 11; id++) {
-        uint4 entry = entries[id].kind_index_material;
-        assert_int_equal(entry.x, id == 0 || id == 10 ? KIND_SPHERES : KIND_TRIANGLES);
+        uint4 entry = entries[id].type_index_material;
+        assert_int_equal(entry.x, id == 0 || id == 10 ? TYPE_SPHERES : TYPE_TRIANGLES);
         const FlatArray *array = &flat.arrays[FLAT_FIRST_SHAPE + entry.x];
         assert_int_equal(*flat_id(array, flat_array_at(array, entry.y)), id);
     }
@@ -581,7 +581,7 @@ static void assert_refused(Compute *compute, const Scene *scene, const char *exp
 TEST(too_many_triangles_are_refused)
 {
     Mesh mesh = {.triangle_count = ((size_t)1 << 28) + 1};
-    Object object = {.kind = SHAPE_MESH};
+    Object object = {.type = SHAPE_MESH};
     Scene scene = {.meshes = {&mesh, 1, 1}, .objects = {&object, 1, 1}};
     assert_refused(&probe_compute, &scene, "268435457 objects and triangles, more than 268435456");
 }

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { OBJECTS = 3 * FLAT_RANGE_MIN }; // of them some kinds are moved by several threads
+enum { OBJECTS = 3 * FLAT_RANGE_MIN }; // of them some types are moved by several threads
 
 static const char scene_text[] =
     "camera: {position: [1, 2, -40], look_at: [0, 0, 0], fov: 50}\n"
@@ -34,7 +34,7 @@ static Scene scene_make(void)
     const size_t form_count = shape_forms(forms);
     Random random = {19};
     for (size_t i = 0; i < OBJECTS; i++) {
-        // of some kinds many, so that they are moved by several threads
+        // of some types many, so that they are moved by several threads
         const ShapeForm *form = &forms[i % 2 ? random_bits(&random) % form_count : (i / 2) % 2];
         array_push(scene.objects, random_shape(form, &random).object);
     }
@@ -58,12 +58,12 @@ static CompiledScene compiled_make(const Scene *scene, const CompileSettings *se
 
 static uint4 entry_of(const CompiledScene *compiled, size_t id)
 {
-    return ((const ObjectEntry *)compiled->arrays[FLAT_OBJECTS].items)[id].kind_index_material;
+    return ((const ObjectEntry *)compiled->arrays[FLAT_OBJECTS].items)[id].type_index_material;
 }
 
-static void check_array(const CompiledScene *moved, const CompiledScene *expected, size_t kind)
+static void check_array(const CompiledScene *moved, const CompiledScene *expected, size_t type)
 {
-    const FlatArray *got = &moved->arrays[kind], *wanted = &expected->arrays[kind];
+    const FlatArray *got = &moved->arrays[type], *wanted = &expected->arrays[type];
     assert_int_equal(got->count, wanted->count);
     assert_memory_equal(got->items, wanted->items, got->count * got->layout.size);
 }
@@ -72,8 +72,8 @@ static void check_array(const CompiledScene *moved, const CompiledScene *expecte
 static void check_numbers(const CompiledScene *moved, const CompiledScene *expected)
 {
     assert_int_equal(moved->features, expected->features);
-    for (size_t kind = FLAT_HEADER; kind < FLAT_COUNT; kind++)
-        if (!is_ordered_by_bvh(kind)) check_array(moved, expected, kind);
+    for (size_t type = FLAT_HEADER; type < FLAT_COUNT; type++)
+        if (!is_ordered_by_bvh(type)) check_array(moved, expected, type);
     for (size_t id = 0; id < expected->arrays[FLAT_OBJECTS].count; id++) {
         const uint4 got = entry_of(moved, id), wanted = entry_of(expected, id);
         assert_int_equal(got.x, wanted.x);
@@ -87,7 +87,7 @@ static void check_numbers(const CompiledScene *moved, const CompiledScene *expec
 
 typedef struct {
     const double *planes;
-    const uint32_t *child_index, *child_kind;
+    const uint32_t *child_index, *child_type;
 } Node;
 
 static Node node_at(const CompiledScene *compiled, size_t index)
@@ -106,7 +106,7 @@ static size_t check_block(const CompiledScene *compiled, size_t index, size_t co
     const bool is_double = blocks->layout.scalar4_count > 0;
     const void *rows = flat_array_at(blocks, index);
     for (size_t lane = 0; lane < width; lane++) {
-        const Triangle *triangle = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES],
+        const Triangle *triangle = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES],
                                                  first + (lane < count ? lane : 0));
         const double vertices[BLOCK_ROWS] = {triangle->a.x, triangle->a.y, triangle->a.z,
                                              triangle->b.x, triangle->b.y, triangle->b.z,
@@ -126,7 +126,7 @@ static size_t check_sphere_block(const CompiledScene *compiled, size_t index, si
     const uint32_t *ids = (const void *)(rows + SPHERE_ROWS * width), *places = ids + width;
     for (size_t lane = 0; lane < width; lane++) {
         const size_t place = places[0] + (lane < count ? lane : 0);
-        const Sphere *sphere = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + KIND_SPHERES], place);
+        const Sphere *sphere = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES], place);
         assert_int_equal(places[lane], place);
         assert_true(rows[lane] == sphere->center_radius.x);
         assert_true(rows[width + lane] == sphere->center_radius.y);
@@ -147,15 +147,15 @@ static Bounds check_node(const CompiledScene *compiled, size_t index, const Boun
     for (size_t i = 0; i < width; i++) {
         const double *low = node.planes + i, *high = low + BVH_HIGH * width;
         const Bounds stored = {{low[0], low[width], low[2 * width]}, {high[0], high[width], high[2 * width]}};
-        const size_t kind = node.child_kind[i] & 0xff, count = node.child_kind[i] >> 8;
+        const size_t type = node.child_type[i] & 0xff, count = node.child_type[i] >> 8;
         Bounds expected = bounds_empty(), box;
-        if (node.child_kind[i] == BVH_NODE) expected = check_node(compiled, node.child_index[i], empty);
+        if (node.child_type[i] == BVH_NODE) expected = check_node(compiled, node.child_index[i], empty);
         size_t first = node.child_index[i];
-        if (kind == KIND_TRIANGLES && count > 0) first = check_block(compiled, first, count);
-        if (kind == KIND_SPHERES && count > 0) first = check_sphere_block(compiled, first, count);
+        if (type == TYPE_TRIANGLES && count > 0) first = check_block(compiled, first, count);
+        if (type == TYPE_SPHERES && count > 0) first = check_sphere_block(compiled, first, count);
         for (size_t k = first; k < first + count; k++) {
             assert_true(
-                primitive_bounds(kind, flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], k), &box));
+                primitive_bounds(type, flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + type], k), &box));
             expected = bounds_join(expected, box);
         }
         all = bounds_join(all, expected);
@@ -172,13 +172,13 @@ static void check_bvh(const CompiledScene *compiled)
     for (size_t i = 0; i < compiled->arrays[FLAT_NODES].count; i++) {
         const Node node = node_at(compiled, i);
         for (size_t k = 0; k < single.lanes; k++)
-            if (node.child_kind[k] == 0) {
+            if (node.child_type[k] == 0) {
                 const double *low = node.planes + k, *high = low + BVH_HIGH * (size_t)single.lanes;
                 empty = (Bounds){{low[0], low[single.lanes], low[2 * single.lanes]},
                                  {high[0], high[single.lanes], high[2 * single.lanes]}};
             }
     }
-    assert_true(root.child_kind[0] != 0);
+    assert_true(root.child_type[0] != 0);
     const Bounds all = check_node(compiled, 0, &empty);
     assert_memory_equal(&all, &compiled->bvh_bounds, sizeof all);
     // beyond all boxes
@@ -240,8 +240,8 @@ TEST(turned_camera_changes_the_header_alone)
     scene.camera.look_at = (Vector3){3, 3, 3};
     MessageList messages = {0};
     assert_true(scene_move(&compiled, &scene, &single, &messages));
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        assert_int_equal(compiled.changed[kind], kind == FLAT_HEADER);
+    for (size_t type = 0; type < FLAT_COUNT; type++)
+        assert_int_equal(compiled.changed[type], type == FLAT_HEADER);
     CompiledScene expected = compiled_make(&scene, &single);
     check_array(&compiled, &expected, FLAT_HEADER);
     compiled_scene_free(&expected);

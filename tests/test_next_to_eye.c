@@ -39,9 +39,9 @@ static CompiledScene compile_text(const char *objects, Precision precision)
     return compiled;
 }
 
-static const void *first(const CompiledScene *compiled, int kind)
+static const void *first(const CompiledScene *compiled, int type)
 {
-    return flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], 0);
+    return flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + type], 0);
 }
 
 static double power_of(uint4 id, bool is_double)
@@ -77,7 +77,7 @@ TEST(a_cylinder_is_seen_from_its_nearest_point)
             compile_text("  - cylinder: {from: [0, -6371001, -1234567.8], to: [0, -6371001, 7654321.1], "
                          "radius: 6371001}\n",
                          (Precision)precision);
-        const Cylinder *cylinder = first(&compiled, KIND_CYLINDERS);
+        const Cylinder *cylinder = first(&compiled, TYPE_CYLINDERS);
         const bool is_double = precision == PRECISION_DOUBLE;
         const double squared = cylinder->range.z, length = cylinder->range.y;
         const double expected = squared * height * (2 * radius + height);
@@ -87,7 +87,7 @@ TEST(a_cylinder_is_seen_from_its_nearest_point)
         assert_number(cylinder->range.w / length, -1234567.8);
         assert_number(cylinder->range.x / length, 7654321.1);
         Bounds bounds;
-        assert_true(primitive_bounds(KIND_CYLINDERS, cylinder, &bounds));
+        assert_true(primitive_bounds(TYPE_CYLINDERS, cylinder, &bounds));
         assert_true(fabs(bounds.min.z + 1234567.8) < 1 && fabs(bounds.max.z - 7654321.1) < 1);
         compiled_scene_free(&compiled);
     }
@@ -97,7 +97,7 @@ TEST(a_plane_goes_through_its_nearest_point)
 {
     CompiledScene compiled =
         compile_text("  - plane: {point: [2e7, -1e7, 0], normal: [1, 2, 3]}\n", PRECISION_SINGLE);
-    const Plane *plane = first(&compiled, KIND_PLANES);
+    const Plane *plane = first(&compiled, TYPE_PLANES);
     const double height = -3.5 / 14; // of the plane over the eye, in normals
     assert_true(fabs(plane->point.x - height) < 1e-7);
     assert_true(fabs(plane->point.y - 2 * height) < 1e-7);
@@ -117,7 +117,7 @@ TEST(explicit_rays_see_a_plane_through_its_own_point)
                  point[0], point[1], point[2]);
     Scene scene = scene_of_text("far.yaml", text_c(&text));
     CompiledScene compiled = compile_for(&scene, PRECISION_DOUBLE, false);
-    const Plane *plane = first(&compiled, KIND_PLANES);
+    const Plane *plane = first(&compiled, TYPE_PLANES);
     assert_true(plane->point.x == point[0] && plane->point.y == point[1] && plane->point.z == point[2]);
     compiled_scene_free(&compiled);
     scene_free(&scene);
@@ -136,7 +136,7 @@ TEST(a_triangle_has_the_eyes_height)
                                : "  - triangle: {vertices: [[22345677, -11172838.5, 0], "
                                  "[-33518515.5, 0, 11172838.5], [11172838.5, 11172838.5, -11172838.5]]}\n";
         CompiledScene compiled = compile_text(text, (Precision)precision);
-        const Triangle *triangle = first(&compiled, KIND_TRIANGLES);
+        const Triangle *triangle = first(&compiled, TYPE_TRIANGLES);
         assert_true(compiled.features & FEATURE_EYE_POWERS);
         float height;
         memcpy(&height, &triangle->id.w, sizeof height);

@@ -137,12 +137,12 @@ TEST(test_folder_of_others)
 {
     char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
     assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
-    for (int kind = 0; kind < 3; kind++) {
+    for (int type = 0; type < 3; type++) {
         store(key);
         assert_true(loads(key));
-        if (kind == 0) {
+        if (type == 0) {
             assert_int_equal(chmod(cache, 0770), 0);
-        } else if (kind == 1) {
+        } else if (type == 1) {
             assert_int_equal(rename(cache, moved), 0);
             assert_int_equal(symlink(moved, cache), 0);
         } else if (geteuid() == 0) {
@@ -151,15 +151,15 @@ TEST(test_folder_of_others)
             continue;
         }
         static const char *const reasons[] = {"others may access it", "a symbolic link", "of another user"};
-        assert_refused(reasons[kind]);
+        assert_refused(reasons[type]);
         assert_int_equal(unlink(path), 0);
         bool used = true;
         assert_int_equal(child_run(store_and_list, &used, sizeof used).status, 0);
         assert_false(used);
         assert_int_equal(access(path, F_OK), -1);
-        if (kind == 0) {
+        if (type == 0) {
             assert_int_equal(chmod(cache, 0700), 0);
-        } else if (kind == 1) {
+        } else if (type == 1) {
             assert_int_equal(unlink(cache), 0);
             assert_int_equal(rename(moved, cache), 0);
         }
@@ -392,12 +392,12 @@ TEST(test_entry_that_is_none_of_ours)
 {
     char *path = cache_entry_path(key), *other = cache_entry_path("another key");
     alarm(60);
-    for (int kind = 0; kind < 3; kind++) {
+    for (int type = 0; type < 3; type++) {
         store(key);
-        if (kind == 0) {
+        if (type == 0) {
             assert_int_equal(unlink(path), 0);
             assert_int_equal(mkfifo(path, 0600), 0);
-        } else if (kind == 1) {
+        } else if (type == 1) {
             assert_int_equal(rename(path, other), 0);
             assert_int_equal(symlink(other, path), 0);
         } else if (geteuid() == 0) {

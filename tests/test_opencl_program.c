@@ -48,9 +48,9 @@ static void opened_close(Opened *opened)
 // Shared objects in the folder: PoCL's finished machine code. Other runtimes have none.
 static size_t shared_object_count;
 
-static int count_one(const char *path, const struct stat *status, int kind, struct FTW *place)
+static int count_one(const char *path, const struct stat *status, int type, struct FTW *place)
 {
-    (void)status, (void)kind, (void)place;
+    (void)status, (void)type, (void)place;
     size_t length = strlen(path);
     shared_object_count += length > 3 && strcmp(path + length - 3, ".so") == 0;
     return 0;
@@ -173,9 +173,9 @@ TEST(test_no_cache)
 
 static char *entry_path_found;
 
-static int find_entry(const char *path, const struct stat *status, int kind, struct FTW *place)
+static int find_entry(const char *path, const struct stat *status, int type, struct FTW *place)
 {
-    (void)status, (void)kind, (void)place;
+    (void)status, (void)type, (void)place;
     if (!strstr(path, "/glint/") || !strstr(path, ".bin")) return 0;
     entry_path_found = strdup(path);
     return 1;

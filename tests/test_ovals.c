@@ -16,10 +16,10 @@ enum { RAYS = 2000 };
 
 static ShapeForm forms[SHAPE_FORMS_MAX];
 
-static bool has_ovals(ShapeKind kind)
+static bool has_ovals(ShapeType type)
 {
-    return kind == SHAPE_SPHERE || kind == SHAPE_DISC || kind == SHAPE_CYLINDER || kind == SHAPE_CONE ||
-           kind == SHAPE_TORUS || kind == SHAPE_PARABOLOID;
+    return type == SHAPE_SPHERE || type == SHAPE_DISC || type == SHAPE_CYLINDER || type == SHAPE_CONE ||
+           type == SHAPE_TORUS || type == SHAPE_PARABOLOID;
 }
 
 static Affine random_turn(Random *random)
@@ -51,8 +51,8 @@ static Object oval_of(const Object *shape, const Affine *affine)
     Scene scene = scene_of_shapes(&object, 1, &material);
     const char *why = object_transform(&scene, &object, affine);
     if (why) fail_msg("%s", why);
-    assert_int_equal(object.kind, SHAPE_OVAL);
-    assert_int_equal(object_shape(&object), shape->kind);
+    assert_int_equal(object.type, SHAPE_OVAL);
+    assert_int_equal(object_shape(&object), shape->type);
     return object;
 }
 
@@ -183,7 +183,7 @@ static void hits_ovals(void **state)
             assert_true(is_right);
             static TraceRay leaving[RAYS];
             memcpy(leaving, rays, sizeof leaving);
-            if (form->kind == SHAPE_SPHERE) leaving_rays_miss(&scene, precision, leaving, hits);
+            if (form->type == SHAPE_SPHERE) leaving_rays_miss(&scene, precision, leaving, hits);
         }
     }
 }
@@ -197,7 +197,7 @@ TEST(certain_hits_of_ovals_are_right)
     const size_t form_count = shape_forms(forms);
     size_t certain = 0, found = 0, traced = 0;
     for (size_t f = 0; f < form_count; f++) {
-        if (!has_ovals(forms[f].kind)) continue;
+        if (!has_ovals(forms[f].type)) continue;
         Random random = {f + 100};
         for (int round = 0; round < (tests_are_long() ? 20 : 2); round++) {
             const RandomShape shape = random_shape(&forms[f], &random);
@@ -244,7 +244,7 @@ TEST(ellipsoids_follow_the_textbook)
                 affine.rows[i][2] *= semi_axes.z;
         }
         affine.rows[0][3] = center.x, affine.rows[1][3] = center.y, affine.rows[2][3] = center.z;
-        const Object unit = {.kind = SHAPE_SPHERE, .as.sphere.radius = 1};
+        const Object unit = {.type = SHAPE_SPHERE, .as.sphere.radius = 1};
         Object object = oval_of(&unit, &affine);
         Material material;
         const Scene scene = scene_of_shapes(&object, 1, &material);
@@ -293,7 +293,7 @@ int main(void)
     const size_t form_count = shape_forms(forms);
     size_t count = 0;
     for (size_t i = 0; i < form_count; i++)
-        if (has_ovals(forms[i].kind))
+        if (has_ovals(forms[i].type))
             tests[count++] = (struct CMUnitTest){forms[i].name, hits_ovals, NULL, NULL, &forms[i]};
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(certain_hits_of_ovals_are_right);
     tests[count++] = (struct CMUnitTest)cmocka_unit_test(ellipsoids_follow_the_textbook);

@@ -69,23 +69,23 @@ TEST(bound_covers_the_mean)
     enum { TRIALS = 2000, COUNT = 400 };
     const double risk = 0.1;
     Random random = {3};
-    for (int kind = 0; kind < 3; kind++) {
+    for (int type = 0; type < 3; type++) {
         unsigned missed = 0;
         double values[COUNT], mean = 0, bounds = 0;
         for (size_t i = 0; i < COUNT; i++)
-            mean += (kind == 0 ? 0.005 : kind == 1 && i % 4 == 0 ? 0.02 : 0.001) / COUNT;
-        if (kind == 2) mean = 0.5;
+            mean += (type == 0 ? 0.005 : type == 1 && i % 4 == 0 ? 0.02 : 0.001) / COUNT;
+        if (type == 2) mean = 0.5;
         for (int trial = 0; trial < TRIALS; trial++) {
             for (size_t i = 0; i < COUNT; i++) {
-                const double share = kind == 0 ? 0.005 : kind == 1 && i % 4 == 0 ? 0.02 : 0.001;
-                values[i] = kind == 2 ? random_between(&random, 0, 1) : random_between(&random, 0, 1) < share;
+                const double share = type == 0 ? 0.005 : type == 1 && i % 4 == 0 ? 0.02 : 0.001;
+                values[i] = type == 2 ? random_between(&random, 0, 1) : random_between(&random, 0, 1) < share;
             }
             const double bound = mean_upper_bound(values, COUNT, risk);
             missed += bound < mean;
             bounds += bound / TRIALS;
         }
         assert_true(missed <= risk * TRIALS);
-        assert_true(bounds < mean + (kind == 2 ? 0.07 : 0.03));
+        assert_true(bounds < mean + (type == 2 ? 0.07 : 0.03));
     }
 }
 

@@ -18,28 +18,28 @@ typedef struct {
 
 static Object sphere(Vector3 center, double radius)
 {
-    return (Object){.kind = SHAPE_SPHERE, .as.sphere = {center, radius, false}};
+    return (Object){.type = SHAPE_SPHERE, .as.sphere = {center, radius, false}};
 }
 
 static Object cylinder(Vector3 from, Vector3 axis, double radius, bool finite, bool caps)
 {
-    return (Object){.kind = SHAPE_CYLINDER, .as.cylinder = {from, axis, radius, finite, caps, false}};
+    return (Object){.type = SHAPE_CYLINDER, .as.cylinder = {from, axis, radius, finite, caps, false}};
 }
 
 static Object frustum(double first, double second, bool caps)
 {
-    return (Object){.kind = SHAPE_CONE,
+    return (Object){.type = SHAPE_CONE,
                     .as.cone = {{0, 0, 0}, {0, 0, 2}, {first, second}, 0, true, caps, false}};
 }
 
 static Object infinite_cone(double slope)
 {
-    return (Object){.kind = SHAPE_CONE, .as.cone = {.axis = {0, 0, 1}, .slope = slope}};
+    return (Object){.type = SHAPE_CONE, .as.cone = {.axis = {0, 0, 1}, .slope = slope}};
 }
 
 static Object triangle(double side)
 {
-    return (Object){.kind = SHAPE_TRIANGLE, .as.triangle.vertices = {{0, 0, 0}, {side, 0, 0}, {0, side, 0}}};
+    return (Object){.type = SHAPE_TRIANGLE, .as.triangle.vertices = {{0, 0, 0}, {side, 0, 0}, {0, side, 0}}};
 }
 
 static void check(const Known *known, size_t count)
@@ -103,10 +103,10 @@ TEST(sees_only_insides)
 
 TEST(knows_flat_shapes)
 {
-    const Object plane = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
-    const Object disc = {.kind = SHAPE_DISC, .as.disc = {{0, 0, 2}, {0, 0, 3}, 0.5}};
-    const Object box = {.kind = SHAPE_BOX, .as.box = {{-1, -1, -1}, {1, 1, 1}}};
-    const Object plate = {.kind = SHAPE_BOX, .as.box = {{0, 0, 0}, {1, 1, 1e-6}}};
+    const Object plane = {.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
+    const Object disc = {.type = SHAPE_DISC, .as.disc = {{0, 0, 2}, {0, 0, 3}, 0.5}};
+    const Object box = {.type = SHAPE_BOX, .as.box = {{-1, -1, -1}, {1, 1, 1}}};
+    const Object plate = {.type = SHAPE_BOX, .as.box = {{0, 0, 0}, {1, 1, 1e-6}}};
     const Vector3 z = {0, 0, 1};
     const Known known[] = {
         {"horizon", plane, {0, 1.7, 0}, {0, -0x1p-1, 1}, 1.7000000476837158 * 0x1p1},
@@ -185,9 +185,9 @@ TEST(knows_cones)
 // The numbers are those of interval arithmetic.
 TEST(knows_tori)
 {
-    const Object ring = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 3}, 1, 0.25}};
-    const Object wire = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 1e-3}};
-    const Object spindle = {.kind = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 2}};
+    const Object ring = {.type = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 3}, 1, 0.25}};
+    const Object wire = {.type = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 1e-3}};
+    const Object spindle = {.type = SHAPE_TORUS, .as.torus = {{0, 0, 0}, {0, 0, 1}, 1, 2}};
     const Vector3 x = {1, 0, 0}, z = {0, 0, 1}, down = {0, 0, -1};
     const Known known[] = {
         {"far", ring, {0.9, 0, -1000}, z, 999.77087122566},
@@ -235,10 +235,10 @@ static double red(const Scene *scene, Vector3 origin, Vector3 direction)
 
 TEST(shades_as_phong)
 {
-    Object floor = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
+    Object floor = {.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
     Material material = {
         .color = {0.8, 0, 0}, .ambient = 0.5, .diffuse = {0.5, 0, 0}, .specular = 0.25, .shininess = 2};
-    Light light = {.kind = LIGHT_POINT, .color = {2, 2, 2}, .position = {3, 4, 0}};
+    Light light = {.type = LIGHT_POINT, .color = {2, 2, 2}, .position = {3, 4, 0}};
     Scene scene = one_object(&floor, &material, &light, 1);
 
     // At the origin N.L = 4/5; seen from straight above, R.V is the same.
@@ -248,13 +248,13 @@ TEST(shades_as_phong)
     // From below, the light is behind the surface.
     assert_near(red(&scene, (Vector3){0, -2, 0}, (Vector3){0, 1, 0}), 0.2, 1e-16);
 
-    light = (Light){.kind = LIGHT_DIRECTIONAL, .color = {2, 2, 2}, .direction = {-3, -4, 0}};
+    light = (Light){.type = LIGHT_DIRECTIONAL, .color = {2, 2, 2}, .direction = {-3, -4, 0}};
     assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), expected, 1e-15);
 
     // Half-way between full light and none in 1 - cos, the smooth step is a half.
     double outer = 1 - cos(60 * acos(-1) / 180), inner = 1 - cos(20 * acos(-1) / 180);
     double halfway = acos(1 - (outer + inner) / 2);
-    light = (Light){.kind = LIGHT_SPOT,
+    light = (Light){.type = LIGHT_SPOT,
                     .color = {2, 2, 2},
                     .position = {0, 4, 0},
                     .half_angle = 60,
@@ -268,10 +268,10 @@ TEST(shades_as_phong)
 TEST(casts_shadows)
 {
     // The shadow of a unit sphere that stands on a plane under a light ten high ends at 10 / sqrt 80.
-    Object objects[] = {{.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}},
+    Object objects[] = {{.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}},
                         sphere((Vector3){0, 1, 0}, 1)};
     Material material = {.diffuse = {1, 1, 1}, .color = {1, 1, 1}};
-    Light light = {.kind = LIGHT_POINT, .color = {1, 1, 1}, .position = {0, 10, 0}};
+    Light light = {.type = LIGHT_POINT, .color = {1, 1, 1}, .position = {0, 10, 0}};
     Scene scene = one_object(objects, &material, &light, 1);
     scene.objects.count = COUNT(objects);
     const double edge = 10 / sqrt(80);
@@ -286,7 +286,7 @@ TEST(casts_shadows)
 
 TEST(lays_checkers)
 {
-    Object floor = {.kind = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
+    Object floor = {.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
     Material material = {
         .ambient = 1, .checker = true, .checker_size = 2, .checker_colors = {{1, 1, 1}, {0.5, 0.5, 0.5}}};
     Scene scene = one_object(&floor, &material, NULL, 0);
@@ -297,7 +297,7 @@ TEST(lays_checkers)
     assert_near(red(&scene, (Vector3){3, 1, -3}, down), 0.5, 0);
     assert_near(red(&scene, (Vector3){-1, 1, -1}, down), 0.25, 0);
     assert_near(red(&scene, (Vector3){-1, 1, 1}, down), 0.5, 0);
-    floor = (Object){.kind = SHAPE_BOX, .as.box = {{-4, -1, -4}, {4, 1, 4}}};
+    floor = (Object){.type = SHAPE_BOX, .as.box = {{-4, -1, -4}, {4, 1, 4}}};
     assert_near(red(&scene, (Vector3){1, 5, 1}, down), 0.5, 0);
     assert_near(red(&scene, (Vector3){-1, 5, 1}, down), 0.25, 0);
 }
@@ -368,7 +368,7 @@ TEST(rounds_every_number)
 {
     const Vector3 third = {1.0 / 3, 1.0 / 3, 1.0 / 3};
     const double rounded = (double)(1.0f / 3);
-    Object object = {.kind = SHAPE_BOX, .as.box = {third, third}};
+    Object object = {.type = SHAPE_BOX, .as.box = {third, third}};
     object = reference_round_object(&object);
     const double numbers[] = {object.as.box.min.x, object.as.box.min.y, object.as.box.min.z,
                               object.as.box.max.x, object.as.box.max.y, object.as.box.max.z};
@@ -410,9 +410,9 @@ TEST(finds_small_shapes_exactly)
         const Object objects[SHAPES] = {
             sphere(at, size),
             cylinder(at, vector_scale(axis, 2 * size), size, true, true),
-            {.kind = SHAPE_CONE,
+            {.type = SHAPE_CONE,
              .as.cone = {at, vector_scale(axis, size), {0, 7 * size}, 0, true, true, false}},
-            {.kind = SHAPE_PARABOLOID,
+            {.type = SHAPE_PARABOLOID,
              .as.paraboloid = {
                  .apex = at, .axis = axis, .focal_length = size, .height = size, .finite = true}}};
         const Object *object = &objects[i % SHAPES];
@@ -435,9 +435,9 @@ TEST(measures_distances)
     size_t measured = 0;
     ShapeForm forms[SHAPE_FORMS_MAX];
     const size_t form_count = shape_forms(forms);
-    for (size_t kind = 0; kind < form_count; kind++) {
-        Random random = {kind};
-        RandomShape shape = random_shape(&forms[kind], &random);
+    for (size_t type = 0; type < form_count; type++) {
+        Random random = {type};
+        RandomShape shape = random_shape(&forms[type], &random);
         for (int i = 0; i < 50; i++) {
             RandomRay given = random_ray(&shape, &random);
             ReferenceRay ray = reference_ray(given.origin, given.direction);
@@ -456,7 +456,7 @@ TEST(measures_distances)
             }
             // to first order, of a paraboloid
             if (fabs(distance - fabs(height)) > 1e-7 * fabs(height) || !normal_found)
-                fail_msg("%s: %g off the surface, not %g", forms[kind].name, distance, height);
+                fail_msg("%s: %g off the surface, not %g", forms[type].name, distance, height);
             measured++;
         }
     }

@@ -31,7 +31,7 @@ TEST(test_scene)
 TEST(test_light)
 {
     assert_int_equal(complete.lights.count, 1);
-    assert_int_equal(complete.lights.items[0].kind, LIGHT_POINT);
+    assert_int_equal(complete.lights.items[0].type, LIGHT_POINT);
     assert_vector(complete.lights.items[0].position, 1, 2, 3);
     assert_vector(complete.lights.items[0].color, 0.5, 0.6, 0.7);
 }
@@ -39,7 +39,7 @@ TEST(test_light)
 TEST(test_sphere)
 {
     const Object *sphere = &complete.objects.items[0];
-    assert_int_equal(sphere->kind, SHAPE_SPHERE);
+    assert_int_equal(sphere->type, SHAPE_SPHERE);
     assert_vector(sphere->as.sphere.center, 0, -3, -5);
     assert_number(sphere->as.sphere.radius, 2.5);
     assert_vector(material_of(sphere)->color, 1, 0.4, 0);
@@ -52,7 +52,7 @@ TEST(test_sphere)
 TEST(test_plane)
 {
     const Object *plane = &complete.objects.items[1];
-    assert_int_equal(plane->kind, SHAPE_PLANE);
+    assert_int_equal(plane->type, SHAPE_PLANE);
     assert_vector(plane->as.plane.point, 0, -6, 0);
     assert_vector(plane->as.plane.normal, 0, 1, 0);
     assert_vector(material_of(plane)->color, 0, 0, 1);
@@ -61,7 +61,7 @@ TEST(test_plane)
 TEST(test_cylinder)
 {
     const Object *cylinder = &complete.objects.items[2];
-    assert_int_equal(cylinder->kind, SHAPE_CYLINDER);
+    assert_int_equal(cylinder->type, SHAPE_CYLINDER);
     assert_false(cylinder->as.cylinder.finite);
     assert_vector(cylinder->as.cylinder.from, 3, 0, -9);
     assert_vector(cylinder->as.cylinder.axis, 0, 2, 0);
@@ -72,7 +72,7 @@ TEST(test_cylinder)
 TEST(test_cone)
 {
     const Object *cone = &complete.objects.items[3];
-    assert_int_equal(cone->kind, SHAPE_CONE);
+    assert_int_equal(cone->type, SHAPE_CONE);
     assert_false(cone->as.cone.finite);
     assert_vector(cone->as.cone.from, -3, 0, -9);
     assert_vector(cone->as.cone.axis, 1, 1, 0);

@@ -54,13 +54,13 @@ TEST(test_lights)
     const Light *lights = complete.lights.items;
     assert_vector(complete.ambient, 1, 1, 1);
     assert_int_equal(complete.lights.count, 5);
-    assert_int_equal(lights[0].kind, LIGHT_POINT);
+    assert_int_equal(lights[0].type, LIGHT_POINT);
     assert_vector(lights[0].position, 1, 2, -3);
     assert_vector(lights[0].color, 0.5, 0.25, 1);
     assert_vector(lights[1].color, 0.5, 0.5, 0.25);
-    assert_int_equal(lights[2].kind, LIGHT_DIRECTIONAL);
+    assert_int_equal(lights[2].type, LIGHT_DIRECTIONAL);
     assert_vector(lights[2].direction, 1, -2, -3);
-    assert_int_equal(lights[3].kind, LIGHT_SPOT);
+    assert_int_equal(lights[3].type, LIGHT_SPOT);
     assert_vector(lights[3].direction, 0, -1, -0.5);
     assert_number(lights[3].half_angle, 45);
     assert_number(lights[3].penumbra, 25);
@@ -103,36 +103,36 @@ TEST(test_shapes)
 {
     const Object *objects = complete.objects.items;
     assert_int_equal(complete.objects.count, 16);
-    assert_int_equal(objects[0].kind, SHAPE_SPHERE);
+    assert_int_equal(objects[0].type, SHAPE_SPHERE);
     assert_vector(objects[0].as.sphere.center, 1, 2, -3);
     assert_number(objects[0].as.sphere.radius, 4);
-    assert_int_equal(objects[1].kind, SHAPE_PLANE);
+    assert_int_equal(objects[1].type, SHAPE_PLANE);
     assert_vector(objects[1].as.plane.point, 1, 2, -3);
     assert_vector(objects[1].as.plane.normal, 0, 1, -2);
-    assert_int_equal(objects[2].kind, SHAPE_CYLINDER);
+    assert_int_equal(objects[2].type, SHAPE_CYLINDER);
     assert_vector(objects[2].as.cylinder.axis, 1, 0, 1);
     assert_false(objects[2].as.cylinder.finite);
-    assert_int_equal(objects[3].kind, SHAPE_CYLINDER);
+    assert_int_equal(objects[3].type, SHAPE_CYLINDER);
     assert_vector(objects[3].as.cylinder.from, 1, 2, -3);
     assert_vector(objects[3].as.cylinder.axis, 0, 2, -1);
     assert_true(objects[3].as.cylinder.finite);
     assert_false(objects[3].as.cylinder.caps);
-    assert_int_equal(objects[4].kind, SHAPE_DISC);
+    assert_int_equal(objects[4].type, SHAPE_DISC);
     assert_vector(objects[4].as.disc.normal, 0, 0, -2);
     assert_number(objects[4].as.disc.radius, 3);
-    assert_int_equal(objects[5].kind, SHAPE_BOX);
+    assert_int_equal(objects[5].type, SHAPE_BOX);
     assert_vector(objects[5].as.box.min, 1, 2, -6);
     assert_vector(objects[5].as.box.max, 4, 5, -3);
     for (size_t i = 6; i < 9; i++) {
-        assert_int_equal(objects[i].kind, SHAPE_TRIANGLE);
+        assert_int_equal(objects[i].type, SHAPE_TRIANGLE);
         assert_vector(objects[i].as.triangle.vertices[1], 1, 0, -2);
         assert_int_equal(objects[i].as.triangle.smooth, i > 6);
         if (i > 6) assert_vector(objects[i].as.triangle.normals[0], 1, 0, -1);
     }
-    static const ShapeKind beads[] = {SHAPE_SPHERE, SHAPE_SPHERE, SHAPE_CYLINDER, SHAPE_SPHERE,
+    static const ShapeType beads[] = {SHAPE_SPHERE, SHAPE_SPHERE, SHAPE_CYLINDER, SHAPE_SPHERE,
                                       SHAPE_CYLINDER};
     for (size_t i = 0; i < 5; i++)
-        assert_int_equal(objects[9 + i].kind, beads[i]);
+        assert_int_equal(objects[9 + i].type, beads[i]);
     assert_vector(objects[12].as.sphere.center, 1, 1, -2);
     assert_vector(objects[13].as.cylinder.from, 1, 1, -2);
     assert_vector(objects[13].as.cylinder.axis, -1, 0, 1);
@@ -141,7 +141,7 @@ TEST(test_shapes)
 TEST(test_meshes)
 {
     const Object *ring = &complete.objects.items[14], *array = &complete.objects.items[15];
-    assert_int_equal(ring->kind, SHAPE_MESH);
+    assert_int_equal(ring->type, SHAPE_MESH);
     const Mesh *mesh = &complete.meshes.items[ring->as.mesh.index];
     assert_int_equal(mesh->triangle_count, 512);
     double area = 0;

@@ -89,7 +89,7 @@ TEST(test_files_are_joined)
     assert_vector(scene.lights.items[0].position, 1, 1, 1);
     assert_vector(scene.lights.items[1].position, 2, 2, 2);
     static const struct {
-        ShapeKind kind;
+        ShapeType type;
         const char *material, *description;
     } expected[] = {
         {SHAPE_MESH, "bark", "triangle 0 of mesh 0, triangle.obj, trees.yaml:9, material bark"},
@@ -102,7 +102,7 @@ TEST(test_files_are_joined)
     assert_int_equal(scene.objects.count, 6);
     for (size_t i = 0; i < 6; i++) {
         const Object *object = &scene.objects.items[i];
-        assert_int_equal(object->kind, expected[i].kind);
+        assert_int_equal(object->type, expected[i].type);
         assert_string_equal(scene.material_names.items[object->material], expected[i].material);
         Text description = {0};
         object_describe(&description, &scene, "forest.yaml", i);

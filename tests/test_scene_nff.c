@@ -40,7 +40,7 @@ TEST(test_lights)
 {
     assert_int_equal(complete.lights.count, 4);
     const Light *lights = complete.lights.items;
-    assert_int_equal(lights[0].kind, LIGHT_POINT);
+    assert_int_equal(lights[0].type, LIGHT_POINT);
     assert_vector(lights[0].position, 1, 2, 3);
     assert_vector(lights[0].color, 0.25, 0.25, 0.25);
     assert_vector(lights[1].color, 0.5, 0, 0.25);
@@ -70,32 +70,32 @@ TEST(test_materials)
 TEST(test_round_shapes)
 {
     const Object *objects = complete.objects.items;
-    assert_int_equal(objects[0].kind, SHAPE_SPHERE);
+    assert_int_equal(objects[0].type, SHAPE_SPHERE);
     assert_vector(objects[0].as.sphere.center, 1, 2, 3);
     assert_number(objects[0].as.sphere.radius, 4);
     assert_false(objects[0].as.sphere.only_inside);
     assert_number(objects[1].as.sphere.radius, 4);
     assert_true(objects[1].as.sphere.only_inside);
 
-    assert_int_equal(objects[2].kind, SHAPE_CYLINDER);
+    assert_int_equal(objects[2].type, SHAPE_CYLINDER);
     assert_vector(objects[2].as.cylinder.axis, 0, 3, 0);
     assert_number(objects[2].as.cylinder.radius, 2);
     assert_true(objects[2].as.cylinder.finite);
     assert_false(objects[2].as.cylinder.caps);
     assert_false(objects[2].as.cylinder.only_inside);
 
-    assert_int_equal(objects[3].kind, SHAPE_CONE);
+    assert_int_equal(objects[3].type, SHAPE_CONE);
     assert_number(objects[3].as.cone.radius[0], 2);
     assert_number(objects[3].as.cone.radius[1], 0.5);
     assert_true(objects[3].as.cone.finite);
     assert_false(objects[3].as.cone.caps);
     assert_false(objects[3].as.cone.only_inside);
 
-    assert_int_equal(objects[4].kind, SHAPE_CYLINDER);
+    assert_int_equal(objects[4].type, SHAPE_CYLINDER);
     assert_number(objects[4].as.cylinder.radius, 2);
     assert_true(objects[4].as.cylinder.only_inside);
 
-    assert_int_equal(objects[5].kind, SHAPE_CONE);
+    assert_int_equal(objects[5].type, SHAPE_CONE);
     assert_number(objects[5].as.cone.radius[0], 0);
     assert_number(objects[5].as.cone.radius[1], 1);
     assert_true(objects[5].as.cone.only_inside);
@@ -112,7 +112,7 @@ TEST(test_polygons)
     assert_int_equal(complete.objects.count, 6 + 1 + 3 + 1);
     const Object *triangles = complete.objects.items + 6;
     for (size_t i = 0; i < 5; i++)
-        assert_int_equal(triangles[i].kind, SHAPE_TRIANGLE);
+        assert_int_equal(triangles[i].type, SHAPE_TRIANGLE);
     assert_number(triangle_area(&triangles[0]), 0.5);
     assert_false(triangles[0].as.triangle.smooth);
     double area = 0;

@@ -36,7 +36,7 @@ TEST(test_lights)
 {
     assert_int_equal(complete.lights.count, 3);
     const Light *lights = complete.lights.items;
-    assert_int_equal(lights[0].kind, LIGHT_POINT);
+    assert_int_equal(lights[0].type, LIGHT_POINT);
     assert_vector(lights[0].position, 1, 2, 3);
     assert_vector(lights[0].color, 0.5, 0, 0.1);
     assert_vector(lights[1].color, 1, 1, 1);
@@ -46,13 +46,13 @@ TEST(test_lights)
 TEST(test_sphere_and_plane)
 {
     const Object *sphere = &complete.objects.items[0], *plane = sphere + 1;
-    assert_int_equal(sphere->kind, SHAPE_SPHERE);
+    assert_int_equal(sphere->type, SHAPE_SPHERE);
     assert_vector(sphere->as.sphere.center, 1, 2, 3);
     assert_number(sphere->as.sphere.radius, 2);
     assert_vector(material_of(sphere)->color, 1, 0, 0);
     assert_number(material_of(sphere)->specular, 0.5);
     assert_number(material_of(sphere)->shininess, 10);
-    assert_int_equal(plane->kind, SHAPE_PLANE);
+    assert_int_equal(plane->type, SHAPE_PLANE);
     assert_vector(plane->as.plane.point, 0, -1, 0);
     assert_vector(plane->as.plane.normal, 0, 1, 0);
     assert_vector(material_of(plane)->color, 0, 1, 0);
@@ -64,13 +64,13 @@ TEST(test_sphere_and_plane)
 TEST(test_cylinder_and_cone)
 {
     const Object *cylinder = &complete.objects.items[2], *cone = &complete.objects.items[6];
-    assert_int_equal(cylinder->kind, SHAPE_CYLINDER);
+    assert_int_equal(cylinder->type, SHAPE_CYLINDER);
     assert_vector(cylinder->as.cylinder.from, 1, -1, 3); // its center is given
     assert_vector(cylinder->as.cylinder.axis, 0, 6, 0);
     assert_number(cylinder->as.cylinder.radius, 1);
     assert_true(cylinder->as.cylinder.finite && cylinder->as.cylinder.caps);
     assert_number(material_of(cylinder)->specular, 0.25);
-    assert_int_equal(cone->kind, SHAPE_CONE);
+    assert_int_equal(cone->type, SHAPE_CONE);
     assert_vector(cone->as.cone.from, 1, 2, 3);
     assert_vector(cone->as.cone.axis, 3, 0, 0);
     assert_number(cone->as.cone.radius[0], 2);
@@ -81,7 +81,7 @@ TEST(test_cylinder_and_cone)
 TEST(test_square_and_triangle)
 {
     const Object *first = &complete.objects.items[3], *second = first + 1, *triangle = first + 2;
-    assert_int_equal(first->kind, SHAPE_TRIANGLE);
+    assert_int_equal(first->type, SHAPE_TRIANGLE);
     assert_int_equal(first->material, second->material);
     assert_vector(material_of(first)->color, 0.2, 0.4, 0.6);
     assert_vector(first->as.triangle.vertices[0], -1, 0, 3);
@@ -90,7 +90,7 @@ TEST(test_square_and_triangle)
     assert_vector(second->as.triangle.vertices[0], -1, 0, 3);
     assert_vector(second->as.triangle.vertices[1], 3, 4, 3);
     assert_vector(second->as.triangle.vertices[2], -1, 4, 3);
-    assert_int_equal(triangle->kind, SHAPE_TRIANGLE);
+    assert_int_equal(triangle->type, SHAPE_TRIANGLE);
     assert_false(triangle->as.triangle.smooth);
     assert_vector(triangle->as.triangle.vertices[1], 1, 0, 0);
     assert_int_equal(complete.objects.count, 7);

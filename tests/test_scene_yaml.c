@@ -38,13 +38,13 @@ TEST(test_lights)
     assert_int_equal(complete.lights.count, 4);
     const Light *point = &complete.lights.items[0], *directional = point + 1, *spot = point + 2,
                 *other = point + 3;
-    assert_int_equal(point->kind, LIGHT_POINT);
+    assert_int_equal(point->type, LIGHT_POINT);
     assert_vector(point->position, 5, 8, -5);
     assert_vector(point->color, 0.5, 0.25, 0.125); // times intensity
-    assert_int_equal(directional->kind, LIGHT_DIRECTIONAL);
+    assert_int_equal(directional->type, LIGHT_DIRECTIONAL);
     assert_vector(directional->direction, 0, -1, 0.2);
     assert_vector(directional->color, 1, 1, 1);
-    assert_int_equal(spot->kind, LIGHT_SPOT);
+    assert_int_equal(spot->type, LIGHT_SPOT);
     assert_vector(spot->position, 0, 5, 0);
     assert_vector(spot->direction, 0, -4, 0);
     assert_number(spot->half_angle, 30);
@@ -152,15 +152,15 @@ TEST(test_energy)
 TEST(test_round_shapes)
 {
     const Object *sphere = &complete.objects.items[0], *plane = sphere + 1, *disc = sphere + 2;
-    assert_int_equal(sphere->kind, SHAPE_SPHERE);
+    assert_int_equal(sphere->type, SHAPE_SPHERE);
     assert_int_equal(sphere->material, 0);
     assert_vector(sphere->as.sphere.center, 0, 1, 0);
     assert_number(sphere->as.sphere.radius, 1);
-    assert_int_equal(plane->kind, SHAPE_PLANE);
+    assert_int_equal(plane->type, SHAPE_PLANE);
     assert_int_equal(plane->material, 1);
     assert_vector(plane->as.plane.point, 0, -1, 0);
     assert_vector(plane->as.plane.normal, 0, 2, 0);
-    assert_int_equal(disc->kind, SHAPE_DISC);
+    assert_int_equal(disc->type, SHAPE_DISC);
     assert_int_equal(disc->material, 2); // the default
     assert_vector(disc->as.disc.center, 1, 2, 3);
     assert_vector(disc->as.disc.normal, 0, 0, -1);
@@ -170,7 +170,7 @@ TEST(test_round_shapes)
 TEST(test_cylinders)
 {
     const Object *open = &complete.objects.items[4], *capped = open + 1, *infinite = open + 2;
-    assert_int_equal(open->kind, SHAPE_CYLINDER);
+    assert_int_equal(open->type, SHAPE_CYLINDER);
     assert_vector(open->as.cylinder.from, 1, 0, 0);
     assert_vector(open->as.cylinder.axis, 0, 3, 0);
     assert_number(open->as.cylinder.radius, 0.25);
@@ -188,7 +188,7 @@ TEST(test_cylinders)
 TEST(test_cones)
 {
     const Object *frustum = &complete.objects.items[7], *tip = frustum + 1, *infinite = frustum + 2;
-    assert_int_equal(frustum->kind, SHAPE_CONE);
+    assert_int_equal(frustum->type, SHAPE_CONE);
     assert_vector(frustum->as.cone.from, 0, 0, 1);
     assert_vector(frustum->as.cone.axis, 0, 4, 0);
     assert_number(frustum->as.cone.radius[0], 1);
@@ -207,11 +207,11 @@ TEST(test_cones)
 TEST(test_flat_shapes)
 {
     const Object *box = &complete.objects.items[3], *flat = &complete.objects.items[10], *smooth = flat + 1;
-    assert_int_equal(box->kind, SHAPE_BOX);
+    assert_int_equal(box->type, SHAPE_BOX);
     assert_vector(box->as.box.min, -1, -2, -3);
     assert_vector(box->as.box.max, 1, 2, 3);
     assert_int_equal(box->material, 3);
-    assert_int_equal(flat->kind, SHAPE_TRIANGLE);
+    assert_int_equal(flat->type, SHAPE_TRIANGLE);
     assert_false(flat->as.triangle.smooth);
     assert_vector(flat->as.triangle.vertices[1], 1, 0, 0);
     assert_vector(flat->as.triangle.vertices[2], 0, 1, 0);
@@ -366,7 +366,7 @@ TEST(test_values_are_removed)
     assert_int_equal(scene.camera.field_axis, FIELD_VERTICAL);
     assert_int_equal(scene.objects.count, 2);
     assert_number(scene.objects.items[0].as.sphere.radius, 3);
-    assert_int_equal(scene.objects.items[1].kind, SHAPE_BOX);
+    assert_int_equal(scene.objects.items[1].type, SHAPE_BOX);
     assert_int_equal(scene.lights.count, 0);
     scene_free(&scene);
 }

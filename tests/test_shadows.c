@@ -98,7 +98,7 @@ TEST(smooth_meshes_do_not_shade_themselves)
                                        "lights: [{directional: {direction: [-1, -0.25, 0.15]}}]\n"
                                        "objects: [{sphere: {center: [1.5, 0.5, 0], radius: 0.35}}]\n");
         array_push(scene.meshes, coarse_ball());
-        array_push(scene.objects, ((Object){.kind = SHAPE_MESH}));
+        array_push(scene.objects, ((Object){.type = SHAPE_MESH}));
         const RenderSettings settings = film_settings(160, 120, precision);
         Film film = film_render(&probe_compute, &scene, &settings, AOV_NORMAL | AOV_SHADOW | AOV_OBJECT);
         const Vector3 to_light = vector_normalize((Vector3){1, 0.25, -0.15});

@@ -77,9 +77,9 @@ static double cone_moved_by_power(const Object *cone, Vector3 point, double r, d
 static double moved_beyond(const Object *object, const ReferenceHit *hit, Vector3 point, bool has_eye_powers,
                            bool compensated, double u, double size)
 {
-    if (object->kind != SHAPE_CYLINDER && object->kind != SHAPE_CONE) return 0;
+    if (object->type != SHAPE_CYLINDER && object->type != SHAPE_CONE) return 0;
     if (hit->curvature_radius == LDBL_MAX) return compensated ? 2 * u * size : 0;
-    if (!has_eye_powers || object->kind != SHAPE_CONE) return 0;
+    if (!has_eye_powers || object->type != SHAPE_CONE) return 0;
     return cone_moved_by_power(object, point, (double)hit->curvature_radius, u);
 }
 
@@ -266,10 +266,10 @@ TEST(hits_from_next_to_the_side)
     for (uint64_t seed = 0; seed < seed_count; seed++) {
         Random random = {form_count + 2 + 1000 * seed};
         for (const ShapeForm *form = forms; form < forms + form_count; form++) {
-            if (form->kind != SHAPE_CYLINDER && form->kind != SHAPE_CONE) continue;
+            if (form->type != SHAPE_CYLINDER && form->type != SHAPE_CONE) continue;
             for (int i = 0; i < SHAPES_BESIDE; i++) {
                 RandomShape shape = random_shape(form, &random);
-                if (i == 0 && form->kind == SHAPE_CONE) make_steep(&shape);
+                if (i == 0 && form->type == SHAPE_CONE) make_steep(&shape);
                 check(&shape, 1, shape.center, shape.radius, true, form->name, &random);
             }
         }

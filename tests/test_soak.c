@@ -64,9 +64,9 @@ static Mesh random_mesh(Random *random, uint32_t material_count)
     return mesh;
 }
 
-static bool takes_image(ShapeKind kind)
+static bool takes_image(ShapeType type)
 {
-    return kind == SHAPE_SPHERE || kind == SHAPE_PLANE || kind == SHAPE_DISC;
+    return type == SHAPE_SPHERE || type == SHAPE_PLANE || type == SHAPE_DISC;
 }
 
 // From one object to all, mostly with a mesh and with an image on what can have one.
@@ -91,12 +91,12 @@ static Scene soak_scene(Random *random)
     textured.texture_size = random_between(random, 0.5, 4);
     array_push(scene.materials, textured);
     for (uint32_t i = 0; i < kept; i++)
-        if (takes_image(scene.objects.items[i].kind) && random_coin(random))
+        if (takes_image(scene.objects.items[i].type) && random_coin(random))
             scene.objects.items[i].material = plain_count;
     if (random_coin(random)) {
         const Mesh mesh = random_mesh(random, plain_count + 1);
         array_push(scene.meshes, mesh);
-        array_push(scene.objects, ((Object){.kind = SHAPE_MESH, .material = plain_count}));
+        array_push(scene.objects, ((Object){.type = SHAPE_MESH, .material = plain_count}));
     }
     return scene;
 }

@@ -379,8 +379,8 @@ static void errors_json(Json *json, const AccuracyErrors *errors)
     json_int64(json, "nonfinite", (int64_t)errors->nonfinite);
     json_int64(json, "negative", (int64_t)errors->negative);
     if (errors->why_colors_only)
-        for (unsigned kind = 0; kind < ACCURACY_IMAGE; kind++)
-            absent_json(json, accuracy_kind_names[kind], errors->why_colors_only);
+        for (unsigned measure = 0; measure < ACCURACY_IMAGE; measure++)
+            absent_json(json, accuracy_measure_names[measure], errors->why_colors_only);
     else
         kinds_json(json, errors);
     const ImageMetrics *display = &errors->display;
@@ -397,9 +397,9 @@ static void errors_json(Json *json, const AccuracyErrors *errors)
     json_end(json);
 }
 
-static void worst_json(Json *json, AccuracyKind kind, const AccuracyWorst *worst)
+static void worst_json(Json *json, AccuracyMeasure measure, const AccuracyWorst *worst)
 {
-    const char *name = accuracy_kind_names[kind];
+    const char *name = accuracy_measure_names[measure];
     if (!worst->found) {
         json_none(json, name);
         return;
@@ -407,10 +407,10 @@ static void worst_json(Json *json, AccuracyKind kind, const AccuracyWorst *worst
     json_begin_object(json, name);
     json_int64(json, "x", worst->x);
     json_int64(json, "y", worst->y);
-    if (kind <= ACCURACY_PATH) json_bool(json, "away", worst->away);
-    if (kind == ACCURACY_SHADOW) json_int64(json, "light", worst->light);
+    if (measure <= ACCURACY_PATH) json_bool(json, "away", worst->away);
+    if (measure == ACCURACY_SHADOW) json_int64(json, "light", worst->light);
     json_number(json, "error", worst->error);
-    if (kind != ACCURACY_NORMAL) {
+    if (measure != ACCURACY_NORMAL) {
         json_number(json, "reference", worst->reference);
         json_number(json, "variant", worst->variant);
     }
@@ -429,13 +429,13 @@ static void measured_json(Json *json, const AccuracyVariant *variant)
     json_end(json);
     errors_json(json, &variant->errors);
     json_begin_object(json, "worst");
-    for (unsigned kind = 0; kind < ACCURACY_FLIP; kind++)
-        worst_json(json, (AccuracyKind)kind, &variant->errors.worst[kind]);
+    for (unsigned measure = 0; measure < ACCURACY_FLIP; measure++)
+        worst_json(json, (AccuracyMeasure)measure, &variant->errors.worst[measure]);
     json_end(json);
     json_begin_object(json, "pareto");
-    for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
-        if (!accuracy_figure(variant, (AccuracyKind)kind).why_not)
-            json_bool(json, accuracy_kind_names[kind], variant->pareto >> kind & 1);
+    for (unsigned measure = 0; measure < ACCURACY_MEASURE_COUNT; measure++)
+        if (!accuracy_figure(variant, (AccuracyMeasure)measure).why_not)
+            json_bool(json, accuracy_measure_names[measure], variant->pareto >> measure & 1);
     json_end(json);
 }
 
@@ -466,7 +466,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
     const AccuracyRecommendation *pick = &scene->recommendations[index];
     json_begin_object(json, NULL);
     json_number(json, "budget", pick->budget);
-    json_text(json, "measure", accuracy_kind_names[pick->measure]);
+    json_text(json, "measure", accuracy_measure_names[pick->measure]);
     if (pick->variant == SIZE_MAX) {
         json_none(json, "variant");
     } else {

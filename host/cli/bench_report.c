@@ -253,9 +253,9 @@ static void reasons_print(const BenchReport *report, FILE *stream)
 static void rays_print(const uint64_t *rays, const char *indent, FILE *stream)
 {
     fprintf(stream, "%srays:", indent);
-    for (int kind = 0; kind < RAYS_COUNT; kind++)
-        fprintf(stream, "%s %" PRIu64 " %s", kind ? "," : "", rays[kind],
-                kind == RAYS_CAMERA_HITS ? "of them hit" : bench_ray_names[kind]);
+    for (int type = 0; type < RAYS_COUNT; type++)
+        fprintf(stream, "%s %" PRIu64 " %s", type ? "," : "", rays[type],
+                type == RAYS_CAMERA_HITS ? "of them hit" : bench_ray_names[type]);
     fputc('\n', stream);
 }
 

@@ -46,7 +46,7 @@ static SceneFacts facts_of(const Scene *scene)
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         facts.shapes[object_shape(object)]++;
-        if (object->kind == SHAPE_MESH) facts.mesh_triangle_count += object_primitive_count(scene, object);
+        if (object->type == SHAPE_MESH) facts.mesh_triangle_count += object_primitive_count(scene, object);
     }
     facts.bounds = scene_bounds(scene, &facts.unbounded_count);
     facts.features = features_of(scene);
@@ -66,9 +66,9 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
 {
     printf("%s\n  objects    %zu", path, scene->objects.count);
     const char *separator = ": ";
-    for (size_t kind = 0; kind < SHAPE_COUNT; kind++) {
-        if (facts->shapes[kind] == 0) continue;
-        printf("%s%zu %s", separator, facts->shapes[kind], shape_names[kind]);
+    for (size_t type = 0; type < SHAPE_COUNT; type++) {
+        if (facts->shapes[type] == 0) continue;
+        printf("%s%zu %s", separator, facts->shapes[type], shape_names[type]);
         separator = ", ";
     }
     if (facts->mesh_triangle_count > 0)
@@ -131,8 +131,8 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         SceneFacts facts = facts_of(scene);
         json_int64(json, "objects", (int64_t)scene->objects.count);
         json_begin_object(json, "shapes");
-        for (size_t kind = 0; kind < SHAPE_COUNT; kind++)
-            if (kind != SHAPE_OVAL) json_int64(json, shape_names[kind], (int64_t)facts.shapes[kind]);
+        for (size_t type = 0; type < SHAPE_COUNT; type++)
+            if (type != SHAPE_OVAL) json_int64(json, shape_names[type], (int64_t)facts.shapes[type]);
         json_end(json);
         json_int64(json, "mesh_triangles", (int64_t)facts.mesh_triangle_count);
         json_int64(json, "unbounded", (int64_t)facts.unbounded_count);

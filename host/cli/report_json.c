@@ -150,8 +150,8 @@ void times_json(Json *json, const BenchRow *row)
 void rays_json(Json *json, const BenchRow *row)
 {
     json_begin_object(json, "rays");
-    for (int kind = 0; kind < RAYS_COUNT; kind++)
-        json_int64(json, bench_ray_names[kind], (int64_t)row->rays[kind]);
+    for (int type = 0; type < RAYS_COUNT; type++)
+        json_int64(json, bench_ray_names[type], (int64_t)row->rays[type]);
     json_end(json);
     json_number(json, "mrays_per_s", bench_rays_per_second(row) / 1e6);
 }

@@ -12,7 +12,7 @@
 
 enum {
     // Below this depth ranges are halved by count, which bounds the depth: 25 halvings leave at most 8 of
-    // 2^28 primitives, and at most 7 cuts by kind follow. Ranges of 16 fit a leaf only if all are triangles
+    // 2^28 primitives, and at most 7 cuts by type follow. Ranges of 16 fit a leaf only if all are triangles
     // or spheres: 24 halvings and a cut. With blocks of 4, 26 halvings leave 4, and at most 3 cuts follow.
     HALVING_DEPTH = BVH_DEPTH_MAX - (25 + 7),
     THREAD_RANGE_MIN = 8192 // below it a thread costs more than it saves
@@ -20,7 +20,7 @@ enum {
 
 typedef struct {
     const Bounds *boxes;
-    const uint8_t *kinds;
+    const uint8_t *types;
     double scale; // of the references' coordinates
     size_t count;
     BvhLeaves leaves;
@@ -41,26 +41,26 @@ typedef struct {
 
 static BvhChild range_build(Builder *builder, const PrimitiveRange *range, unsigned depth);
 
-static void range_sort_by_kind(const Builder *builder, const PrimitiveRange *range)
+static void range_sort_by_type(const Builder *builder, const PrimitiveRange *range)
 {
     PrimitiveReference *references = builder->references;
     for (size_t i = range->begin + 1; i < range->end; i++) {
         const PrimitiveReference moving = references[i];
-        const uint8_t kind = reference_kind(&moving);
+        const uint8_t type = reference_type(&moving);
         size_t place = i;
-        for (; place > range->begin && reference_kind(&references[place - 1]) > kind; place--)
+        for (; place > range->begin && reference_type(&references[place - 1]) > type; place--)
             references[place] = references[place - 1];
         references[place] = moving;
     }
 }
 
-// The first primitive of another kind than the first; `end` where there is but one kind.
-static size_t range_kind_boundary(const Builder *builder, const PrimitiveRange *range)
+// The first primitive of another type than the first; `end` where there is but one type.
+static size_t range_type_boundary(const Builder *builder, const PrimitiveRange *range)
 {
     const PrimitiveReference *references = builder->references;
-    const uint8_t kind = reference_kind(&references[range->begin]);
+    const uint8_t type = reference_type(&references[range->begin]);
     size_t boundary = range->begin + 1;
-    while (boundary < range->end && reference_kind(&references[boundary]) == kind)
+    while (boundary < range->end && reference_type(&references[boundary]) == type)
         boundary++;
     return boundary;
 }
@@ -78,9 +78,9 @@ static bool range_divide(const Builder *builder, const PrimitiveRange *range, un
                            depth == 0 && count >= THREAD_RANGE_MIN, bounds);
     if (left == count) {
         const bool fits = range_fits_leaf(references, count, builder->leaves);
-        if (fits) range_sort_by_kind(builder, range);
-        left = fits ? range_kind_boundary(builder, range) - range->begin : count / 2;
-        if (left == count && count > 1 && reference_kind(references) == KIND_INSTANCES) left = count / 2;
+        if (fits) range_sort_by_type(builder, range);
+        left = fits ? range_type_boundary(builder, range) - range->begin : count / 2;
+        if (left == count && count > 1 && reference_type(references) == TYPE_INSTANCES) left = count / 2;
         if (left == count) return false;
         bounds[0] = range_bounds_of(references, left);
         bounds[1] = range_bounds_of(references + left, count - left);
@@ -175,7 +175,7 @@ static void references_make(void *context, size_t begin, size_t end)
     Builder *builder = context;
     for (size_t i = begin; i < end; i++)
         builder->references[i] =
-            reference_make(builder->boxes[i], builder->scale, (uint32_t)i, builder->kinds[i]);
+            reference_make(builder->boxes[i], builder->scale, (uint32_t)i, builder->types[i]);
     const RangeBounds bounds = range_bounds_of(builder->references + begin, end - begin);
     pthread_mutex_lock(&builder->lock);
     builder->bounds = range_bounds_join(builder->bounds, bounds);
@@ -194,13 +194,13 @@ static void root_build(Builder *builder)
     builder->depth = builder->count > 0;
 }
 
-void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves,
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count, BvhLeaves leaves,
                Stage *stage)
 {
     const double largest = largest_coordinate(boxes, count);
     Builder builder = {
         .boxes = boxes,
-        .kinds = kinds,
+        .types = types,
         .scale = largest > 0 ? 1 / largest : 1,
         .count = count,
         .leaves = leaves,
@@ -218,14 +218,14 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count
         .nodes = builder.nodes,
         .node_count = builder.node_count,
         .order = memory_allocate(count + 1, sizeof *bvh->order),
-        .kinds = memory_allocate(count + 1, 1),
+        .types = memory_allocate(count + 1, 1),
         .primitive_count = count,
         .depth = builder.depth,
         .leaves = leaves,
     };
     for (size_t i = 0; i < count; i++) {
         bvh->order[i] = reference_index(&builder.references[i]);
-        bvh->kinds[i] = reference_kind(&builder.references[i]);
+        bvh->types[i] = reference_type(&builder.references[i]);
     }
     free(builder.references);
 }
@@ -234,6 +234,6 @@ void bvh_free(Bvh *bvh)
 {
     free(bvh->nodes);
     free(bvh->order);
-    free(bvh->kinds);
+    free(bvh->types);
     *bvh = (Bvh){0};
 }

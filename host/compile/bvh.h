@@ -1,5 +1,5 @@
 // The bounding volume hierarchy over a scene's bounded primitives: a binary tree by the surface area
-// heuristic (bvh_split.h), both sides of a large split built by two threads, every leaf of one kind of shape,
+// heuristic (bvh_split.h), both sides of a large split built by two threads, every leaf of one type of shape,
 // those of instances of one each.
 // The tree is the same whatever the number of threads; only the order of its nodes is not.
 #pragma once
@@ -20,23 +20,23 @@ typedef struct {
     BvhChild children[2];
 } BvhBinaryNode;
 
-// Limits on the sizes of leaves. A leaf of a kind with blocks holds up to block_size primitives, which are
-// tested at once. A range of these kinds that fits is divided only by kind.
+// Limits on the sizes of leaves. A leaf of a type with blocks holds up to block_size primitives, which are
+// tested at once. A range of these types that fits is divided only by type.
 typedef struct {
     unsigned size_max;   // of other leaves
     unsigned block_size; // 0: kernels read no blocks
     bool counts_blocks;  // splits are chosen by numbers of blocks, not of primitives; needs a block_size
 } BvhLeaves;
 
-static inline bool kind_is_in_blocks(BvhLeaves leaves, unsigned kind)
+static inline bool type_is_in_blocks(BvhLeaves leaves, unsigned type)
 {
-    return leaves.block_size > 0 && kind_has_blocks(kind);
+    return leaves.block_size > 0 && type_has_blocks(type);
 }
 
-// Returns the most primitives of a leaf of one kind.
-static inline unsigned leaf_size_max(BvhLeaves leaves, unsigned kind)
+// Returns the most primitives of a leaf of one type.
+static inline unsigned leaf_size_max(BvhLeaves leaves, unsigned type)
 {
-    return kind_is_in_blocks(leaves, kind) ? leaves.block_size : leaves.size_max;
+    return type_is_in_blocks(leaves, type) ? leaves.block_size : leaves.size_max;
 }
 
 // An empty child adds nothing.
@@ -49,7 +49,7 @@ typedef struct {
     BvhBinaryNode *nodes; // the root first; a tree of one leaf has a second child with an empty box
     size_t node_count;
     uint32_t *order; // the primitives, leaf by leaf
-    uint8_t *kinds;  // theirs, in this order
+    uint8_t *types;  // theirs, in this order
     size_t primitive_count;
     unsigned depth; // inner nodes on the longest path
     BvhLeaves leaves;
@@ -57,9 +57,9 @@ typedef struct {
 
 enum { BVH_DEPTH_MAX = 80 };
 
-// `kinds[i]`: the kind of primitive i; primitives of one leaf are of one kind. Boxes are finite, at most 2^28
+// `types[i]`: the type of primitive i; primitives of one leaf are of one type. Boxes are finite, at most 2^28
 // of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep.
 // The stage, which may be NULL, is set to the primitives whose leaves are built.
-void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *kinds, size_t count, BvhLeaves leaves,
+void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count, BvhLeaves leaves,
                Stage *stage);
 void bvh_free(Bvh *bvh);

@@ -20,15 +20,15 @@ enum { HUGE_RATIO = 16 };
 // The bounded primitives that the BVH is built of.
 typedef struct {
     Bounds *boxes;
-    uint8_t *kinds;
+    uint8_t *types;
     uint32_t *places; // in their shapes' arrays
     size_t count;
-    uint32_t kind_counts[KIND_COUNT];
+    uint32_t type_counts[TYPE_COUNT];
 } Bounded;
 
 typedef struct {
     const FlatArray *array;
-    size_t kind;
+    size_t type;
     Bounds *boxes; // of the array's primitives; empty where unbounded
 } Boxing;
 
@@ -36,30 +36,30 @@ static void range_box(void *context, size_t begin, size_t end)
 {
     const Boxing *boxing = context;
     for (size_t i = begin; i < end; i++)
-        if (!primitive_bounds(boxing->kind, flat_array_at(boxing->array, i), &boxing->boxes[i]))
+        if (!primitive_bounds(boxing->type, flat_array_at(boxing->array, i), &boxing->boxes[i]))
             boxing->boxes[i] = bounds_empty();
 }
 
 static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
 {
     size_t capacity = 0;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        capacity += compiled->arrays[FLAT_FIRST_SHAPE + kind].count;
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        capacity += compiled->arrays[FLAT_FIRST_SHAPE + type].count;
     *bounded = (Bounded){
         .boxes = memory_allocate(capacity + 1, sizeof(Bounds)),
-        .kinds = memory_allocate(capacity + 1, 1),
+        .types = memory_allocate(capacity + 1, 1),
         .places = memory_allocate(capacity + 1, sizeof(uint32_t)),
     };
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
-        Boxing boxing = {array, kind, bounded->boxes + bounded->count};
+    for (size_t type = 0; type < TYPE_COUNT; type++) {
+        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
+        Boxing boxing = {array, type, bounded->boxes + bounded->count};
         parallel_run(array->count, FLAT_RANGE_MIN, range_box, &boxing);
         for (size_t i = 0; i < array->count; i++) {
             if (bounds_is_empty(&boxing.boxes[i])) continue;
             bounded->boxes[bounded->count] = boxing.boxes[i];
-            bounded->kinds[bounded->count] = (uint8_t)kind;
+            bounded->types[bounded->count] = (uint8_t)type;
             bounded->places[bounded->count++] = (uint32_t)i;
-            bounded->kind_counts[kind]++;
+            bounded->type_counts[type]++;
         }
     }
 }
@@ -72,10 +72,10 @@ static double box_size(const Bounds *box)
 
 static void bounded_remove(Bounded *bounded, size_t index)
 {
-    bounded->kind_counts[bounded->kinds[index]]--;
+    bounded->type_counts[bounded->types[index]]--;
     const size_t left = --bounded->count - index;
     memmove(&bounded->boxes[index], &bounded->boxes[index + 1], left * sizeof *bounded->boxes);
-    memmove(&bounded->kinds[index], &bounded->kinds[index + 1], left * sizeof *bounded->kinds);
+    memmove(&bounded->types[index], &bounded->types[index + 1], left * sizeof *bounded->types);
     memmove(&bounded->places[index], &bounded->places[index + 1], left * sizeof *bounded->places);
 }
 
@@ -99,17 +99,17 @@ static void huge_remove(Bounded *bounded)
 static void bounded_free(Bounded *bounded)
 {
     free(bounded->boxes);
-    free(bounded->kinds);
+    free(bounded->types);
     free(bounded->places);
 }
 
 // Where each primitive of the tree's order stands in its shape's new array.
-static uint32_t *order_in_kinds(const Bvh *bvh)
+static uint32_t *order_in_types(const Bvh *bvh)
 {
     uint32_t *order = memory_allocate(bvh->primitive_count + 1, sizeof *order);
-    uint32_t counts[KIND_COUNT] = {0};
+    uint32_t counts[TYPE_COUNT] = {0};
     for (size_t i = 0; i < bvh->primitive_count; i++)
-        order[i] = counts[bvh->kinds[i]]++;
+        order[i] = counts[bvh->types[i]]++;
     return order;
 }
 
@@ -150,21 +150,21 @@ static void range_enter(void *context, size_t begin, size_t end)
     const Entering *entering = context;
     for (size_t i = begin; i < end; i++) {
         const uint32_t id = *flat_id(entering->array, flat_array_at(entering->array, i));
-        entering->entries[entry_of_id(entering->compiled, id)].kind_index_material.y = (uint32_t)i;
+        entering->entries[entry_of_id(entering->compiled, id)].type_index_material.y = (uint32_t)i;
     }
 }
 
 // Moves a shape's primitives into the leaves' order, those outside the tree behind them, and updates the
 // objects' entries.
-static void array_reorder(CompiledScene *compiled, size_t kind, const Bvh *bvh, const Bounded *bounded)
+static void array_reorder(CompiledScene *compiled, size_t type, const Bvh *bvh, const Bounded *bounded)
 {
-    FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
+    FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
     if (array->count == 0) return;
     uint32_t *from = memory_allocate(array->count, sizeof *from);
     bool *in_tree = memory_allocate_zeroed(array->count, sizeof *in_tree);
     size_t count = 0;
     for (size_t i = 0; i < bvh->primitive_count; i++) {
-        if (bvh->kinds[i] != kind) continue;
+        if (bvh->types[i] != type) continue;
         from[count] = bounded->places[bvh->order[i]];
         in_tree[from[count++]] = true;
     }
@@ -188,7 +188,7 @@ static Bounds empty_place(const Bounds *bounds)
 // The parts of a node of FLAT_NODES.
 typedef struct {
     double *planes;
-    uint32_t *child_index, *child_kind;
+    uint32_t *child_index, *child_type;
     unsigned width;
 } FlatNode;
 
@@ -219,10 +219,10 @@ static void node_write(const BvhWideNode *wide, const Bvh *bvh, const uint32_t *
         child_box_write(node, i, child ? &child->box : empty);
         if (child && child->count > 0) {
             node->child_index[i] = order[child->first];
-            node->child_kind[i] = child->count << 8 | bvh->kinds[child->first];
+            node->child_type[i] = child->count << 8 | bvh->types[child->first];
         } else if (child) {
             node->child_index[i] = next_node++;
-            node->child_kind[i] = BVH_NODE;
+            node->child_type[i] = BVH_NODE;
         }
     }
 }
@@ -235,7 +235,7 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     // a visit replaces a node by at most `width` children: a ray from far away also enters the empty slots
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
-    uint32_t *order = order_in_kinds(bvh);
+    uint32_t *order = order_in_types(bvh);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
     for (size_t i = 0; i < wide.node_count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
@@ -262,16 +262,16 @@ static FlatSphereBlock sphere_block_at(const CompiledScene *compiled, size_t blo
 }
 
 // Returns whether a child is a leaf that kernels with several lanes read as a block.
-static bool is_block(uint32_t child_kind)
+static bool is_block(uint32_t child_type)
 {
-    const unsigned kind = child_kind & 0xff;
-    return child_kind >> 8 > 0 && kind_has_blocks(kind);
+    const unsigned type = child_type & 0xff;
+    return child_type >> 8 > 0 && type_has_blocks(type);
 }
 
 // Returns the index of a block's first primitive, to be read or set.
-static uint32_t *block_place(const CompiledScene *compiled, unsigned kind, size_t block)
+static uint32_t *block_place(const CompiledScene *compiled, unsigned type, size_t block)
 {
-    if (kind == KIND_SPHERES) return sphere_block_at(compiled, block).places;
+    if (type == TYPE_SPHERES) return sphere_block_at(compiled, block).places;
     return (uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items + block;
 }
 
@@ -279,23 +279,23 @@ static uint32_t *block_place(const CompiledScene *compiled, unsigned kind, size_
 static void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
 {
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
-    size_t counts[KIND_COUNT] = {0};
+    size_t counts[TYPE_COUNT] = {0};
     for (size_t i = 0; i < nodes->count; i++)
         for (unsigned k = 0; k < width; k++) {
-            const uint32_t child_kind = flat_node_at(nodes, i).child_kind[k];
-            if (is_block(child_kind)) counts[child_kind & 0xff]++;
+            const uint32_t child_type = flat_node_at(nodes, i).child_type[k];
+            if (is_block(child_type)) counts[child_type & 0xff]++;
         }
-    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, counts[KIND_TRIANGLES], width, !is_double);
-    flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, counts[KIND_SPHERES], width, false);
-    flat_array_renew(compiled, FLAT_BLOCK_PLACES, (counts[KIND_TRIANGLES] + 3) / 4);
-    uint32_t next[KIND_COUNT] = {0};
+    flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, counts[TYPE_TRIANGLES], width, !is_double);
+    flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, counts[TYPE_SPHERES], width, false);
+    flat_array_renew(compiled, FLAT_BLOCK_PLACES, (counts[TYPE_TRIANGLES] + 3) / 4);
+    uint32_t next[TYPE_COUNT] = {0};
     for (size_t i = 0; i < nodes->count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
         for (unsigned k = 0; k < width; k++) {
-            if (!is_block(node.child_kind[k])) continue;
-            const unsigned kind = node.child_kind[k] & 0xff;
-            *block_place(compiled, kind, next[kind]) = node.child_index[k];
-            node.child_index[k] = next[kind]++;
+            if (!is_block(node.child_type[k])) continue;
+            const unsigned type = node.child_type[k] & 0xff;
+            *block_place(compiled, type, next[type]) = node.child_index[k];
+            node.child_index[k] = next[type]++;
         }
     }
 }
@@ -308,11 +308,11 @@ static size_t blocks_count(const CompiledScene *compiled)
 static void triangle_block_fill(const CompiledScene *compiled, size_t block, unsigned count)
 {
     const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS],
-                    *triangles = &compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
+                    *triangles = &compiled->arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES];
     // floats are narrowed here: a million triangles' blocks take 130 MB as doubles
     const bool is_double = blocks->layout.scalar4_count > 0;
     const size_t width = 4 * (blocks->layout.scalar4_count + blocks->layout.uint4_count) / BLOCK_ROWS;
-    const size_t first = *block_place(compiled, KIND_TRIANGLES, block);
+    const size_t first = *block_place(compiled, TYPE_TRIANGLES, block);
     void *rows = flat_array_at(blocks, block);
     for (size_t lane = 0; lane < width; lane++) {
         const Triangle *triangle = flat_array_at(triangles, first + (lane < count ? lane : 0));
@@ -333,7 +333,7 @@ static void sphere_block_fill(const CompiledScene *compiled, size_t index, unsig
     for (unsigned lane = 0; lane < block.width; lane++) {
         block.places[lane] = block.places[0] + (lane < count ? lane : 0);
         const Sphere *sphere =
-            flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + KIND_SPHERES], block.places[lane]);
+            flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES], block.places[lane]);
         block.rows[lane] = sphere->center_radius.x;
         block.rows[block.width + lane] = sphere->center_radius.y;
         block.rows[2 * block.width + lane] = sphere->center_radius.z;
@@ -350,9 +350,9 @@ static void nodes_fill_blocks(void *context, size_t begin, size_t end)
     for (size_t i = begin; i < end; i++) {
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
         for (unsigned k = 0; k < node.width; k++) {
-            if (!is_block(node.child_kind[k])) continue;
-            const unsigned kind = node.child_kind[k] & 0xff, count = node.child_kind[k] >> 8;
-            if (kind == KIND_SPHERES)
+            if (!is_block(node.child_type[k])) continue;
+            const unsigned type = node.child_type[k] & 0xff, count = node.child_type[k] >> 8;
+            if (type == TYPE_SPHERES)
                 sphere_block_fill(compiled, node.child_index[k], count);
             else
                 triangle_block_fill(compiled, node.child_index[k], count);
@@ -376,7 +376,7 @@ static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
     enum { LEAF_SIZE_MAX = 8 };
     if (lanes <= 1) return (BvhLeaves){LEAF_SIZE_MAX, 0, false};
     const size_t others =
-        bounded->count - bounded->kind_counts[KIND_TRIANGLES] - bounded->kind_counts[KIND_SPHERES];
+        bounded->count - bounded->type_counts[TYPE_TRIANGLES] - bounded->type_counts[TYPE_SPHERES];
     return (BvhLeaves){LEAF_SIZE_MAX, lanes, 16 * others < bounded->count};
 }
 
@@ -385,7 +385,7 @@ static void tree_flatten(CompiledScene *compiled, const CompileSettings *setting
 {
     Bvh bvh;
     stage_begin(settings->stage, "building the BVH", NULL, bounded->count);
-    bvh_build(&bvh, bounded->boxes, bounded->kinds, bounded->count, leaves_for(bounded, settings->lanes),
+    bvh_build(&bvh, bounded->boxes, bounded->types, bounded->count, leaves_for(bounded, settings->lanes),
               settings->stage);
     free(bounded->boxes);
     bounded->boxes = NULL;
@@ -395,10 +395,10 @@ static void tree_flatten(CompiledScene *compiled, const CompileSettings *setting
     compiled->bvh_bounds = bvh_node_bounds(&bvh.nodes[0]);
     free(bvh.nodes);
     bvh.nodes = NULL;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        array_reorder(compiled, kind, &bvh, bounded);
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        array_reorder(compiled, type, &bvh, bounded);
     blocks_fill(compiled);
-    memcpy(compiled->bvh_counts, bounded->kind_counts, sizeof compiled->bvh_counts);
+    memcpy(compiled->bvh_counts, bounded->type_counts, sizeof compiled->bvh_counts);
     bvh_free(&bvh);
 }
 
@@ -438,8 +438,8 @@ void bvh_shift(CompiledScene *compiled, uint32_t node_base, uint32_t leaf_base)
     for (size_t i = 0; i < compiled->arrays[FLAT_NODES].count; i++) {
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
         for (unsigned k = 0; k < node.width; k++)
-            if (node.child_kind[k] != BVH_EMPTY)
-                node.child_index[k] += node.child_kind[k] == BVH_NODE ? node_base : leaf_base;
+            if (node.child_type[k] != BVH_EMPTY)
+                node.child_index[k] += node.child_type[k] == BVH_NODE ? node_base : leaf_base;
     }
 }
 
@@ -451,14 +451,14 @@ static void leaves_fit(void *context, size_t begin, size_t end)
     for (size_t i = begin; i < end; i++) {
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
         for (unsigned k = 0; k < node.width; k++) {
-            const unsigned kind = node.child_kind[k] & 0xff, count = node.child_kind[k] >> 8;
+            const unsigned type = node.child_type[k] & 0xff, count = node.child_type[k] >> 8;
             if (count == 0) continue;
-            const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
+            const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
             Bounds all = bounds_empty(), box;
             size_t first = node.child_index[k];
-            if (has_blocks && is_block(node.child_kind[k])) first = *block_place(compiled, kind, first);
+            if (has_blocks && is_block(node.child_type[k])) first = *block_place(compiled, type, first);
             for (size_t p = first; p < first + count; p++)
-                if (primitive_bounds(kind, flat_array_at(array, p), &box)) all = bounds_join(all, box);
+                if (primitive_bounds(type, flat_array_at(array, p), &box)) all = bounds_join(all, box);
             child_box_write(&node, k, &all);
         }
     }
@@ -468,7 +468,7 @@ static Bounds node_bounds(const FlatNode *node)
 {
     Bounds all = bounds_empty();
     for (unsigned k = 0; k < node->width; k++) {
-        if (node->child_kind[k] == 0) continue;
+        if (node->child_type[k] == 0) continue;
         const double *low = node->planes + k, *high = low + (size_t)BVH_HIGH * node->width;
         const size_t y = node->width, z = 2 * y;
         all = bounds_join(all, (Bounds){{low[0], low[y], low[z]}, {high[0], high[y], high[z]}});
@@ -479,8 +479,8 @@ static Bounds node_bounds(const FlatNode *node)
 void bvh_refit(CompiledScene *compiled)
 {
     uint32_t count = 0;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        count += compiled->bvh_counts[kind];
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        count += compiled->bvh_counts[type];
     if (count == 0) return; // no BVH, though the kernel may be built for one
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
     compiled->changed[FLAT_NODES] = true;
@@ -490,7 +490,7 @@ void bvh_refit(CompiledScene *compiled)
     for (size_t i = nodes->count; i-- > 0;) {
         const FlatNode node = flat_node_at(nodes, i);
         for (unsigned k = 0; k < node.width; k++) {
-            if (node.child_kind[k] != BVH_NODE) continue;
+            if (node.child_type[k] != BVH_NODE) continue;
             const FlatNode child = flat_node_at(nodes, node.child_index[k]);
             const Bounds box = node_bounds(&child);
             child_box_write(&node, k, &box);
@@ -502,6 +502,6 @@ void bvh_refit(CompiledScene *compiled)
     for (size_t i = 0; i < nodes->count; i++) {
         const FlatNode node = flat_node_at(nodes, i);
         for (unsigned k = 0; k < node.width; k++)
-            if (node.child_kind[k] == 0) child_box_write(&node, k, &empty);
+            if (node.child_type[k] == 0) child_box_write(&node, k, &empty);
     }
 }

@@ -65,13 +65,13 @@ static inline float box_half_area(BuildBox box)
     return size[0] * size[1] + size[1] * size[2] + size[2] * size[0];
 }
 
-PrimitiveReference reference_make(Bounds box, double scale, uint32_t index, uint8_t kind)
+PrimitiveReference reference_make(Bounds box, double scale, uint32_t index, uint8_t type)
 {
     const int32_t two = 0x40000000; // bits of a float
     Int4 low = (Int4)float4_of(vector_scale(box.min, scale)),
          high = (Int4)float4_of(vector_scale(box.max, scale));
     low[3] = two | (int32_t)index;
-    high[3] = two | kind;
+    high[3] = two | type;
     return (PrimitiveReference){{(Float4)low, (Float4)high}};
 }
 
@@ -296,14 +296,14 @@ static size_t range_partition(PrimitiveReference *references, size_t count, cons
 bool range_fits_leaf(const PrimitiveReference *references, size_t count, BvhLeaves leaves)
 {
     for (size_t i = 0; i < count; i++)
-        if (count > leaf_size_max(leaves, reference_kind(&references[i]))) return false;
+        if (count > leaf_size_max(leaves, reference_type(&references[i]))) return false;
     return true;
 }
 
 static bool all_in_blocks(const PrimitiveReference *references, size_t count, BvhLeaves leaves)
 {
     for (size_t i = 0; i < count; i++)
-        if (!kind_is_in_blocks(leaves, reference_kind(&references[i]))) return false;
+        if (!type_is_in_blocks(leaves, reference_type(&references[i]))) return false;
     return true;
 }
 

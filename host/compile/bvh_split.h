@@ -17,7 +17,7 @@ typedef struct {
     Float4 low, high; // the fourth lanes unused
 } BuildBox;
 
-// A primitive while the tree is built. The fourth lanes of the box hold its index and its kind, as the bits
+// A primitive while the tree is built. The fourth lanes of the box hold its index and its type, as the bits
 // of floats from 2 on, with which arithmetic is as fast as with others.
 typedef struct {
     BuildBox box;
@@ -29,14 +29,14 @@ typedef struct {
 } RangeBounds;
 
 // `scale`: of the box's coordinates; index: below 2^28.
-PrimitiveReference reference_make(Bounds box, double scale, uint32_t index, uint8_t kind);
+PrimitiveReference reference_make(Bounds box, double scale, uint32_t index, uint8_t type);
 
 static inline uint32_t reference_index(const PrimitiveReference *reference)
 {
     return (uint32_t)((Int4)reference->box.low)[3] & 0xfffffff;
 }
 
-static inline uint8_t reference_kind(const PrimitiveReference *reference)
+static inline uint8_t reference_type(const PrimitiveReference *reference)
 {
     return (uint8_t)((Int4)reference->box.high)[3];
 }
@@ -45,7 +45,7 @@ RangeBounds range_bounds_empty(void);
 RangeBounds range_bounds_join(RangeBounds a, RangeBounds b);
 RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count);
 
-// Returns whether the range is within the leaf size of every kind in it.
+// Returns whether the range is within the leaf size of every type in it.
 bool range_fits_leaf(const PrimitiveReference *references, size_t count, BvhLeaves leaves);
 
 // Partitions the range where that pays or it is too large for a leaf, and sets the bounds of both sides.

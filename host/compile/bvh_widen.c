@@ -25,7 +25,7 @@ typedef struct {
     Costs costs; // of up to slots_max slots: its leaves need no more
     unsigned slots_max;
     float leaves_cost;     // of the binary tree's leaves
-    uint32_t first, count; // its primitives; count 0: more, or of more kinds, than a leaf may hold
+    uint32_t first, count; // its primitives; count 0: more, or of more types, than a leaf may hold
     bool is_leaf;          // rather than a wide node
 } Subtree;
 
@@ -48,7 +48,7 @@ static bool child_is_node(const BvhChild *child)
 
 static float leaf_cost(const Widening *widening, double half_area, uint32_t first, uint32_t count)
 {
-    const bool is_block = kind_is_in_blocks(widening->bvh->leaves, widening->bvh->kinds[first]);
+    const bool is_block = type_is_in_blocks(widening->bvh->leaves, widening->bvh->types[first]);
     const double test_cost = is_block ? block_cost : intersection_cost * count;
     return (float)(half_area * widening->scale * (visit_cost + test_cost));
 }
@@ -78,10 +78,10 @@ static unsigned slots_share(const Subtree *first, const Subtree *second, unsigne
 static void subtree_count(const Widening *widening, const Subtree *first, const Subtree *second,
                           Subtree *subtree)
 {
-    const uint8_t *kinds = widening->bvh->kinds;
+    const uint8_t *types = widening->bvh->types;
     bool joins = first->count > 0 && second->count > 0 &&
-                 first->count + second->count <= leaf_size_max(widening->bvh->leaves, kinds[first->first]) &&
-                 kinds[first->first] == kinds[second->first] && kinds[first->first] != KIND_INSTANCES;
+                 first->count + second->count <= leaf_size_max(widening->bvh->leaves, types[first->first]) &&
+                 types[first->first] == types[second->first] && types[first->first] != TYPE_INSTANCES;
     subtree->first = first->first < second->first ? first->first : second->first;
     subtree->count = joins ? first->count + second->count : 0;
 }

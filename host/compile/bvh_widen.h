@@ -19,7 +19,7 @@ typedef struct {
 } BvhWide;
 
 // Nodes of at most `width` children, 2 to BVH_WIDTH_MAX, and leaves of up to leaf_size_max primitives of
-// their kind, so chosen that they cost the least that the binary tree allows: areas stand for how often rays
+// their type, so chosen that they cost the least that the binary tree allows: areas stand for how often rays
 // come by (Ylitie, Karras, Laine, Efficient incoherent ray traversal on GPUs through compressed wide BVHs,
 // HPG 2017; here the binary tree's leaves may have more than one primitive, and are not split). What is
 // written to `wide` lasts as long as the binary tree.

@@ -19,17 +19,17 @@ static const CertifiedRange of_float = {0x1p-36, 0x1p48, 0x1p-60, 0x1p60, 0x1p-3
 
 typedef struct {
     const CompiledScene *compiled;
-    size_t kind;
+    size_t type;
     CertifiedRange range;
     atomic_bool exceeds;
 } RangeTest;
 
-static double primitive_reach(size_t kind, const void *primitive)
+static double primitive_reach(size_t type, const void *primitive)
 {
     Bounds bounds;
-    if (primitive_bounds(kind, primitive, &bounds))
+    if (primitive_bounds(type, primitive, &bounds))
         return fmax(vector_largest(bounds.min), vector_largest(bounds.max));
-    return shape_ops[kind]->largest_coordinate(primitive);
+    return shape_ops[type]->largest_coordinate(primitive);
 }
 
 // In the unit shape's space, where distances are up to twice the inverse's norm times as large, and not
@@ -38,18 +38,18 @@ static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, doub
 {
     const double unit = oval->sizes.x;
     if (!(2 * oval->inverses[0].w * reach <= range->reach_max)) return false;
-    return oval->id.z != KIND_TORI ||
+    return oval->id.z != TYPE_TORI ||
            (unit <= range->torus_max && (unit >= range->torus_min || unit <= range->roundoff * reach));
 }
 
-static bool is_in_range(const CertifiedRange *range, size_t kind, const void *primitive)
+static bool is_in_range(const CertifiedRange *range, size_t type, const void *primitive)
 {
-    const double reach = primitive_reach(kind, primitive);
+    const double reach = primitive_reach(type, primitive);
     // no square is taken of a plane's distance
-    if (kind == KIND_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
+    if (type == TYPE_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
-    if (kind == KIND_OVALS) return oval_is_in_range(range, primitive, reach);
-    if (kind != KIND_TORI) return true;
+    if (type == TYPE_OVALS) return oval_is_in_range(range, primitive, reach);
+    if (type != TYPE_TORI) return true;
     const Torus *torus = primitive;
     const double size = torus->center_major.w + torus->axis_minor.w;
     return size <= range->torus_max && (size >= range->torus_min || size <= range->roundoff * reach);
@@ -58,9 +58,9 @@ static bool is_in_range(const CertifiedRange *range, size_t kind, const void *pr
 static void range_test(void *context, size_t begin, size_t end)
 {
     RangeTest *test = context;
-    const FlatArray *array = &test->compiled->arrays[FLAT_FIRST_SHAPE + test->kind];
+    const FlatArray *array = &test->compiled->arrays[FLAT_FIRST_SHAPE + test->type];
     for (size_t i = begin; i < end; i++)
-        if (!is_in_range(&test->range, test->kind, flat_array_at(array, i))) {
+        if (!is_in_range(&test->range, test->type, flat_array_at(array, i))) {
             atomic_store(&test->exceeds, true);
             return;
         }
@@ -70,7 +70,7 @@ bool bounds_hold(const CompiledScene *compiled, const CompileSettings *settings)
 {
     RangeTest test = {.compiled = compiled,
                       .range = settings->precision == PRECISION_DOUBLE ? of_double : of_float};
-    for (; test.kind < KIND_COUNT && !test.exceeds; test.kind++)
-        parallel_run(compiled->arrays[FLAT_FIRST_SHAPE + test.kind].count, FLAT_RANGE_MIN, range_test, &test);
+    for (; test.type < TYPE_COUNT && !test.exceeds; test.type++)
+        parallel_run(compiled->arrays[FLAT_FIRST_SHAPE + test.type].count, FLAT_RANGE_MIN, range_test, &test);
     return !test.exceeds;
 }

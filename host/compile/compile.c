@@ -45,10 +45,10 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     if (compiled->instances) compiled->features |= FEATURE_INSTANCES;
     if (settings->hashes_primitives) {
         compiled->primitives_hash = HASH_START;
-        for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-            if (is_ordered_by_bvh(kind))
+        for (size_t type = 0; type < FLAT_COUNT; type++)
+            if (is_ordered_by_bvh(type))
                 compiled->primitives_hash =
-                    flat_array_hash(compiled->primitives_hash, &compiled->arrays[kind]);
+                    flat_array_hash(compiled->primitives_hash, &compiled->arrays[type]);
     }
     double start = clock_seconds();
     bvh_flatten(compiled, settings);

@@ -16,7 +16,7 @@
 
 static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_HEADER] = LAYOUT(SceneHeader, image, bvh_counts),
-#define SHAPE_LAYOUT(feature, Type, name, names) [FLAT_FIRST_SHAPE + KIND_##feature] = LAYOUT(Type, id, id),
+#define SHAPE_LAYOUT(feature, Type, name, names) [FLAT_FIRST_SHAPE + TYPE_##feature] = LAYOUT(Type, id, id),
     PRIMITIVE_LIST(SHAPE_LAYOUT)
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
@@ -29,9 +29,9 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_NODES] = {BVH_WIDTH_MAX / 4 * (BVH_PLANES * sizeof(scalar4) + 2 * sizeof(uint4)),
                     BVH_WIDTH_MAX / 4 * BVH_PLANES, BVH_WIDTH_MAX / 4 * 2},
     [FLAT_CULL_SPHERES] = LAYOUT_OF_REALS(CullSphere),
-    [FLAT_OBJECTS] = LAYOUT(ObjectEntry, kind_index_material, kind_index_material),
+    [FLAT_OBJECTS] = LAYOUT(ObjectEntry, type_index_material, type_index_material),
     [FLAT_MATERIALS] = LAYOUT(FlatMaterial, optical_depth, normal_map),
-    [FLAT_LIGHTS] = LAYOUT(FlatLight, kind, kind),
+    [FLAT_LIGHTS] = LAYOUT(FlatLight, type, type),
     [FLAT_SKY_CELLS] = LAYOUT_OF_REALS(FlatSkyCell),
     [FLAT_TEXTURE_LEVELS] = LAYOUT(TextureLevel, place, place),
     [FLAT_SHARED_MESHES] = LAYOUT(SharedMesh, place, place),
@@ -46,23 +46,23 @@ static void range_zero(void *context, size_t begin, size_t end)
     memset(flat_array_at(array, begin), 0, (end - begin) * array->layout.size);
 }
 
-static void array_renew(CompiledScene *compiled, size_t kind, FlatLayout layout, size_t count)
+static void array_renew(CompiledScene *compiled, size_t type, FlatLayout layout, size_t count)
 {
-    FlatArray *array = &compiled->arrays[kind];
+    FlatArray *array = &compiled->arrays[type];
     free(array->items);
     *array = (FlatArray){memory_allocate_large(count, layout.size), count, layout};
     parallel_run(count, FLAT_RANGE_MIN, range_zero, array);
-    compiled->changed[kind] = true;
+    compiled->changed[type] = true;
 }
 
-void flat_array_renew_as(CompiledScene *compiled, size_t kind, size_t count, FlatLayout layout)
+void flat_array_renew_as(CompiledScene *compiled, size_t type, size_t count, FlatLayout layout)
 {
-    array_renew(compiled, kind, layout, count);
+    array_renew(compiled, type, layout, count);
 }
 
-void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count)
+void flat_array_renew(CompiledScene *compiled, size_t type, size_t count)
 {
-    array_renew(compiled, kind, layouts[kind], count);
+    array_renew(compiled, type, layouts[type], count);
 }
 
 static size_t narrow_size(const FlatLayout *layout)
@@ -70,13 +70,13 @@ static size_t narrow_size(const FlatLayout *layout)
     return 4 * sizeof(float) * layout->scalar4_count + sizeof(uint4) * layout->uint4_count;
 }
 
-void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width, bool is_narrow)
+void flat_wide_array_renew(CompiledScene *compiled, size_t type, size_t count, unsigned width, bool is_narrow)
 {
-    const FlatLayout widest = layouts[kind];
+    const FlatLayout widest = layouts[type];
     const unsigned parts = BVH_WIDTH_MAX / width;
     const FlatLayout layout = {widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts};
     const size_t size = narrow_size(&layout);
-    array_renew(compiled, kind, is_narrow ? (FlatLayout){size, 0, size / sizeof(uint4)} : layout, count);
+    array_renew(compiled, type, is_narrow ? (FlatLayout){size, 0, size / sizeof(uint4)} : layout, count);
 }
 
 void *flat_array_at(const FlatArray *array, size_t index)
@@ -84,11 +84,11 @@ void *flat_array_at(const FlatArray *array, size_t index)
     return (char *)array->items + index * array->layout.size;
 }
 
-bool is_ordered_by_bvh(size_t kind)
+bool is_ordered_by_bvh(size_t type)
 {
-    return (kind >= FLAT_FIRST_SHAPE && kind < FLAT_FIRST_SHAPE + KIND_COUNT) || kind == FLAT_OBJECTS ||
-           kind == FLAT_NODES || kind == FLAT_TRIANGLE_BLOCKS || kind == FLAT_SPHERE_BLOCKS ||
-           kind == FLAT_BLOCK_PLACES || kind == FLAT_SHARED_MESHES || kind == FLAT_INSTANCE_IDS;
+    return (type >= FLAT_FIRST_SHAPE && type < FLAT_FIRST_SHAPE + TYPE_COUNT) || type == FLAT_OBJECTS ||
+           type == FLAT_NODES || type == FLAT_TRIANGLE_BLOCKS || type == FLAT_SPHERE_BLOCKS ||
+           type == FLAT_BLOCK_PLACES || type == FLAT_SHARED_MESHES || type == FLAT_INSTANCE_IDS;
 }
 
 uint64_t flat_array_hash(uint64_t hash, const FlatArray *array)
@@ -108,8 +108,8 @@ uint32_t *flat_id(const FlatArray *array, void *primitive)
 
 void compiled_scene_free(CompiledScene *compiled)
 {
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        free(compiled->arrays[kind].items);
+    for (size_t type = 0; type < FLAT_COUNT; type++)
+        free(compiled->arrays[type].items);
     free(compiled->textures);
     instance_plan_free(compiled->instances);
     *compiled = (CompiledScene){0};

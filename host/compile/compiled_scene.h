@@ -26,7 +26,7 @@ typedef enum {
     FLAT_TEXELS,
     FLAT_COUNT,
     FLAT_FIRST_SHAPE = FLAT_HEADER + 1
-} FlatKind;
+} FlatType;
 
 // A texture's full size, its levels in FLAT_TEXTURE_LEVELS, and its largest channel.
 typedef struct CompiledTexture {
@@ -46,7 +46,7 @@ typedef struct {
     // What the stages leave for later ones and for the header.
     CompiledTexture *textures;       // of each of the scene's textures
     struct InstancePlan *instances;  // NULL: no mesh is shared
-    uint32_t bvh_counts[KIND_COUNT]; // primitives in the BVH, the first of their arrays
+    uint32_t bvh_counts[TYPE_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;               // of these; 0 where there are none
     uint32_t cull_sphere_count;      // of each common origin
     Vector3 eye;                     // from which the arrays are seen; NAN: a move failed
@@ -68,13 +68,13 @@ static inline scalar4 scalar4_of(Vector3 v, double w)
 
 // Replaces an array by one of `count` zeroed structs; nodes and blocks of triangles have `width` children or
 // triangles: a power of two, 4 to 16. A narrow array has its reals as floats.
-void flat_array_renew(CompiledScene *compiled, size_t kind, size_t count);
-void flat_wide_array_renew(CompiledScene *compiled, size_t kind, size_t count, unsigned width,
+void flat_array_renew(CompiledScene *compiled, size_t type, size_t count);
+void flat_wide_array_renew(CompiledScene *compiled, size_t type, size_t count, unsigned width,
                            bool is_narrow);
-void flat_array_renew_as(CompiledScene *compiled, size_t kind, size_t count, FlatLayout layout);
+void flat_array_renew_as(CompiledScene *compiled, size_t type, size_t count, FlatLayout layout);
 void *flat_array_at(const FlatArray *array, size_t index);
 // Whether the order of an array, or all of it, follows from the BVH, and so from the kernel's lanes.
-bool is_ordered_by_bvh(size_t kind);
+bool is_ordered_by_bvh(size_t type);
 // Extends the hash by the members of an array's structs.
 uint64_t flat_array_hash(uint64_t hash, const FlatArray *array);
 // The object's id in a shape's struct of this array.

@@ -40,11 +40,11 @@ static Bounds everywhere(void)
     return bounds_around((Vector3){0, 0, 0}, vector_all(INFINITY));
 }
 
-static ContactRegion region_of(size_t kind, const void *primitive)
+static ContactRegion region_of(size_t type, const void *primitive)
 {
-    const ShapeOps *shape = shape_ops[kind];
+    const ShapeOps *shape = shape_ops[type];
     ContactRegion region = {.box = everywhere()};
-    if (primitive_bounds(kind, primitive, &region.box))
+    if (primitive_bounds(type, primitive, &region.box))
         region.largest_coordinate = fmax(vector_largest(region.box.min), vector_largest(region.box.max));
     else
         region.largest_coordinate = shape->largest_coordinate(primitive);
@@ -117,17 +117,17 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
     *list = (ContactRegionList){
         .items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count + 1, sizeof(ContactRegion))};
     double largest = 0;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
+    for (size_t type = 0; type < TYPE_COUNT; type++) {
+        const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
         for (size_t i = 0; i < array->count; i++) {
             const void *primitive = flat_array_at(array, i);
             const uint32_t entry = entry_of_id(compiled, *flat_id(array, flat_array_at(array, i)));
-            const FlatMaterial *material = &materials[entries[entry].kind_index_material.z];
+            const FlatMaterial *material = &materials[entries[entry].type_index_material.z];
             const bool is_transparent = material->reflection_transmission_ior.y > 0;
-            if (kind == KIND_INSTANCES ? !instance_has(compiled, primitive, is_transparent, transparent)
+            if (type == TYPE_INSTANCES ? !instance_has(compiled, primitive, is_transparent, transparent)
                                        : transparent != is_transparent)
                 continue;
-            list->items[list->count] = region_of(kind, flat_array_at(array, i));
+            list->items[list->count] = region_of(type, flat_array_at(array, i));
             largest = fmax(largest, list->items[list->count++].largest_coordinate);
         }
     }
@@ -181,7 +181,7 @@ static Bounds lists_meet(ContactRegionList *transparent, ContactRegionList *opaq
 static double conditions_largest(const CompiledScene *compiled)
 {
     double largest = compiled->instances ? compiled->instances->condition : 0;
-    const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + KIND_OVALS];
+    const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + TYPE_OVALS];
     for (size_t i = 0; i < array->count; i++)
         largest = fmax(largest, ((const Oval *)array->items)[i].extent.w);
     return largest;

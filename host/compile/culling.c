@@ -23,33 +23,33 @@ static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, Cull
 static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, CullSlack slack)
 {
     uint32_t count = 0;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        count += compiled->bvh_counts[kind];
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        count += compiled->bvh_counts[type];
     if (count == 0) return (CullSphere){{0, 0, 0, CULL_SPHERE_MAX}};
     return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, slack);
 }
 
-// The first primitive of a kind outside the BVH, and the end of those that have cull spheres: planes have
+// The first primitive of a type outside the BVH, and the end of those that have cull spheres: planes have
 // none.
 typedef struct {
     size_t first, end;
 } Outside;
 
-static Outside outside_bvh(const CompiledScene *compiled, size_t kind)
+static Outside outside_bvh(const CompiledScene *compiled, size_t type)
 {
-    size_t first = compiled->bvh_counts[kind];
-    return (Outside){first, kind == KIND_PLANES ? first : compiled->arrays[FLAT_FIRST_SHAPE + kind].count};
+    size_t first = compiled->bvh_counts[type];
+    return (Outside){first, type == TYPE_PLANES ? first : compiled->arrays[FLAT_FIRST_SHAPE + type].count};
 }
 
 static void row_fill(const CompiledScene *compiled, Vector3 common_origin, CullSlack slack, CullSphere *row)
 {
     *row++ = bvh_cull_sphere(compiled, common_origin, slack);
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        Outside outside = outside_bvh(compiled, kind);
+    for (size_t type = 0; type < TYPE_COUNT; type++) {
+        Outside outside = outside_bvh(compiled, type);
         for (size_t i = outside.first; i < outside.end; i++) {
-            const void *primitive = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + kind], i);
-            const CullSlack own = {slack.squared, kind == KIND_INSTANCES ? slack.distance : 0};
-            *row++ = cull_sphere(primitive_bounding_sphere(kind, primitive), common_origin, own);
+            const void *primitive = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + type], i);
+            const CullSlack own = {slack.squared, type == TYPE_INSTANCES ? slack.distance : 0};
+            *row++ = cull_sphere(primitive_bounding_sphere(type, primitive), common_origin, own);
         }
     }
 }
@@ -66,8 +66,8 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
                         slack.distance};
     const FlatArray *lights = &compiled->arrays[FLAT_LIGHTS];
     size_t count = 1;
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        Outside outside = outside_bvh(compiled, kind);
+    for (size_t type = 0; type < TYPE_COUNT; type++) {
+        Outside outside = outside_bvh(compiled, type);
         count += outside.end - outside.first;
     }
     if (count > CULL_SPHERES_MAX / (1 + lights->count)) {

@@ -9,8 +9,8 @@
 const char *const feature_names[FEATURE_COUNT] = {FEATURE_LIST(FEATURE_NAME)};
 #undef FEATURE_NAME
 
-#define SHAPE_FEATURE(feature, Type, name, names) [KIND_##feature] = FEATURE_##feature,
-static const FeatureSet shape_features[KIND_COUNT] = {SHAPE_LIST(SHAPE_FEATURE)};
+#define SHAPE_FEATURE(feature, Type, name, names) [TYPE_##feature] = FEATURE_##feature,
+static const FeatureSet shape_features[TYPE_COUNT] = {SHAPE_LIST(SHAPE_FEATURE)};
 #undef SHAPE_FEATURE
 
 static const FeatureSet light_features[] = {
@@ -52,7 +52,7 @@ FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         set |= of(&scene->materials.items[object->material]);
-        if (object->kind != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
+        if (object->type != SHAPE_MESH || is_done[object->as.mesh.index]) continue;
         const Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         const uint32_t *materials = mesh_materials(mesh, object);
         is_done[object->as.mesh.index] = materials != NULL;
@@ -68,13 +68,13 @@ FeatureSet features_of(const Scene *scene)
     FeatureSet set = materials_union(scene, material_features);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        set |= shape_features[shape_ops[object->kind]->kind];
-        if (object->kind == SHAPE_OVAL) set |= shape_features[object->as.oval.unit];
+        set |= shape_features[shape_ops[object->type]->type];
+        if (object->type == SHAPE_OVAL) set |= shape_features[object->as.oval.unit];
         if (object_is_smooth(scene, object)) set |= FEATURE_SMOOTH_NORMALS;
     }
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
-        set |= light_features[light->kind];
+        set |= light_features[light->type];
         if (light_fades(light)) set |= FEATURE_FADING_LIGHTS;
         if (light->area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
         if (light->area == AREA_SKY) set |= FEATURE_SKY_LIGHT;

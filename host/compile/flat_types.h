@@ -12,8 +12,8 @@
 #undef SkyCell
 #undef Material
 
-// Returns whether kernels with several lanes read a leaf of this kind as a block.
-static inline bool kind_has_blocks(unsigned kind)
+// Returns whether kernels with several lanes read a leaf of this type as a block.
+static inline bool type_has_blocks(unsigned type)
 {
-    return kind == KIND_TRIANGLES || kind == KIND_SPHERES;
+    return type == TYPE_TRIANGLES || type == TYPE_SPHERES;
 }

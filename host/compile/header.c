@@ -77,9 +77,9 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         header.sky_texture =
             (uint4){1 + texture->first_level, texture->level_count, WRAP_REPEATED, WRAP_CLAMPED};
     }
-    uint32_t counts[KIND_COUNT];
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        counts[kind] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + kind].count;
+    uint32_t counts[TYPE_COUNT];
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        counts[type] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + type].count;
     memcpy(header.counts, counts, sizeof counts);
     memcpy(header.bvh_counts, compiled->bvh_counts, sizeof compiled->bvh_counts);
     flat_array_renew(compiled, FLAT_HEADER, 1);

@@ -73,7 +73,7 @@ static bool map_suits(const Scene *scene, const Object *object, const SharedMesh
     for (size_t i = 0; i < scene->lights.count && suits; i++) {
         const Light *light = &scene->lights.items[i];
         suits =
-            light->kind == LIGHT_DIRECTIONAL ||
+            light->type == LIGHT_DIRECTIONAL ||
             vector_largest(vector_subtract(light->position, center)) * inverse_largest <= LIGHT_DISTANCE_MAX;
     }
     if (suits) *condition = fmax(*condition, own_condition * (1 + 1e-9)); // more than its rounding
@@ -142,7 +142,7 @@ static uint32_t shared_mesh_find(Planning *planning, const Object *object)
 
 static bool is_instance(const Object *object)
 {
-    return object->kind == SHAPE_MESH && object->as.mesh.is_instance;
+    return object->type == SHAPE_MESH && object->as.mesh.is_instance;
 }
 
 // Returns whether meshes are shared where that suits them.
@@ -234,11 +234,11 @@ void instance_flatten(Flattening *flattening, const Object *object, uint32_t sha
     instance.inverses[0].w = sqrt(fabs(map.determinant));
     const uint32_t first = (uint32_t)flattening->primitive_count,
                    count = (uint32_t)object_primitive_count(flattening->scene, object);
-    primitive_add(flattening, KIND_INSTANCES, &instance, object->material);
+    primitive_add(flattening, TYPE_INSTANCES, &instance, object->material);
     if (flattening->moved) return;
     flattening->primitive_count += count - 1;
     InstanceIds *ids = flattening->compiled->arrays[FLAT_INSTANCE_IDS].items;
-    ids[flattening->counts[KIND_INSTANCES] - 1].ids =
+    ids[flattening->counts[TYPE_INSTANCES] - 1].ids =
         (uint4){first, first + count, (uint32_t)(flattening->primitive_count - flattening->entry_count), 0};
 }
 
@@ -266,7 +266,7 @@ uint32_t entry_of_id(const CompiledScene *compiled, uint32_t id)
 }
 
 // The arrays that shared meshes add to.
-static const FlatKind extended[EXTENDED_COUNT] = {FLAT_FIRST_SHAPE + KIND_TRIANGLES,
+static const FlatType extended[EXTENDED_COUNT] = {FLAT_FIRST_SHAPE + TYPE_TRIANGLES,
                                                   FLAT_TRIANGLE_NORMALS,
                                                   FLAT_TRIANGLE_UVS,
                                                   FLAT_OBJECTS,
@@ -279,7 +279,7 @@ static CompiledScene shared_mesh_compile(const CompiledScene *compiled, const Sc
                                          uint64_t *hash)
 {
     Mesh mesh = scene->meshes.items[shared->mesh];
-    Object object = {.kind = SHAPE_MESH, .material = shared->object_material};
+    Object object = {.type = SHAPE_MESH, .material = shared->object_material};
     if (shared->material > 0) mesh.materials = NULL;
     mesh.vertices = memory_allocate(mesh.vertex_count, sizeof *mesh.vertices);
     for (size_t i = 0; i < mesh.vertex_count; i++)
@@ -302,9 +302,9 @@ static CompiledScene shared_mesh_compile(const CompiledScene *compiled, const Sc
 }
 
 // Replaces an array by one that has room for more behind it.
-static void array_extend(CompiledScene *compiled, FlatKind kind, size_t count)
+static void array_extend(CompiledScene *compiled, FlatType type, size_t count)
 {
-    FlatArray *array = &compiled->arrays[kind];
+    FlatArray *array = &compiled->arrays[type];
     const size_t size = array->layout.size;
     void *items = memory_allocate_large(array->count + count, size);
     if (array->count > 0) memcpy(items, array->items, array->count * size);
@@ -312,29 +312,29 @@ static void array_extend(CompiledScene *compiled, FlatKind kind, size_t count)
     array->items = items;
 }
 
-static void array_append(CompiledScene *compiled, FlatKind kind, const FlatArray *added)
+static void array_append(CompiledScene *compiled, FlatType type, const FlatArray *added)
 {
-    FlatArray *array = &compiled->arrays[kind];
+    FlatArray *array = &compiled->arrays[type];
     if (added->count > 0)
         memcpy(flat_array_at(array, array->count), added->items, added->count * array->layout.size);
     array->count += added->count;
-    compiled->changed[kind] = true;
+    compiled->changed[type] = true;
 }
 
 // Points the structs of a shared mesh to their places behind those of `compiled`.
 static void shared_mesh_shift(const CompiledScene *compiled, CompiledScene *part)
 {
     uint32_t bases[FLAT_COUNT];
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++)
-        bases[kind] = (uint32_t)compiled->arrays[kind].count;
-    const uint32_t triangle_base = bases[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
-    const FlatArray *triangles = &part->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES];
+    for (size_t type = 0; type < FLAT_COUNT; type++)
+        bases[type] = (uint32_t)compiled->arrays[type].count;
+    const uint32_t triangle_base = bases[FLAT_FIRST_SHAPE + TYPE_TRIANGLES];
+    const FlatArray *triangles = &part->arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES];
     ObjectEntry *entries = part->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < triangles->count; i++) {
         Triangle *triangle = flat_array_at(triangles, i);
         if (triangle->id.y > 0) triangle->id.y += bases[FLAT_TRIANGLE_NORMALS];
         if (triangle->id.z > 0) triangle->id.z += bases[FLAT_TRIANGLE_UVS];
-        entries[i].kind_index_material.y += triangle_base;
+        entries[i].type_index_material.y += triangle_base;
     }
     const uint32_t block_count = (uint32_t)part->arrays[FLAT_TRIANGLE_BLOCKS].count;
     bvh_shift(part, bases[FLAT_NODES], block_count > 0 ? bases[FLAT_TRIANGLE_BLOCKS] : triangle_base);
@@ -403,7 +403,7 @@ void shared_meshes_append(CompiledScene *compiled, const Scene *scene, const Com
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     for (size_t i = 0; i < ids->count; i++) {
         uint4 *of_instance = &((InstanceIds *)ids->items)[i].ids;
-        of_instance->w = entries[entry_of_id(compiled, of_instance->x)].kind_index_material.y;
+        of_instance->w = entries[entry_of_id(compiled, of_instance->x)].type_index_material.y;
     }
 }
 

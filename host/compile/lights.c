@@ -1,8 +1,8 @@
 #include "host/compile/stages.h"
 #include "host/scene/portable.h"
 
-_Static_assert((int)LIGHT_POINT == LIGHT_KIND_POINT && (int)LIGHT_DIRECTIONAL == LIGHT_KIND_DIRECTIONAL &&
-                   (int)LIGHT_SPOT == LIGHT_KIND_SPOT,
+_Static_assert((int)LIGHT_POINT == LIGHT_TYPE_POINT && (int)LIGHT_DIRECTIONAL == LIGHT_TYPE_DIRECTIONAL &&
+                   (int)LIGHT_SPOT == LIGHT_TYPE_SPOT,
                "kinds of lights have the kernels' numbers");
 _Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT_AREA_RECTANGLE &&
                    (int)AREA_ELLIPSE == LIGHT_AREA_ELLIPSE && (int)AREA_SPHERE == LIGHT_AREA_SPHERE &&
@@ -26,20 +26,20 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
-                                .kind = {.x = (uint32_t)light->kind, .y = (uint32_t)light->area}};
+                                .type = {.x = (uint32_t)light->type, .y = (uint32_t)light->area}};
         if (light->area != AREA_NONE) {
             const double factor = light->area == AREA_SKY ? scene->sky.cell_factor : light->radius;
-            const double unit = light->kind == LIGHT_DIRECTIONAL ? 1 / vector_length(light->direction) : 1;
+            const double unit = light->type == LIGHT_DIRECTIONAL ? 1 / vector_length(light->direction) : 1;
             lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), factor);
             lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
         }
         lights[i].fading =
             (scalar4){light_fades(light) ? light->fading[0] : 1, light->fading[1], light->fading[2], 0};
-        if (light->kind != LIGHT_DIRECTIONAL)
+        if (light->type != LIGHT_DIRECTIONAL)
             lights[i].position = scalar4_of(point_from_eye(rounding, light->position), 0);
-        if (light->kind != LIGHT_POINT)
+        if (light->type != LIGHT_POINT)
             lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
-        if (light->kind == LIGHT_SPOT) {
+        if (light->type == LIGHT_SPOT) {
             double outer = versine(light->half_angle), inner = versine(light->half_angle - light->penumbra);
             lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
         }

@@ -25,7 +25,7 @@ bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *m
     size_t copied = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        if (object->kind == SHAPE_MESH && object->as.mesh.is_instance && instance_mesh(compiled, i) == 0)
+        if (object->type == SHAPE_MESH && object->as.mesh.is_instance && instance_mesh(compiled, i) == 0)
             copied += object_primitive_count(scene, object);
     }
     if (copied <= copied_max) return true;
@@ -70,7 +70,7 @@ void sizes_check(const Scene *scene, const CompileSettings *settings, MessageLis
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         Bounds bounds;
-        if (!shape_ops[object->kind]->bounds(scene, object, &bounds)) continue;
+        if (!shape_ops[object->type]->bounds(scene, object, &bounds)) continue;
         const double reach = fmax(vector_largest(vector_subtract(bounds.min, eye)),
                                   vector_largest(vector_subtract(bounds.max, eye)));
         const double width = box_width(&bounds);
@@ -136,7 +136,7 @@ static double stretch_largest(const Scene *scene)
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         double least, most;
-        if (object->kind != SHAPE_OVAL) continue;
+        if (object->type != SHAPE_OVAL) continue;
         oval_stretches(object, &least, &most);
         largest = fmax(largest, most / least);
     }
@@ -153,7 +153,7 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
         const Light *light = &scene->lights.items[i];
         const double distance = vector_largest(vector_subtract(light->position, eye)) + light->radius +
                                 vector_largest(light->across[0]) + vector_largest(light->across[1]);
-        if (light->kind == LIGHT_DIRECTIONAL || distance <= farthest) continue;
+        if (light->type == LIGHT_DIRECTIONAL || distance <= farthest) continue;
         return message_error(
             messages,
             "a light lies %.3g from the eye, farther than precision %s can square (%.3g): use a "
@@ -200,8 +200,8 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
                 vector_is_within(basis.middle, largest) && vector_is_within(basis.right, largest) &&
                 vector_is_within(basis.up, largest) &&
                 vector_is_within(vector_add(compiled->eye_offset, basis.shift), largest);
-    for (size_t kind = 0; kind < FLAT_COUNT && fits; kind++)
-        fits = !compiled->changed[kind] || array_fits(&compiled->arrays[kind], largest);
+    for (size_t type = 0; type < FLAT_COUNT && fits; type++)
+        fits = !compiled->changed[type] || array_fits(&compiled->arrays[type], largest);
     if (fits) return true;
     return message_error(messages,
                          "a number of the scene does not fit precision %s: its magnitude is beyond %s",

@@ -52,8 +52,8 @@ static Triangles triangles_open(const Scene *scene)
     size_t count = 0, vertex_count = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        const bool is_mesh = object->kind == SHAPE_MESH;
-        if (!is_mesh && object->kind != SHAPE_TRIANGLE) continue;
+        const bool is_mesh = object->type == SHAPE_MESH;
+        if (!is_mesh && object->type != SHAPE_TRIANGLE) continue;
         const size_t triangle_count = object_primitive_count(scene, object);
         const bool has_vertices = is_mesh && !object->as.mesh.is_instance;
         count += triangle_count;
@@ -69,14 +69,14 @@ static Triangles triangles_open(const Scene *scene)
     uint32_t id = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
+        const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
         const size_t first = triangles.all.triangle_count;
         triangles.first_ids[i] = id;
         if (mesh && object->as.mesh.is_instance)
             instance_add(&triangles, mesh, object, id);
         else if (mesh)
             triangles_add(&triangles, mesh, id);
-        if (object->kind == SHAPE_TRIANGLE) {
+        if (object->type == SHAPE_TRIANGLE) {
             Object copy = *object;
             Mesh single = {.vertices = copy.as.triangle.vertices,
                            .vertex_count = 3,
@@ -193,7 +193,7 @@ static MeshTriangle triangle_at(const Triangles *triangles, size_t index)
     const Scene *scene = triangles->scene;
     const uint32_t owner = triangles->owners[index];
     const Object *object = &scene->objects.items[owner];
-    if (object->kind == SHAPE_MESH)
+    if (object->type == SHAPE_MESH)
         return mesh_triangle_at(&scene->meshes.items[object->as.mesh.index], object,
                                 triangles->ids[index] - triangles->first_ids[owner]);
     MeshTriangle triangle;
@@ -247,7 +247,7 @@ static void sides_find(void *context, size_t begin, size_t end)
 void neighbors_find(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const bool is_wanted =
-        settings->certifies && compiled->arrays[FLAT_FIRST_SHAPE + KIND_TRIANGLES].count > 0;
+        settings->certifies && compiled->arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].count > 0;
     flat_array_renew(compiled, FLAT_TRIANGLE_NEIGHBORS, is_wanted ? compiled->arrays[FLAT_OBJECTS].count : 0);
     if (!is_wanted) return;
     Triangles triangles = triangles_open(scene);

@@ -8,15 +8,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-void primitive_add(Flattening *flattening, int kind, const void *primitive, uint32_t material)
+void primitive_add(Flattening *flattening, int type, const void *primitive, uint32_t material)
 {
     const uint32_t id = (uint32_t)flattening->primitive_count++, entry = (uint32_t)flattening->entry_count++;
-    FlatArray *array = &flattening->compiled->arrays[FLAT_FIRST_SHAPE + kind];
+    FlatArray *array = &flattening->compiled->arrays[FLAT_FIRST_SHAPE + type];
     void *target = flattening->moved;
     if (!target) {
-        const uint32_t index = (uint32_t)flattening->counts[kind]++;
+        const uint32_t index = (uint32_t)flattening->counts[type]++;
         ObjectEntry *entries = flattening->compiled->arrays[FLAT_OBJECTS].items;
-        entries[entry].kind_index_material = (uint4){(uint32_t)kind, index, material, 0};
+        entries[entry].type_index_material = (uint4){(uint32_t)type, index, material, 0};
         target = flat_array_at(array, index);
     }
     memcpy(target, primitive, array->layout.size);
@@ -43,21 +43,21 @@ bool primitive_take_power(Flattening *flattening, double power, uint4 *id)
 
 static void arrays_make(CompiledScene *compiled, const Scene *scene)
 {
-    size_t counts[KIND_COUNT] = {0}, normals_count = 0, uvs_count = 0;
+    size_t counts[TYPE_COUNT] = {0}, normals_count = 0, uvs_count = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
+        const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
         size_t count = object_primitive_count(scene, object);
         if (instance_mesh(compiled, i) > 0) {
-            counts[KIND_INSTANCES]++;
+            counts[TYPE_INSTANCES]++;
             continue;
         }
-        counts[shape_ops[object->kind]->kind] += count;
+        counts[shape_ops[object->type]->type] += count;
         if (object_is_smooth(scene, object)) normals_count += count;
         if (mesh && mesh->uvs && scene->textures.count > 0) uvs_count += count;
     }
-    for (size_t kind = 0; kind < KIND_COUNT; kind++)
-        flat_array_renew(compiled, FLAT_FIRST_SHAPE + kind, counts[kind]);
+    for (size_t type = 0; type < TYPE_COUNT; type++)
+        flat_array_renew(compiled, FLAT_FIRST_SHAPE + type, counts[type]);
     flat_array_renew(compiled, FLAT_TRIANGLE_NORMALS, normals_count);
     flat_array_renew(compiled, FLAT_TRIANGLE_UVS, uvs_count);
     const InstancePlan *plan = compiled->instances;
@@ -78,7 +78,7 @@ void objects_flatten(CompiledScene *compiled, const Scene *scene, const Rounding
         const uint32_t shared = instance_mesh(compiled, i);
         if (shared > 0) instance_flatten(&flattening, object, shared - 1);
         for (flattening.part = 0; shared == 0 && flattening.part < count; flattening.part++)
-            shape_ops[object->kind]->flatten(&flattening, object);
+            shape_ops[object->type]->flatten(&flattening, object);
     }
     compiled->features |= flattening.features;
     compiled->arrays[FLAT_TRIANGLE_NORMALS].count = flattening.normals_count;
@@ -118,7 +118,7 @@ static void range_move(void *context, size_t begin, size_t end)
         if (shared > 0)
             instance_flatten(&flattening, of_id, shared - 1);
         else
-            shape_ops[of_id->kind]->flatten(&flattening, of_id);
+            shape_ops[of_id->type]->flatten(&flattening, of_id);
     }
     atomic_fetch_or(&move->features, flattening.features);
 }
@@ -131,9 +131,9 @@ void objects_move(CompiledScene *compiled, const Scene *scene, const Rounding *r
         first_ids[i + 1] = first_ids[i] + (uint32_t)object_primitive_count(scene, &scene->objects.items[i]);
     Move move = {.flattening = {.compiled = compiled, .scene = scene, .rounding = *rounding},
                  .first_ids = first_ids};
-    for (size_t kind = 0; kind < KIND_COUNT; kind++) {
-        move.array = &compiled->arrays[FLAT_FIRST_SHAPE + kind];
-        compiled->changed[FLAT_FIRST_SHAPE + kind] = true;
+    for (size_t type = 0; type < TYPE_COUNT; type++) {
+        move.array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
+        compiled->changed[FLAT_FIRST_SHAPE + type] = true;
         parallel_run(move.array->count, FLAT_RANGE_MIN, range_move, &move);
     }
     free(first_ids);

@@ -60,12 +60,12 @@ Vector3 vector_on_grid(Vector3 point)
 size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX])
 {
     size_t count = 0;
-    for (ShapeKind kind = 0; kind < SHAPE_MESH; kind++) {
-        const ShapeOps *shape = shape_ops[kind];
+    for (ShapeType type = 0; type < SHAPE_MESH; type++) {
+        const ShapeOps *shape = shape_ops[type];
         for (unsigned form = 0; form < SHAPE_OPS_FORMS && shape->forms[form]; form++) {
             if (count == SHAPE_FORMS_MAX) fault("more than %d forms of shapes", SHAPE_FORMS_MAX);
             ShapeForm *entry = &forms[count++];
-            *entry = (ShapeForm){kind, form, shape->forms[form], false};
+            *entry = (ShapeForm){type, form, shape->forms[form], false};
             Bounds bounds;
             RandomShape one = random_shape(entry, &(Random){0});
             entry->bounded = shape->bounds(NULL, &one.object, &bounds);
@@ -77,8 +77,8 @@ size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX])
 static RandomShape shape_make(const ShapeForm *form, Vector3 center, double size, Vector3 axis,
                               Random *random)
 {
-    RandomShape made = {.object.kind = form->kind, .center = center, .radius = size, .axis = axis};
-    shape_ops[form->kind]->randomize(&made, form->form, random);
+    RandomShape made = {.object.type = form->type, .center = center, .radius = size, .axis = axis};
+    shape_ops[form->type]->randomize(&made, form->form, random);
     return made;
 }
 

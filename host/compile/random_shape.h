@@ -29,7 +29,7 @@ typedef struct {
 
 // A form of a shape, such as "open cylinder".
 typedef struct {
-    ShapeKind kind;
+    ShapeType type;
     unsigned form;
     const char *name;
     bool bounded;

@@ -5,7 +5,7 @@
 static bool object_bounds(const Scene *scene, size_t index, Bounds *bounds)
 {
     const Object *object = &scene->objects.items[index];
-    return shape_ops[object->kind]->bounds(scene, object, bounds);
+    return shape_ops[object->type]->bounds(scene, object, bounds);
 }
 
 Bounds scene_bounds(const Scene *scene, size_t *unbounded_count)

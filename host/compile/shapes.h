@@ -15,7 +15,7 @@ enum { SHAPE_OPS_FORMS = 4 };
 // An Object is the scene's, in double and in world coordinates; a primitive is the flat struct of
 // kernels/types.h, relative to the eye. A mesh is an object alone: its primitives are triangles.
 typedef struct {
-    int kind; // KIND_… of its primitives
+    int type; // TYPE_… of its primitives
     // Offsets in Object, up to the first 0: of positions and other vectors (axes, normals); of lengths.
     size_t vectors[7], lengths[3];
     // Restores what transforms of its vectors break; NULL: nothing.
@@ -41,12 +41,12 @@ typedef struct {
     double (*largest_coordinate)(const void *primitive);
 } ShapeOps;
 
-// By ShapeKind, whose values but SHAPE_MESH are those of KIND_….
+// By ShapeType, whose values but SHAPE_MESH are those of TYPE_….
 extern const ShapeOps *const shape_ops[SHAPE_COUNT];
 
 // The bounds of a primitive; false where it is unbounded.
-bool primitive_bounds(size_t kind, const void *primitive, Bounds *bounds);
-BoundingSphere primitive_bounding_sphere(size_t kind, const void *primitive);
+bool primitive_bounds(size_t type, const void *primitive, Bounds *bounds);
+BoundingSphere primitive_bounding_sphere(size_t type, const void *primitive);
 
 // The sphere around a box, larger by a bound on the rounding errors here and in the box far from the eye.
 BoundingSphere box_bounding_sphere(const Bounds *box);

@@ -23,7 +23,7 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     }
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
-        const ShapeOps *shape = shape_ops[object->kind];
+        const ShapeOps *shape = shape_ops[object->type];
         for (const size_t *offset = shape->vectors; *offset > 0; offset++)
             change((Vector3 *)(void *)((char *)object + *offset), factor);
         if (shape->restore) shape->restore(object);
@@ -43,9 +43,9 @@ void scene_scale(Scene *scene, double factor)
     if (scene->camera.orthographic) scene->camera.half_tangent *= factor;
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
-        for (const size_t *offset = shape_ops[object->kind]->lengths; *offset > 0; offset++)
+        for (const size_t *offset = shape_ops[object->type]->lengths; *offset > 0; offset++)
             *(double *)(void *)((char *)object + *offset) *= factor;
-        for (int row = 0; row < 3 && object->kind == SHAPE_MESH && object->as.mesh.is_instance; row++)
+        for (int row = 0; row < 3 && object->type == SHAPE_MESH && object->as.mesh.is_instance; row++)
             object->as.mesh.transform.rows[row][3] *= factor;
     }
     for (size_t i = 0; i < scene->lights.count; i++) {

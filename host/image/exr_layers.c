@@ -86,8 +86,8 @@ static exr_result_t candidates_add_part(CandidateList *list, exr_const_context_t
         }
         if (candidate->first < 0) candidate->first = i;
         candidate->count++;
-        const Base kind = base_of(base);
-        if (kind < BASE_COUNT && candidate->bases[kind] < 0) candidate->bases[kind] = i;
+        const Base type = base_of(base);
+        if (type < BASE_COUNT && candidate->bases[type] < 0) candidate->bases[type] = i;
     }
     return EXR_ERR_SUCCESS;
 }

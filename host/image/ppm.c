@@ -50,8 +50,8 @@ static bool number_read(const ImageFile *file, size_t *at, uint32_t *number)
 
 bool ppm_decode(Image *image, const ImageFile *file)
 {
-    char kind = (char)file->bytes[1];
-    bool is_text = kind == '2' || kind == '3';
+    char type = (char)file->bytes[1];
+    bool is_text = type == '2' || type == '3';
     size_t at = 2;
     uint32_t width, height, maximum;
     if (!number_read(file, &at, &width) || !number_read(file, &at, &height) ||
@@ -61,7 +61,7 @@ bool ppm_decode(Image *image, const ImageFile *file)
         return image_refuse(file, "PPM: the maximum must be 1 to 65535, not %u", maximum);
     // A value is a digit and a space, or its bytes.
     size_t value_size = is_text ? 2 : maximum > 255 ? 2 : 1;
-    if (!image_allocate(image, file, width, height, kind == '3' || kind == '6' ? 3 : 1,
+    if (!image_allocate(image, file, width, height, type == '3' || type == '6' ? 3 : 1,
                         sizeof *image->values / value_size))
         return false;
     image->display = true;

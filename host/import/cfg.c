@@ -48,11 +48,11 @@ typedef struct {
     bool has_camera;
 } CfgReader;
 
-typedef enum { BLOCK_CAMERA, BLOCK_LIGHT, BLOCK_OBJECT } BlockKind;
+typedef enum { BLOCK_CAMERA, BLOCK_LIGHT, BLOCK_OBJECT } BlockType;
 
 typedef struct {
     const char *name;
-    BlockKind kind;
+    BlockType type;
     const char *keys[BLOCK_KEYS_MAX]; // all required; ended by NULL
     void (*finish)(CfgReader *reader, const BlockValues *values);
 } Block;
@@ -70,7 +70,7 @@ static void camera_finish(CfgReader *reader, const BlockValues *values)
 
 static void light_finish(CfgReader *reader, const BlockValues *values)
 {
-    Light light = {.kind = LIGHT_POINT, .position = values->position, .color = values->intensity};
+    Light light = {.type = LIGHT_POINT, .position = values->position, .color = values->intensity};
     array_push(reader->scene->lights, light);
 }
 
@@ -86,27 +86,27 @@ static void object_finish(CfgReader *reader, const BlockValues *values, Object o
 
 static void sphere_finish(CfgReader *reader, const BlockValues *values)
 {
-    Object object = {.kind = SHAPE_SPHERE, .as.sphere = {.center = values->center, .radius = values->radius}};
+    Object object = {.type = SHAPE_SPHERE, .as.sphere = {.center = values->center, .radius = values->radius}};
     object_finish(reader, values, object);
 }
 
 static void plane_finish(CfgReader *reader, const BlockValues *values)
 {
-    Object object = {.kind = SHAPE_PLANE, .as.plane = {.point = values->position, .normal = values->normal}};
+    Object object = {.type = SHAPE_PLANE, .as.plane = {.point = values->position, .normal = values->normal}};
     object_finish(reader, values, object);
 }
 
 static void cylinder_finish(CfgReader *reader, const BlockValues *values)
 {
     Object object = {
-        .kind = SHAPE_CYLINDER,
+        .type = SHAPE_CYLINDER,
         .as.cylinder = {.from = values->center, .axis = values->normal, .radius = values->radius}};
     object_finish(reader, values, object);
 }
 
 static void cone_finish(CfgReader *reader, const BlockValues *values)
 {
-    Object object = {.kind = SHAPE_CONE,
+    Object object = {.type = SHAPE_CONE,
                      .as.cone = {.from = values->center,
                                  .axis = values->normal,
                                  .slope = portable_tangent(values->angle)}};
@@ -139,7 +139,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
 {
     Line *line = &reader->line;
     Word word = line_word(line);
-    if (word_is(word, "transfo") && block->kind == BLOCK_OBJECT) {
+    if (word_is(word, "transfo") && block->type == BLOCK_OBJECT) {
         report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
         return true;
     }
@@ -247,7 +247,7 @@ static void block_open(CfgReader *reader)
     }
     line_word(line);
     line_end(line);
-    bool is_camera = block->kind == BLOCK_CAMERA;
+    bool is_camera = block->type == BLOCK_CAMERA;
     if (is_camera && reader->has_camera) report_error(&reader->report, start, "a second camera");
     reader->has_camera |= is_camera;
     BlockValues values = {0};

@@ -22,14 +22,14 @@ static bool object_end(DatReader *reader, Object object, double size, size_t off
     if (size > 0)
         array_push(reader->scene->objects, object);
     else
-        dat_warn(reader, offset, "a %s without size or direction is not shown", shape_names[object.kind]);
+        dat_warn(reader, offset, "a %s without size or direction is not shown", shape_names[object.type]);
     return true;
 }
 
 bool dat_sphere(DatReader *reader)
 {
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_SPHERE};
+    Object object = {.type = SHAPE_SPHERE};
     return dat_vector(reader, "center", &object.as.sphere.center) &&
            dat_number(reader, "rad", &object.as.sphere.radius) &&
            object_end(reader, object, object.as.sphere.radius, offset);
@@ -38,7 +38,7 @@ bool dat_sphere(DatReader *reader)
 bool dat_plane(DatReader *reader)
 {
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_PLANE};
+    Object object = {.type = SHAPE_PLANE};
     return dat_vector(reader, "center", &object.as.plane.point) &&
            dat_vector(reader, "normal", &object.as.plane.normal) &&
            object_end(reader, object, !vector_is_zero(object.as.plane.normal), offset);
@@ -47,7 +47,7 @@ bool dat_plane(DatReader *reader)
 bool dat_cylinder(DatReader *reader)
 {
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_CYLINDER};
+    Object object = {.type = SHAPE_CYLINDER};
     return dat_vector(reader, "center", &object.as.cylinder.from) &&
            dat_vector(reader, "axis", &object.as.cylinder.axis) &&
            dat_number(reader, "rad", &object.as.cylinder.radius) &&
@@ -58,7 +58,7 @@ bool dat_cylinder(DatReader *reader)
 bool dat_finite_cylinder(DatReader *reader)
 {
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_CYLINDER, .as.cylinder.finite = true};
+    Object object = {.type = SHAPE_CYLINDER, .as.cylinder.finite = true};
     Vector3 apex;
     if (!dat_vector(reader, "base", &object.as.cylinder.from) || !dat_vector(reader, "apex", &apex) ||
         !dat_number(reader, "rad", &object.as.cylinder.radius))
@@ -90,11 +90,11 @@ bool dat_polycylinder(DatReader *reader)
     for (size_t i = 0; read && radius > 0 && i < points.count; i++) {
         const Vector3 point = points.items[i];
         const Vector3 axis = i > 0 ? vector_subtract(points.items[i - 1], point) : (Vector3){0, 0, 0};
-        const Object sphere = {.kind = SHAPE_SPHERE,
+        const Object sphere = {.type = SHAPE_SPHERE,
                                .material = material,
                                .as.sphere = {point, radius, false}},
                      cylinder = {
-                         .kind = SHAPE_CYLINDER,
+                         .type = SHAPE_CYLINDER,
                          .material = material,
                          .as.cylinder = {.from = point, .axis = axis, .radius = radius, .finite = true}};
         array_push(reader->scene->objects, sphere);
@@ -107,7 +107,7 @@ bool dat_polycylinder(DatReader *reader)
 static void mesh_add(DatReader *reader, Mesh *mesh, uint32_t material)
 {
     const Object object = {
-        .kind = SHAPE_MESH, .material = material, .as.mesh.index = (uint32_t)reader->scene->meshes.count};
+        .type = SHAPE_MESH, .material = material, .as.mesh.index = (uint32_t)reader->scene->meshes.count};
     array_push(reader->scene->meshes, *mesh);
     array_push(reader->scene->objects, object);
 }
@@ -139,7 +139,7 @@ static Mesh ring_mesh(Vector3 center, Vector3 normal, double inner, double outer
 bool dat_ring(DatReader *reader)
 {
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_DISC};
+    Object object = {.type = SHAPE_DISC};
     Vector3 center, normal;
     double inner, outer;
     if (!dat_vector(reader, "center", &center) || !dat_vector(reader, "normal", &normal) ||
@@ -159,7 +159,7 @@ bool dat_ring(DatReader *reader)
 bool dat_box(DatReader *reader)
 {
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_BOX};
+    Object object = {.type = SHAPE_BOX};
     Vector3 a, b;
     if (!dat_vector(reader, "min", &a) || !dat_vector(reader, "max", &b)) return false;
     object.as.box.min = vector_min(a, b);
@@ -188,13 +188,13 @@ static bool normals_read(DatReader *reader, Object *object)
 
 bool dat_triangle(DatReader *reader)
 {
-    Object object = {.kind = SHAPE_TRIANGLE};
+    Object object = {.type = SHAPE_TRIANGLE};
     return vertices_read(reader, &object) && object_end(reader, object, 1, 0);
 }
 
 bool dat_smooth_triangle(DatReader *reader)
 {
-    Object object = {.kind = SHAPE_TRIANGLE};
+    Object object = {.type = SHAPE_TRIANGLE};
     return vertices_read(reader, &object) && normals_read(reader, &object) &&
            object_end(reader, object, 1, 0);
 }
@@ -223,7 +223,7 @@ bool dat_colored_triangle(DatReader *reader)
 {
     static const char *const names[] = {"c0", "c1", "c2"};
     const size_t offset = reader->line.start;
-    Object object = {.kind = SHAPE_TRIANGLE};
+    Object object = {.type = SHAPE_TRIANGLE};
     Color colors[3];
     Material material;
     if (!vertices_read(reader, &object) || !normals_read(reader, &object)) return false;

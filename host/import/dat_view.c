@@ -114,7 +114,7 @@ static bool light_end(DatReader *reader, Light light)
     if (!dat_expect(reader, "color") || !dat_components(reader, "color", &light.color)) return false;
     if (!vector_is_zero(vector_min(light.color, vector_all(0))))
         return report_error(&reader->report, offset, "'color' must be 0 or more");
-    if (light.kind != LIGHT_POINT && vector_is_zero(light.direction))
+    if (light.type != LIGHT_POINT && vector_is_zero(light.direction))
         return report_error(&reader->report, offset, "'direction' must not be zero");
     light_fold_fading(&light);
     array_push(reader->scene->lights, light);
@@ -133,20 +133,20 @@ static bool light_place_read(DatReader *reader, Light *light)
 
 bool dat_light(DatReader *reader)
 {
-    Light light = {.kind = LIGHT_POINT};
+    Light light = {.type = LIGHT_POINT};
     return light_place_read(reader, &light) && fading_read(reader, &light) && light_end(reader, light);
 }
 
 bool dat_directional_light(DatReader *reader)
 {
-    Light light = {.kind = LIGHT_DIRECTIONAL};
+    Light light = {.type = LIGHT_DIRECTIONAL};
     return dat_vector(reader, "direction", &light.direction) && light_end(reader, light);
 }
 
 bool dat_spotlight(DatReader *reader)
 {
     static const Range range_falloff = {0, 180, true, "greater than 0 and less than 180"};
-    Light light = {.kind = LIGHT_SPOT};
+    Light light = {.type = LIGHT_SPOT};
     double start;
     if (!light_place_read(reader, &light) || !dat_vector(reader, "direction", &light.direction) ||
         !dat_number(reader, "falloff_start", &start) || !dat_expect(reader, "falloff_end") ||

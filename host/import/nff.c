@@ -156,7 +156,7 @@ static bool read_background(NffReader *reader)
 
 static bool read_light(NffReader *reader)
 {
-    Light light = {.kind = LIGHT_POINT};
+    Light light = {.type = LIGHT_POINT};
     if (!read_vector(reader, "position", NULL, &light.position)) return false;
     if (!line_peek(&reader->line).length)
         array_push(reader->white_lights, reader->scene->lights.count);
@@ -202,7 +202,7 @@ static void object_add(NffReader *reader, Object object)
 
 static bool read_sphere(NffReader *reader)
 {
-    Object object = {.kind = SHAPE_SPHERE};
+    Object object = {.type = SHAPE_SPHERE};
     double radius;
     if (!read_vector(reader, "center", NULL, &object.as.sphere.center)) return false;
     reach_word(reader);
@@ -234,14 +234,14 @@ static bool read_cone(NffReader *reader)
     bool only_inside = base_radius < 0 || apex_radius < 0;
     Object object;
     if (base_radius == apex_radius) {
-        object = (Object){.kind = SHAPE_CYLINDER,
+        object = (Object){.type = SHAPE_CYLINDER,
                           .as.cylinder = {.from = base,
                                           .axis = axis,
                                           .radius = fabs(base_radius),
                                           .finite = true,
                                           .only_inside = only_inside}};
     } else {
-        object = (Object){.kind = SHAPE_CONE,
+        object = (Object){.type = SHAPE_CONE,
                           .as.cone = {.from = base,
                                       .axis = axis,
                                       .radius = {fabs(base_radius), fabs(apex_radius)},
@@ -289,7 +289,7 @@ static bool read_any_polygon(NffReader *reader, bool smooth)
         break;
     }
     for (size_t i = 0; i < reader->triangles.count; i++) {
-        Object object = {.kind = SHAPE_TRIANGLE, .as.triangle.smooth = smooth};
+        Object object = {.type = SHAPE_TRIANGLE, .as.triangle.smooth = smooth};
         for (size_t k = 0; k < 3; k++) {
             uint32_t corner = reader->triangles.items[i][k];
             object.as.triangle.vertices[k] = reader->corners.items[corner];

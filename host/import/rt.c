@@ -144,7 +144,7 @@ static bool read_one_camera(RtReader *reader)
 static bool read_light(RtReader *reader)
 {
     Line *line = &reader->line;
-    Light light = {.kind = LIGHT_POINT, .color = {1, 1, 1}};
+    Light light = {.type = LIGHT_POINT, .color = {1, 1, 1}};
     double ratio;
     if (!line_comma_vector(line, "position", NULL, &light.position) || !read_ratio(reader, &ratio) ||
         (line_peek(line).length && !read_color(line, &light.color)) || !element_end(reader))
@@ -165,7 +165,7 @@ static bool read_resolution(RtReader *reader)
 
 static bool read_sphere(RtReader *reader)
 {
-    Object object = {.kind = SHAPE_SPHERE};
+    Object object = {.type = SHAPE_SPHERE};
     Material material = material_default();
     double diameter;
     if (!line_comma_vector(&reader->line, "center", NULL, &object.as.sphere.center) ||
@@ -179,7 +179,7 @@ static bool read_sphere(RtReader *reader)
 
 static bool read_plane(RtReader *reader)
 {
-    Object object = {.kind = SHAPE_PLANE};
+    Object object = {.type = SHAPE_PLANE};
     Material material = material_default();
     if (!line_comma_vector(&reader->line, "point", NULL, &object.as.plane.point) ||
         !read_axis(&reader->line, "normal", &object.as.plane.normal) || !read_material(reader, &material))
@@ -199,7 +199,7 @@ static bool word_has_comma(Word word)
 static bool read_cylinder(RtReader *reader)
 {
     Line *line = &reader->line;
-    Object object = {.kind = SHAPE_CYLINDER, .as.cylinder = {.finite = true, .caps = true}};
+    Object object = {.type = SHAPE_CYLINDER, .as.cylinder = {.finite = true, .caps = true}};
     Material material = material_default();
     Vector3 center, axis;
     double diameter, height;
@@ -225,7 +225,7 @@ static bool read_cylinder(RtReader *reader)
 static bool read_cone(RtReader *reader)
 {
     Line *line = &reader->line;
-    Object object = {.kind = SHAPE_CONE, .as.cone = {.finite = true, .caps = true}};
+    Object object = {.type = SHAPE_CONE, .as.cone = {.finite = true, .caps = true}};
     Material material = material_default();
     Vector3 axis;
     double diameter, height;
@@ -259,7 +259,7 @@ static bool read_square(RtReader *reader)
                           vector_subtract(high, level)};
     uint32_t index = scene_add_material(reader->scene, &material, "");
     for (size_t i = 1; i <= 2; i++) {
-        Object half = {.kind = SHAPE_TRIANGLE,
+        Object half = {.type = SHAPE_TRIANGLE,
                        .material = index,
                        .as.triangle = {.vertices = {corners[0], corners[i], corners[i + 1]}}};
         array_push(reader->scene->objects, half);
@@ -269,7 +269,7 @@ static bool read_square(RtReader *reader)
 
 static bool read_triangle(RtReader *reader)
 {
-    Object object = {.kind = SHAPE_TRIANGLE};
+    Object object = {.type = SHAPE_TRIANGLE};
     Material material = material_default();
     for (size_t i = 0; i < 3; i++) {
         if (!line_comma_vector(&reader->line, "vertex", NULL, &object.as.triangle.vertices[i])) return false;

@@ -119,11 +119,11 @@ static double color_error(const FilmComparison *comparison, size_t pixel)
     return value_error(comparison->reference->color[value], comparison->variant->color[value]);
 }
 
-// Keeps the error if it is the worst of its kind so far. An error away from edges is worse than any at edges.
-static void worst_offer(const FilmComparison *comparison, AccuracyKind kind, size_t pixel,
+// Keeps the error if it is the worst of its type so far. An error away from edges is worse than any at edges.
+static void worst_offer(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel,
                         const AccuracyWorst *offered)
 {
-    AccuracyWorst *worst = &comparison->errors->worst[kind];
+    AccuracyWorst *worst = &comparison->errors->worst[type];
     if (worst->found &&
         (worst->away > offered->away || (worst->away == offered->away && !(offered->error > worst->error))))
         return;
@@ -137,14 +137,14 @@ static void worst_offer(const FilmComparison *comparison, AccuracyKind kind, siz
     }
 }
 
-static void count_wrong(const FilmComparison *comparison, AccuracyKind kind, EdgeCount *count, size_t pixel,
-                        bool edge, const uint32_t values[2], uint32_t light)
+static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, EdgeCount *count,
+                        size_t pixel, bool edge, const uint32_t values[2], uint32_t light)
 {
     if (edge)
         count->edge++;
     else
         count->away++;
-    worst_offer(comparison, kind, pixel,
+    worst_offer(comparison, type, pixel,
                 &(AccuracyWorst){.away = !edge,
                                  .light = light,
                                  .error = color_error(comparison, pixel),
@@ -216,13 +216,13 @@ static void surface_compare(const FilmComparison *comparison, size_t pixel)
     if (angle > 0) worst_offer(comparison, ACCURACY_NORMAL, pixel, &(AccuracyWorst){.error = angle});
 }
 
-static void color_offer(const FilmComparison *comparison, AccuracyKind kind, size_t pixel)
+static void color_offer(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
 {
     const size_t value = 3 * pixel + worst_channel(comparison, pixel);
     AccuracyWorst offered = {.error = color_error(comparison, pixel),
                              .reference = comparison->reference->color[value],
                              .variant = comparison->variant->color[value]};
-    if (offered.error > 0) worst_offer(comparison, kind, pixel, &offered);
+    if (offered.error > 0) worst_offer(comparison, type, pixel, &offered);
 }
 
 static void pixel_compare(const FilmComparison *comparison, size_t pixel)

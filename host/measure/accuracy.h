@@ -25,7 +25,7 @@ void accuracy_edges_find(AccuracyEdges *edges, const Film *reference);
 // Frees the maps and sets the edges to zeros.
 void accuracy_edges_free(AccuracyEdges *edges);
 
-// The kinds of error. One figure of each is plotted.
+// The types of error. One figure of each is plotted.
 typedef enum {
     ACCURACY_OBJECT,  // pixels that show another object
     ACCURACY_SHADOW,  // shadow bits that differ, over all lights
@@ -35,9 +35,9 @@ typedef enum {
     ACCURACY_NORMAL,  // 99.9th percentile, radians
     ACCURACY_IMAGE,   // RMSE
     ACCURACY_FLIP,    // mean
-    ACCURACY_KIND_COUNT
-} AccuracyKind;
-extern const char *const accuracy_kind_names[ACCURACY_KIND_COUNT]; // "object" and so on, as in the JSON
+    ACCURACY_MEASURE_COUNT
+} AccuracyMeasure;
+extern const char *const accuracy_measure_names[ACCURACY_MEASURE_COUNT]; // "object" and so on, as in the JSON
 
 // The number of differences at the reference's edges and away from them.
 typedef struct {
@@ -48,15 +48,15 @@ typedef struct {
     double largest, percentile_999;
 } ErrorExtremes;
 
-// The place where an error of a kind is largest. For kinds that are counted, it is the wrong pixel away from
+// The place where an error of a type is largest. For types that are counted, it is the wrong pixel away from
 // edges, or else at edges, whose color differs most.
 typedef struct {
-    bool found; // false if there is no error of the kind or it is unavailable
-    bool away;  // for counted kinds, whether the place is away from the reference's edges
+    bool found; // false if there is no error of the type or it is unavailable
+    bool away;  // for counted types, whether the place is away from the reference's edges
     uint32_t x, y;
     uint32_t light; // for shadows, the first light that is wrong there
     // For shading and image, the error of a channel; for t, relative; for normals, in radians; for counted
-    // kinds, the error of the color.
+    // types, the error of the color.
     double error;
     // For objects, ids; for shadows, bits; for paths, signatures; for t, distances; for shading and image,
     // the values of that channel. Unset for normals.
@@ -75,9 +75,9 @@ typedef struct {
     // Where the object equals the reference's and the ray hit one.
     size_t surface_pixels;
     ErrorExtremes t_relative, t_ulps, normal;
-    ErrorSummary image;                       // over all pixels
-    ImageMetrics display;                     // only srgb_psnr, off_by_… and flip_… are set
-    AccuracyWorst worst[ACCURACY_KIND_COUNT]; // unset for FLIP
+    ErrorSummary image;                          // over all pixels
+    ImageMetrics display;                        // only srgb_psnr, off_by_… and flip_… are set
+    AccuracyWorst worst[ACCURACY_MEASURE_COUNT]; // unset for FLIP
 } AccuracyErrors;
 
 // Compares a variant with the reference, which must have the same size and number of lights. With
@@ -109,14 +109,14 @@ typedef struct {
     AccuracyErrors errors;
     float *image;          // linear, 3 values per pixel; NULL if unavailable
     unsigned disqualified; // the set of DISQUALIFIED_… for which its speed does not count
-    unsigned pareto;       // the set of 1 << AccuracyKind in which no other is as good in less median time
+    unsigned pareto;       // the set of 1 << AccuracyMeasure in which no other is as good in less median time
 } AccuracyVariant;
 
 // An error that a user allows, and the fastest variant that stays within it.
 typedef struct {
     double budget;
-    AccuracyKind measure; // shading, or image if there are only colors
-    size_t variant;       // the one with the least median time of a frame, or SIZE_MAX
+    AccuracyMeasure measure; // shading, or image if there are only colors
+    size_t variant;          // the one with the least median time of a frame, or SIZE_MAX
     // The time of each variant divided by that of the picked one. The ratio is 0 for the picked variant and
     // for those beyond the budget.
     Comparison *times;
@@ -153,8 +153,8 @@ void accuracy_scene_free(AccuracyScene *scene);
 
 // Returns whether a variant is within the pick's budget and not certainly slower than the picked one.
 bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant);
-// Returns the plotted figure of a kind, or the reason why it is unavailable.
-Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind);
+// Returns the plotted figure of a type, or the reason why it is unavailable.
+Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type);
 // Returns the set of DISQUALIFIED_… that follows from a variant's errors.
 unsigned accuracy_faults(const AccuracyErrors *errors);
 // Sets, from errors and times, each variant's disqualified and pareto, and a recommendation for each budget.

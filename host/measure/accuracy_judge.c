@@ -4,8 +4,8 @@
 #include "host/base/memory.h"
 #include <stdlib.h>
 
-const char *const accuracy_kind_names[ACCURACY_KIND_COUNT] = {"object", "shadow", "path",  "shading",
-                                                              "t",      "normal", "image", "flip"};
+const char *const accuracy_measure_names[ACCURACY_MEASURE_COUNT] = {"object", "shadow", "path",  "shading",
+                                                                    "t",      "normal", "image", "flip"};
 
 const char *const accuracy_status_names[ACCURACY_STATUS_COUNT] = {"measured", "reference", "unavailable"};
 
@@ -26,15 +26,15 @@ static double sum_of(EdgeCount count)
     return (double)count.edge + (double)count.away;
 }
 
-Figure accuracy_figure(const AccuracyVariant *variant, AccuracyKind kind)
+Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type)
 {
     const AccuracyErrors *errors = &variant->errors;
     if (variant->status == ACCURACY_REFERENCE)
         return (Figure){.why_not = "it is the reference that the others are compared with"};
     if (variant->status == ACCURACY_UNAVAILABLE) return (Figure){.why_not = variant->row->failure};
-    if (errors->why_colors_only && kind != ACCURACY_IMAGE && kind != ACCURACY_FLIP)
+    if (errors->why_colors_only && type != ACCURACY_IMAGE && type != ACCURACY_FLIP)
         return (Figure){.why_not = errors->why_colors_only};
-    switch (kind) {
+    switch (type) {
     case ACCURACY_OBJECT:
         return (Figure){.value = sum_of(errors->object)};
     case ACCURACY_SHADOW:
@@ -77,27 +77,28 @@ static double frame_median(const AccuracyVariant *variant)
 
 // Returns whether a is at least as good as b and better in error or time. The reference has no error, so its
 // time alone decides.
-static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, AccuracyKind kind)
+static bool dominates(const AccuracyVariant *a, const AccuracyVariant *b, AccuracyMeasure type)
 {
-    Figure error_a = accuracy_figure(a, kind), error_b = accuracy_figure(b, kind);
+    Figure error_a = accuracy_figure(a, type), error_b = accuracy_figure(b, type);
     double time_a = frame_median(a), time_b = frame_median(b);
     if (a->status == ACCURACY_REFERENCE) return time_a < time_b;
     if (error_a.why_not || error_a.value > error_b.value || time_a > time_b) return false;
     return error_a.value < error_b.value || time_a < time_b;
 }
 
-static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant *variant, AccuracyKind kind)
+static bool is_pareto_optimal(const AccuracyScene *scene, const AccuracyVariant *variant,
+                              AccuracyMeasure type)
 {
     if (variant->status != ACCURACY_MEASURED || variant->disqualified) return false;
-    if (accuracy_figure(variant, kind).why_not) return false;
+    if (accuracy_figure(variant, type).why_not) return false;
     for (size_t i = 0; i < scene->variant_count; i++) {
         const AccuracyVariant *other = &scene->variants[i];
-        if (other != variant && competes(other) && dominates(other, variant, kind)) return false;
+        if (other != variant && competes(other) && dominates(other, variant, type)) return false;
     }
     return true;
 }
 
-static bool is_within(const AccuracyVariant *variant, double budget, AccuracyKind measure)
+static bool is_within(const AccuracyVariant *variant, double budget, AccuracyMeasure measure)
 {
     if (!competes(variant)) return false;
     if (variant->status == ACCURACY_REFERENCE) return true;
@@ -108,7 +109,7 @@ static bool is_within(const AccuracyVariant *variant, double budget, AccuracyKin
 // Finds the recommendation for a budget. The intervals of all pairs of the scene's variants hold together, so
 // they hold whichever variant is picked by its times.
 static AccuracyRecommendation recommendation_find(const AccuracyScene *scene, double budget,
-                                                  AccuracyKind measure)
+                                                  AccuracyMeasure measure)
 {
     const size_t count = scene->variant_count, pair_count = count > 1 ? count * (count - 1) / 2 : 1;
     AccuracyRecommendation pick = {budget, measure, SIZE_MAX, NULL};
@@ -141,12 +142,12 @@ void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets)
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];
         variant->pareto = 0;
-        for (unsigned kind = 0; kind < ACCURACY_KIND_COUNT; kind++)
-            if (is_pareto_optimal(scene, variant, (AccuracyKind)kind)) variant->pareto |= 1u << kind;
+        for (unsigned type = 0; type < ACCURACY_MEASURE_COUNT; type++)
+            if (is_pareto_optimal(scene, variant, (AccuracyMeasure)type)) variant->pareto |= 1u << type;
     }
     for (size_t i = 0; i < scene->recommendation_count; i++)
         free(scene->recommendations[i].times);
-    AccuracyKind measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
+    AccuracyMeasure measure = scene->reference.file ? ACCURACY_IMAGE : ACCURACY_SHADING;
     scene->recommendation_count = budgets->count;
     for (size_t i = 0; i < budgets->count; i++)
         scene->recommendations[i] = recommendation_find(scene, budgets->limits[i], measure);

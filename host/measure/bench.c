@@ -109,7 +109,7 @@ void bench_row_free(BenchRow *row)
 double bench_rays_per_second(const BenchRow *row)
 {
     uint64_t sum = 0;
-    for (int kind = 0; kind < RAYS_COUNT; kind++)
-        if (kind != RAYS_CAMERA_HITS) sum += row->rays[kind]; // these are camera rays
+    for (int type = 0; type < RAYS_COUNT; type++)
+        if (type != RAYS_CAMERA_HITS) sum += row->rays[type]; // these are camera rays
     return (double)sum / bench_kernel(&row->times).median;
 }

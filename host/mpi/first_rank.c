@@ -23,14 +23,14 @@ static Rank rank_of_message(const Rank *received)
 
 static void ranks_start(bool can_start)
 {
-    Order order = {.kind = can_start ? ORDER_START : ORDER_CANCEL};
+    Order order = {.type = can_start ? ORDER_START : ORDER_CANCEL};
     broadcast(&order, sizeof order, MPI_COMM_WORLD);
 }
 
 static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                         const char *device_selector, MessageList *messages)
 {
-    Job job = {.kind = JOB_IMAGE,
+    Job job = {.type = JOB_IMAGE,
                .settings = *settings,
                .aovs = aovs,
                .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
@@ -248,7 +248,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
             status = render_command_close(command);
         }
     }
-    Job none = {.kind = JOB_END};
+    Job none = {.type = JOB_END};
     broadcast(&none, sizeof none, MPI_COMM_WORLD);
     free(ranks.items);
     free(ranks.shares);

@@ -233,7 +233,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
 {
     const size_t worker_count = other_count + 1, whole = render_command_count(command) / worker_count;
     if (other_count == 0 || whole == 0) return 0;
-    Job job = {.kind = JOB_FRAMES};
+    Job job = {.type = JOB_FRAMES};
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     if (!files_are_shared(command, (Call){argument_count, arguments}, true)) return 0;
     Deal deal = {.mutex = PTHREAD_MUTEX_INITIALIZER,

@@ -39,8 +39,8 @@ static void compiled_broadcast(CompiledScene *compiled, bool is_sender, MPI_Comm
         compiled->textures = NULL;
         compiled->instances = NULL;
     }
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        FlatArray *array = &compiled->arrays[kind];
+    for (size_t type = 0; type < FLAT_COUNT; type++) {
+        FlatArray *array = &compiled->arrays[type];
         if (!is_sender) array->items = memory_allocate_large(array->count, array->layout.size);
         broadcast(array->items, array->count * array->layout.size, ranks);
     }

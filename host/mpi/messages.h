@@ -25,14 +25,14 @@ typedef struct {
 } Request;
 
 typedef struct {
-    enum { JOB_END, JOB_FRAMES, JOB_IMAGE } kind;
+    enum { JOB_END, JOB_FRAMES, JOB_IMAGE } type;
     RenderSettings settings; // of an image, and what follows
     unsigned aovs;
     size_t selector_size; // the device selector's, which follows, with its NUL; 0: none
 } Job;
 
 typedef struct {
-    enum { ORDER_SCENE, ORDER_START, ORDER_CANCEL } kind;
+    enum { ORDER_SCENE, ORDER_START, ORDER_CANCEL } type;
     SceneVariant variant; // of a scene
 } Order;
 

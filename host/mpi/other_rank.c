@@ -127,9 +127,9 @@ static void job_run(RankRenderer *worker, const Job *job)
     worker_begin(worker, job, job->selector_size > 0 ? selector : NULL);
     free(selector);
     MPI_Gather(&worker->own, sizeof worker->own, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
-    while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.kind == ORDER_SCENE)
+    while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.type == ORDER_SCENE)
         scene_receive(worker, order.variant);
-    if (order.kind == ORDER_START) worker_render(worker, job->aovs);
+    if (order.type == ORDER_START) worker_render(worker, job->aovs);
     renderer_release_scene(worker->renderer);
     message_list_free(&worker->messages);
 }
@@ -147,8 +147,8 @@ void other_rank_run(int rank, size_t local_rank, int argument_count, char **argu
     signals_ignore();
     RankRenderer worker = {.rank = rank, .local_rank = local_rank};
     Job job;
-    while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.kind != JOB_END) {
-        if (job.kind == JOB_FRAMES)
+    while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.type != JOB_END) {
+        if (job.type == JOB_FRAMES)
             frames_work(local_rank, argument_count, arguments);
         else
             job_run(&worker, &job);

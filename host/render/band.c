@@ -181,11 +181,11 @@ uint64_t place_pixels(const Place *place)
     return width * least(place->items[1] * place->item.height, place->band.s[3] - top);
 }
 
-Pace *renderer_pace(Renderer *renderer, KernelKind kind)
+Pace *renderer_pace(Renderer *renderer, KernelType type)
 {
     const RenderSettings *settings = &renderer->settings;
     const TileShape group = group_shape(renderer);
-    Pace *pace = &renderer->paces[kind];
+    Pace *pace = &renderer->paces[type];
     pace->target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1;
     pace->samples_min =
         (double)GROUPS_OF_UNIT_MIN * renderer->compute->device->compute_units * group.width * group.height;
@@ -193,13 +193,13 @@ Pace *renderer_pace(Renderer *renderer, KernelKind kind)
 }
 
 // Launches the kernel over the place, part by part, with `samples` per pixel.
-static bool place_launch(Renderer *renderer, KernelKind kind, const Place *place, uint32_t samples)
+static bool place_launch(Renderer *renderer, KernelType type, const Place *place, uint32_t samples)
 {
-    Pace *pace = renderer_pace(renderer, kind);
+    Pace *pace = renderer_pace(renderer, type);
     const RenderSettings *settings = &renderer->settings;
     Place part = {0};
     while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
-        const double seconds = renderer_launch(renderer, kind, 2, part.first, part.items, part.group);
+        const double seconds = renderer_launch(renderer, type, 2, part.first, part.items, part.group);
         pace_note_launch(pace, place_pixels(&part) * samples, seconds);
         if (!compute_ok(renderer->compute) || (settings->stop && settings->stop(settings->stop_context)))
             return false;
@@ -266,11 +266,11 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
     return go_on;
 }
 
-bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, unsigned aovs,
+bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, unsigned aovs,
                const Place *place)
 {
     Compute *compute = renderer->compute;
-    cl_kernel kernel = renderer_kernel(renderer, kind);
+    cl_kernel kernel = renderer_kernel(renderer, type);
     LayerOffsets offsets;
 #define OFFSET_SET(NAME, name, ...)                                                                          \
     offsets.name = (unsigned)(buffers->layer_begins[LAYER_##NAME] / ARENA_UNIT);
@@ -282,11 +282,11 @@ bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, 
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3,
                   is_list ? buffers->doubts : buffers->center_doubts);
     const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
-    if (kind == KERNEL_AOV)
+    if (type == KERNEL_AOV)
         kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
-    if (kind == KERNEL_COVERAGE)
+    if (type == KERNEL_COVERAGE)
         kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, renderer->sample_offsets);
     doubts_clear(renderer, buffers->center_doubts, place);
-    pace_begin_band(renderer_pace(renderer, kind));
-    return place_launch(renderer, kind, place, kind == KERNEL_COVERAGE ? renderer->settings.sample_count : 1);
+    pace_begin_band(renderer_pace(renderer, type));
+    return place_launch(renderer, type, place, type == KERNEL_COVERAGE ? renderer->settings.sample_count : 1);
 }

@@ -75,5 +75,5 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
 
 // Launches a kernel that fills its AOVs (kernels/aovs.h) in launches whose size the kernel's pace decides.
 // Returns false if the device failed or settings.stop ended the render.
-bool band_fill(Renderer *renderer, KernelKind kind, const BandBuffers *buffers, unsigned aovs,
+bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, unsigned aovs,
                const Place *place);

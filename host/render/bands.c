@@ -140,13 +140,13 @@ static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned ao
 {
     const Place place = band_place(renderer, rows);
     const struct {
-        KernelKind kind;
+        KernelType type;
         unsigned layers;
     } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}, {KERNEL_COVERAGE, AOVS_OF_SAMPLES}};
     for (size_t i = 0; i < COUNT_OF(fills); i++) {
         if (!(aovs & fills[i].layers)) continue;
-        if (!band_fill(renderer, fills[i].kind, buffers, aovs, &place)) return false;
-        if (renderer->repeat && !band_repeat(renderer, fills[i].kind, fills[i].layers, buffers, aovs, rows))
+        if (!band_fill(renderer, fills[i].type, buffers, aovs, &place)) return false;
+        if (renderer->repeat && !band_repeat(renderer, fills[i].type, fills[i].layers, buffers, aovs, rows))
             return false;
     }
     return true;

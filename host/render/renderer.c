@@ -47,22 +47,22 @@ static bool settings_fit(const RenderSettings *settings, const Compute *compute,
     return true;
 }
 
-static SceneBuffer buffer_of(size_t kind)
+static SceneBuffer buffer_of(size_t type)
 {
-    return kind < FLAT_NODES ? BUFFER_ARENA : kind == FLAT_NODES ? BUFFER_NODES : BUFFER_TEXELS;
+    return type < FLAT_NODES ? BUFFER_ARENA : type == FLAT_NODES ? BUFFER_NODES : BUFFER_TEXELS;
 }
 
 // Returns the layout of the scene's buffers once the arrays that have changed are uploaded.
 static SceneLayout scene_layout(const CompiledScene *compiled, const Renderer *renderer)
 {
     SceneLayout layout = {.begins = {0}};
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        uint64_t *end = &layout.buffer_sizes[buffer_of(kind)];
-        layout.array_sizes[kind] = compiled->changed[kind]
-                                       ? flat_array_size(&compiled->arrays[kind], renderer->report.is_double)
-                                       : renderer->layout.array_sizes[kind];
-        layout.begins[kind] = *end;
-        *end += padded_size(layout.array_sizes[kind]);
+    for (size_t type = 0; type < FLAT_COUNT; type++) {
+        uint64_t *end = &layout.buffer_sizes[buffer_of(type)];
+        layout.array_sizes[type] = compiled->changed[type]
+                                       ? flat_array_size(&compiled->arrays[type], renderer->report.is_double)
+                                       : renderer->layout.array_sizes[type];
+        layout.begins[type] = *end;
+        *end += padded_size(layout.array_sizes[type]);
     }
     return layout;
 }
@@ -101,10 +101,10 @@ static bool device_has_room(const CompiledScene *compiled, const Renderer *rende
 }
 
 // Returns whether scene_move neither reads nor changes an array.
-static bool is_without_eye(size_t kind)
+static bool is_without_eye(size_t type)
 {
-    return kind == FLAT_TRIANGLE_NORMALS || kind == FLAT_TRIANGLE_UVS || kind == FLAT_TRIANGLE_NEIGHBORS ||
-           kind == FLAT_SKY_CELLS || kind == FLAT_TEXTURE_LEVELS || kind == FLAT_TEXELS;
+    return type == FLAT_TRIANGLE_NORMALS || type == FLAT_TRIANGLE_UVS || type == FLAT_TRIANGLE_NEIGHBORS ||
+           type == FLAT_SKY_CELLS || type == FLAT_TEXTURE_LEVELS || type == FLAT_TEXELS;
 }
 
 // Stages the buffers whose size differs. Then all arrays in them have changed: only scene_compile changes the
@@ -122,18 +122,18 @@ static void buffers_stage(Renderer *renderer, const CompiledScene *compiled)
 }
 
 // Writes an array to its staged buffer, or to its place in the buffer on the device.
-static void array_upload(Renderer *renderer, size_t kind, const FlatArray *array)
+static void array_upload(Renderer *renderer, size_t type, const FlatArray *array)
 {
-    const SceneBuffer buffer = buffer_of(kind);
+    const SceneBuffer buffer = buffer_of(type);
     char *staged = renderer->staged[buffer];
-    const size_t begin = (size_t)renderer->layout.begins[kind],
-                 size = (size_t)renderer->layout.array_sizes[kind];
+    const size_t begin = (size_t)renderer->layout.begins[type],
+                 size = (size_t)renderer->layout.array_sizes[type];
     if (size == 0) return;
     void *bytes =
         staged ? staged + begin : buffer_map(renderer->compute, renderer->buffers[buffer], begin, size);
     if (!bytes) return;
     flat_array_write(array, renderer->report.is_double, bytes);
-    if (renderer->settings.hashes_scene && !is_ordered_by_bvh(kind))
+    if (renderer->settings.hashes_scene && !is_ordered_by_bvh(type))
         renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
     if (!staged) buffer_write_mapped(renderer->compute, renderer->buffers[buffer], bytes);
 }
@@ -155,16 +155,16 @@ static void arrays_upload(Renderer *const *renderers, size_t count, CompiledScen
     if (count > 0) stage_begin(renderers[0]->settings.stage, "uploading the scene", NULL, 0);
     for (size_t i = 0; i < count; i++)
         buffers_stage(renderers[i], compiled);
-    for (size_t kind = 0; kind < FLAT_COUNT; kind++) {
-        for (size_t i = 0; i < count && compiled->changed[kind]; i++) {
+    for (size_t type = 0; type < FLAT_COUNT; type++) {
+        for (size_t i = 0; i < count && compiled->changed[type]; i++) {
             const double start = clock_seconds();
-            array_upload(renderers[i], kind, &compiled->arrays[kind]);
+            array_upload(renderers[i], type, &compiled->arrays[type]);
             renderers[i]->report.upload_seconds += clock_seconds() - start;
         }
-        compiled->changed[kind] = false;
-        if (count > 0 && renderers[0]->settings.moves && !is_without_eye(kind)) continue;
-        free(compiled->arrays[kind].items);
-        compiled->arrays[kind].items = NULL;
+        compiled->changed[type] = false;
+        if (count > 0 && renderers[0]->settings.moves && !is_without_eye(type)) continue;
+        free(compiled->arrays[type].items);
+        compiled->arrays[type].items = NULL;
     }
     for (size_t i = 0; i < count; i++) {
         const double start = clock_seconds();

@@ -50,8 +50,8 @@ static uint32_t pending_max(const Renderer *renderer)
 
 static void variant_close(Renderer *renderer, KernelVariant *variant)
 {
-    for (size_t kind = 0; kind < KERNEL_COUNT; kind++) {
-        KernelSlot *slot = &variant->kernels[kind];
+    for (size_t type = 0; type < KERNEL_COUNT; type++) {
+        KernelSlot *slot = &variant->kernels[type];
         if (slot->kernel) {
             // it has been launched: its program's binary holds finished machine code
             program_store(renderer->compute, &slot->request, &slot->program);
@@ -151,9 +151,9 @@ void renderer_kernels_choose(Renderer *renderer)
         memset(renderer->paces, 0, sizeof renderer->paces);
     }
     renderer->report.build_options = renderer->variant.options;
-    for (size_t kind = 0; kind < KERNEL_COUNT; kind++)
-        if (renderer->variant.kernels[kind].kernel)
-            scene_arguments_set(renderer, renderer->variant.kernels[kind].kernel);
+    for (size_t type = 0; type < KERNEL_COUNT; type++)
+        if (renderer->variant.kernels[type].kernel)
+            scene_arguments_set(renderer, renderer->variant.kernels[type].kernel);
 }
 
 char *renderer_kernel_text(const Renderer *renderer)
@@ -169,20 +169,20 @@ uint64_t renderer_kernel_hash(const Renderer *renderer)
     return hash;
 }
 
-cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
+cl_kernel renderer_kernel(Renderer *renderer, KernelType type)
 {
-    KernelSlot *slot = &renderer->variant.kernels[kind];
+    KernelSlot *slot = &renderer->variant.kernels[type];
     // AOV kernels do not change the hash that identifies an image
-    const bool is_of_image = kind != KERNEL_AOV && kind != KERNEL_PATH && kind != KERNEL_COVERAGE;
+    const bool is_of_image = type != KERNEL_AOV && type != KERNEL_PATH && type != KERNEL_COVERAGE;
     if (slot->kernel) {
         if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
         return slot->kernel;
     }
     slot->request = (ProgramRequest){
-        .root = kernel_sources[kind].file,
+        .root = kernel_sources[type].file,
         .prelude = text_c(&renderer->variant.prelude),
         .easy_prelude = renderer->variant.easy_prelude.items,
-        .kernel = kernel_sources[kind].name,
+        .kernel = kernel_sources[type].name,
         .options = renderer->variant.options,
         .no_cache = renderer->settings.no_cache,
     };
@@ -190,7 +190,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     fault_note_kernel(slot->request.kernel);
     const double start = clock_seconds();
     program_build(renderer->compute, &slot->request, &slot->program);
-    const HostSpan build = {kernel_sources[kind].name, start, clock_seconds()};
+    const HostSpan build = {kernel_sources[type].name, start, clock_seconds()};
     array_push(renderer->report.builds, build);
     fault_note_kernel(NULL);
     stage_begin(renderer->settings.stage, "rendering", NULL, 0);
@@ -204,11 +204,11 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind)
     return slot->kernel;
 }
 
-double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *first,
+double renderer_launch(Renderer *renderer, KernelType type, cl_uint dimensions, const size_t *first,
                        const size_t *items, const size_t *group)
 {
-    KernelSlot *slot = &renderer->variant.kernels[kind];
-    fault_note_kernel(kernel_sources[kind].name);
+    KernelSlot *slot = &renderer->variant.kernels[type];
+    fault_note_kernel(kernel_sources[type].name);
     capture_launch(renderer->compute, &(Launch){slot->kernel, &slot->request, slot->program.is_easy,
                                                 dimensions, first, items, group});
     LaunchTime time = kernel_launch_from(renderer->compute, slot->kernel, dimensions, first, items, group);
@@ -217,8 +217,8 @@ double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, 
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)
         compute_fail(renderer->compute, "clEnqueueNDRangeKernel", CL_INVALID_WORK_GROUP_SIZE,
                      "kernel %s: work-groups of %zu work-items were requested, but at most %zu fit",
-                     kernel_sources[kind].name, group[0] * (dimensions > 1 ? group[1] : 1),
+                     kernel_sources[type].name, group[0] * (dimensions > 1 ? group[1] : 1),
                      time.local[0] * (dimensions > 1 ? time.local[1] : 1));
-    array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[kind].name, time}));
+    array_push(renderer->report.launches, ((NamedLaunch){kernel_sources[type].name, time}));
     return time.trusted ? time.event_seconds : time.host_seconds;
 }

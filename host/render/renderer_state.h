@@ -15,7 +15,7 @@ typedef enum {
     KERNEL_TRACE,
     KERNEL_CLOSEST,
     KERNEL_COUNT
-} KernelKind;
+} KernelType;
 
 typedef struct {
     ProgramRequest request;
@@ -89,15 +89,15 @@ enum { ARGUMENT_ARENA, ARGUMENT_OFFSETS, ARGUMENT_NODES, ARGUMENT_TEXELS, SCENE_
 
 // Returns the kernel with the scene's arguments set, and builds it when first requested. Returns NULL if the
 // device failed.
-cl_kernel renderer_kernel(Renderer *renderer, KernelKind kind);
+cl_kernel renderer_kernel(Renderer *renderer, KernelType type);
 
 // Launches a kernel as kernel_launch_from does and adds the time to the report. Returns the launch's seconds
 // by its event if that is trusted, else by the host's clock.
-double renderer_launch(Renderer *renderer, KernelKind kind, cl_uint dimensions, const size_t *first,
+double renderer_launch(Renderer *renderer, KernelType type, cl_uint dimensions, const size_t *first,
                        const size_t *items, const size_t *group);
 
 // Returns the pace of a kernel's launches, with the target of the settings.
-Pace *renderer_pace(Renderer *renderer, KernelKind kind);
+Pace *renderer_pace(Renderer *renderer, KernelType type);
 
 // Maps `size` bytes of a buffer, beginning at `begin`, for the host to read or write, and adds the time to
 // the report. Returns NULL if the device failed. renderer_unmap releases the mapping and accepts NULL.

@@ -83,7 +83,7 @@ static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
 
 // A band whose flagged pixels are re-rendered: the kernel, the layers that it fills, and their buffers.
 typedef struct {
-    KernelKind kind;
+    KernelType type;
     unsigned layers, aovs;
     const BandBuffers *buffers;
     Film film;
@@ -153,9 +153,9 @@ static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand
     const bool is_last = samples_end(&repeat->settings) == repeat->settings.sample_count;
     repeated.band_film = is_last && repeat->compute == renderer->compute ? band->buffers->film : NULL;
     list_write(repeat, repeated.doubts, list);
-    const bool whole = band->kind == KERNEL_RENDER
+    const bool whole = band->type == KERNEL_RENDER
                            ? list_render(repeat, &repeated, &place)
-                           : band_fill(repeat, band->kind, &repeated, band->aovs, &place);
+                           : band_fill(repeat, band->type, &repeated, band->aovs, &place);
     for (Layer layer = 0; layer < LAYER_COUNT && whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
             !(layer == LAYER_COLOR && repeated.band_film) && film_layer_size(&band->film, layer) > 0)
@@ -181,11 +181,11 @@ static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
     return samples;
 }
 
-bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
+bool band_repeat(Renderer *renderer, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
                  BandRows rows)
 {
-    cl_mem doubts = kind == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
-    const RepeatedBand band = {kind, layers, aovs, buffers,
+    cl_mem doubts = type == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
+    const RepeatedBand band = {type, layers, aovs, buffers,
                                film_of_rows(renderer, rows.first_row, rows.row_count)};
     const size_t word_count = film_doubt_words(renderer, &band.film);
     uint32_t *words = memory_allocate(word_count, sizeof *words);
@@ -199,7 +199,7 @@ bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffe
         const uint32_t samples_of_pixel = samples_end(settings) - settings->first_sample;
         uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
         counts->repeated +=
-            (uint64_t)list.count * (kind == KERNEL_AOV || kind == KERNEL_PATH ? 1 : samples_of_pixel);
+            (uint64_t)list.count * (type == KERNEL_AOV || type == KERNEL_PATH ? 1 : samples_of_pixel);
         doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
         is_whole = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
         if (is_whole) counts->undecided += list_keep_undecided(&list, undecided);

@@ -9,5 +9,5 @@ void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows 
 // Re-renders in double precision, with bounds, the pixels that a kernel flagged. Re-renders those that remain
 // uncertified as at `double`. Adds the number of both to the buffers' counts and records them in the layer
 // `doubt` if the buffers have it. Returns false if the device failed or settings.stop ended the render.
-bool band_repeat(Renderer *renderer, KernelKind kind, unsigned layers, BandBuffers *buffers, unsigned aovs,
+bool band_repeat(Renderer *renderer, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
                  BandRows rows);

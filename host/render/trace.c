@@ -11,7 +11,7 @@ enum { TRACE_GROUP = 64, BATCH_RAYS_MAX = 1 << 18 };
 // Rays of one launch.
 typedef struct {
     const Renderer *renderer;
-    KernelKind kind;
+    KernelType type;
     const TraceRay *rays;
     TraceHit *hits;
     void *ray_scalars; // as the kernel reads and writes them
@@ -39,9 +39,9 @@ static void vector_at(const void *scalars, size_t index, bool is_double, double 
 }
 
 // Returns how many scalars a kernel stores per ray.
-static size_t result_scalars(KernelKind kind)
+static size_t result_scalars(KernelType type)
 {
-    return kind == KERNEL_TRACE ? RESULT_SCALARS : CLOSEST_SCALARS;
+    return type == KERNEL_TRACE ? RESULT_SCALARS : CLOSEST_SCALARS;
 }
 
 static void bounces_read(TraceHit *hit, const void *scalars, size_t index, bool is_double, double unit)
@@ -68,7 +68,7 @@ static void hits_read(void *context, size_t begin, size_t end)
     const double unit = renderer->compiled.unit;
     const TraceCertainty certainty = renderer->pass == PASS_ALL ? TRACE_CERTAIN : TRACE_CERTAIN_IN_DOUBLE;
     for (size_t i = begin; i < end; i++) {
-        const size_t index = i * result_scalars(batch->kind);
+        const size_t index = i * result_scalars(batch->type);
         TraceHit *hit = &batch->hits[i];
         hit->object = batch->objects[i];
         hit->t = unit * scalar_at(scalars, index + RESULT_T, is_double);
@@ -80,7 +80,7 @@ static void hits_read(void *context, size_t begin, size_t end)
             hit->position[axis] *= unit;
         const bool is_certain = certifies && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0;
         hit->certainty = is_certain ? certainty : TRACE_UNCERTAIN;
-        if (batch->kind == KERNEL_TRACE) bounces_read(hit, scalars, index, is_double, unit);
+        if (batch->type == KERNEL_TRACE) bounces_read(hit, scalars, index, is_double, unit);
     }
 }
 
@@ -112,11 +112,11 @@ static void rays_write(void *context, size_t begin, size_t end)
 }
 
 // Launches the kernel and returns the launch's seconds.
-static double trace_launch(Renderer *renderer, KernelKind kind, uint32_t count, cl_mem rays, cl_mem results,
+static double trace_launch(Renderer *renderer, KernelType type, uint32_t count, cl_mem rays, cl_mem results,
                            cl_mem objects)
 {
     Compute *compute = renderer->compute;
-    cl_kernel kernel = renderer_kernel(renderer, kind);
+    cl_kernel kernel = renderer_kernel(renderer, type);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, rays);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 1, sizeof count, &count);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 2, results);
@@ -124,24 +124,24 @@ static double trace_launch(Renderer *renderer, KernelKind kind, uint32_t count, 
     const size_t *fixed = compute->device->work_group,
                  items = (count + renderer->report.lanes - 1) / renderer->report.lanes,
                  group = fixed[0] > 0 ? fixed[0] * fixed[1] : TRACE_GROUP;
-    return renderer_launch(renderer, kind, 1, NULL, &items, &group);
+    return renderer_launch(renderer, type, 1, NULL, &items, &group);
 }
 
-static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t count,
+static void trace_batch(Renderer *renderer, KernelType type, const TraceRay *rays, size_t count,
                         TraceHit *hits)
 {
     Compute *compute = renderer->compute;
     const size_t scalar = renderer_scalar_size(renderer), ray_size = count * RAY_SCALARS * scalar,
-                 result_size = count * result_scalars(kind) * scalar, object_size = count * sizeof(uint32_t);
+                 result_size = count * result_scalars(type) * scalar, object_size = count * sizeof(uint32_t);
     cl_mem ray_buffer = spare_buffer_acquire(renderer, ray_size),
            results = spare_buffer_acquire(renderer, result_size),
            objects = spare_buffer_acquire(renderer, object_size);
-    TraceBatch batch = {renderer, kind, rays, hits};
+    TraceBatch batch = {renderer, type, rays, hits};
     batch.ray_scalars = renderer_map(renderer, ray_buffer, 0, ray_size, CL_MAP_WRITE_INVALIDATE_REGION);
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
     renderer_unmap(renderer, ray_buffer, batch.ray_scalars);
-    const double seconds = trace_launch(renderer, kind, (uint32_t)count, ray_buffer, results, objects);
-    pace_note_launch(renderer_pace(renderer, kind), count, seconds);
+    const double seconds = trace_launch(renderer, type, (uint32_t)count, ray_buffer, results, objects);
+    pace_note_launch(renderer_pace(renderer, type), count, seconds);
     batch.result_scalars = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
     batch.objects = renderer_map(renderer, objects, 0, object_size, CL_MAP_READ);
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, hits_read, &batch);
@@ -153,30 +153,30 @@ static void trace_batch(Renderer *renderer, KernelKind kind, const TraceRay *ray
     spare_buffer_release(renderer, objects);
 }
 
-static bool pass_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
+static bool pass_trace(Renderer *renderer, KernelType type, const TraceRay *rays, size_t ray_count,
                        TraceHit *hits)
 {
     const Compute *compute = renderer->compute;
     // the report describes images, and a view queries one pixel after another
     RenderReport *report = &renderer->report;
     const size_t launch_count = report->launches.count, read_count = report->reads.count;
-    Pace *pace = renderer_pace(renderer, kind);
+    Pace *pace = renderer_pace(renderer, type);
     pace_begin_band(pace);
     for (size_t first = 0, count; first < ray_count && compute_ok(compute); first += count) {
         count = ray_count - first < BATCH_RAYS_MAX ? ray_count - first : BATCH_RAYS_MAX;
         if (count > pace_launch_samples(pace)) count = (size_t)pace_launch_samples(pace);
-        trace_batch(renderer, kind, rays + first, count, hits + first);
+        trace_batch(renderer, type, rays + first, count, hits + first);
     }
     report->launches.count = launch_count;
     report->reads.count = read_count;
     return compute_ok(compute);
 }
 
-static bool rays_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
+static bool rays_trace(Renderer *renderer, KernelType type, const TraceRay *rays, size_t ray_count,
                        TraceHit *hits);
 
 // Re-traces the rays whose hits are uncertain.
-static bool uncertain_trace(Renderer *repeat, KernelKind kind, const TraceRay *rays, size_t ray_count,
+static bool uncertain_trace(Renderer *repeat, KernelType type, const TraceRay *rays, size_t ray_count,
                             TraceHit *hits)
 {
     size_t count = 0;
@@ -187,7 +187,7 @@ static bool uncertain_trace(Renderer *repeat, KernelKind kind, const TraceRay *r
     TraceHit *found = memory_allocate(count, sizeof *found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) chosen[k++] = rays[i];
-    const bool is_done = rays_trace(repeat, kind, chosen, count, found);
+    const bool is_done = rays_trace(repeat, type, chosen, count, found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) hits[i] = found[k++];
     free(chosen);
@@ -208,13 +208,13 @@ static void ends_apply(const TraceRay *rays, size_t ray_count, TraceHit *hits)
     }
 }
 
-static bool rays_trace(Renderer *renderer, KernelKind kind, const TraceRay *rays, size_t ray_count,
+static bool rays_trace(Renderer *renderer, KernelType type, const TraceRay *rays, size_t ray_count,
                        TraceHit *hits)
 {
-    if (!pass_trace(renderer, kind, rays, ray_count, hits)) return false;
+    if (!pass_trace(renderer, type, rays, ray_count, hits)) return false;
     if (!renderer->repeat) return true;
     ends_apply(rays, ray_count, hits);
-    return uncertain_trace(renderer->repeat, kind, rays, ray_count, hits) &&
+    return uncertain_trace(renderer->repeat, type, rays, ray_count, hits) &&
            compute_check_reference(renderer->compute);
 }
 

@@ -17,7 +17,7 @@ const Object *scene_find_object(const Scene *scene, size_t id, size_t *primitive
 
 uint32_t object_material(const Scene *scene, const Object *object, size_t primitive)
 {
-    const uint32_t *of_triangles = object->kind == SHAPE_MESH
+    const uint32_t *of_triangles = object->type == SHAPE_MESH
                                        ? mesh_materials(&scene->meshes.items[object->as.mesh.index], object)
                                        : NULL;
     return of_triangles ? of_triangles[primitive] : object->material;
@@ -37,7 +37,7 @@ void object_describe(Text *text, const Scene *scene, const char *path, size_t id
         text_appendf(text, "nothing");
         return;
     }
-    const Mesh *mesh = object->kind == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
+    const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
     if (mesh) text_appendf(text, "triangle %zu of ", primitive);
     text_appendf(text, "%s %zu", shape_names[object_shape(object)], id - primitive);
     if (mesh && mesh->path) text_appendf(text, ", %s", file_name(mesh->path));

@@ -75,13 +75,13 @@ static void box_make_mesh(Scene *scene, Object *object)
                  .triangle_count = 12};
     for (unsigned i = 0; i < 8; i++)
         mesh.vertices[i] = box_corner(object->as.box.min, object->as.box.max, i);
-    object->kind = SHAPE_MESH;
+    object->type = SHAPE_MESH;
     object->as.mesh.index = (uint32_t)scene->meshes.count;
     array_push(scene->meshes, mesh);
 }
 
 // The functions below transform a shape. They return false, and change nothing, if it would no longer be one
-// of its kind, and leave numbers that object_transform checks.
+// of its type, and leave numbers that object_transform checks.
 
 static bool sphere_transform(Object *object, const Affine *affine)
 {
@@ -165,7 +165,7 @@ static bool paraboloid_transform(Object *object, const Affine *affine)
     return true;
 }
 
-// Indexed by ShapeKind. Each list of offsets is ended by 0: vectors and lengths must stay within the range,
+// Indexed by ShapeType. Each list of offsets is ended by 0: vectors and lengths must stay within the range,
 // the axis different from 0, and `positive` lengths above 0.
 static const struct {
     bool (*transform)(Object *object, const Affine *affine);
@@ -211,14 +211,14 @@ static Vector3 vector_at(const Object *object, size_t offset)
 static bool numbers_fit(const Object *object)
 {
     bool fits =
-        shapes[object->kind].axis == 0 || !vector_is_zero(vector_at(object, shapes[object->kind].axis));
-    for (const size_t *offset = shapes[object->kind].vectors; *offset > 0; offset++)
+        shapes[object->type].axis == 0 || !vector_is_zero(vector_at(object, shapes[object->type].axis));
+    for (const size_t *offset = shapes[object->type].vectors; *offset > 0; offset++)
         fits &= vector_is_within(vector_at(object, *offset), NUMBER_LARGEST);
-    for (const size_t *offset = shapes[object->kind].positive; *offset > 0; offset++)
+    for (const size_t *offset = shapes[object->type].positive; *offset > 0; offset++)
         fits &= number_at(object, *offset) > 0 && number_at(object, *offset) <= NUMBER_LARGEST;
-    for (const size_t *offset = shapes[object->kind].lengths; *offset > 0; offset++)
+    for (const size_t *offset = shapes[object->type].lengths; *offset > 0; offset++)
         fits &= number_at(object, *offset) <= NUMBER_LARGEST;
-    if (object->kind != SHAPE_CONE) return fits;
+    if (object->type != SHAPE_CONE) return fits;
     const double widest = object->as.cone.finite ? object->as.cone.radius[0] + object->as.cone.radius[1]
                                                  : object->as.cone.slope;
     return fits && widest > 0;
@@ -227,21 +227,21 @@ static bool numbers_fit(const Object *object)
 const char *object_transform(Scene *scene, Object *object, const Affine *affine)
 {
     static const char *const out_of_range = "gets a size of 0 or a number beyond 1e30";
-    if (object->kind == SHAPE_BOX && !keeps_axes(affine)) box_make_mesh(scene, object);
-    if (object->kind == SHAPE_MESH) {
+    if (object->type == SHAPE_BOX && !keeps_axes(affine)) box_make_mesh(scene, object);
+    if (object->type == SHAPE_MESH) {
         Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
         const bool fits = object->as.mesh.is_instance ? instance_transform(mesh, object, affine)
                                                       : mesh_transform(mesh, affine);
         return fits ? NULL : out_of_range;
     }
-    if (!shapes[object->kind].transform(object, affine)) {
+    if (!shapes[object->type].transform(object, affine)) {
         if (material_any_texture(&scene->materials.items[object->material]) > 0)
             return "with an image would change its shape, and then cannot have one";
         oval_make(object);
         oval_transform(object, affine);
     }
     if (!numbers_fit(object)) return out_of_range;
-    return object->kind != SHAPE_OVAL || oval_is_moderate(object)
+    return object->type != SHAPE_OVAL || oval_is_moderate(object)
                ? NULL
                : "gets thinner than a millionth of its length, or leans by more than 89.9 degrees";
 }

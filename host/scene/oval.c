@@ -25,12 +25,12 @@ static void ends_set(Object *oval, Vector3 from, Vector3 axis, double widest)
 void oval_make(Object *object)
 {
     const Object from = *object;
-    object->kind = SHAPE_OVAL;
-    object->as.oval.unit = from.kind;
+    object->type = SHAPE_OVAL;
+    object->as.oval.unit = from.type;
     object->as.oval.finite = object->as.oval.caps = false;
     object->as.oval.half_height = object->as.oval.rise = 0;
     object->as.oval.radii[0] = object->as.oval.radii[1] = 0;
-    switch (from.kind) {
+    switch (from.type) {
     case SHAPE_SPHERE:
         object->as.oval.center = from.as.sphere.center;
         for (int i = 0; i < 3; i++)
@@ -163,8 +163,8 @@ Object oval_unit(const Object *oval)
     const bool finite = oval->as.oval.finite, caps = oval->as.oval.caps;
     const double half = oval->as.oval.half_height, *radii = oval->as.oval.radii, rise = oval->as.oval.rise;
     const Vector3 low = {0, 0, finite ? -half : 0}, z = {0, 0, 1}, up = {0, 0, finite ? 2 * half : 1};
-    Object unit = {.kind = oval->as.oval.unit, .material = oval->material};
-    switch (unit.kind) {
+    Object unit = {.type = oval->as.oval.unit, .material = oval->material};
+    switch (unit.type) {
     case SHAPE_SPHERE:
         unit.as.sphere.radius = 1;
         break;
@@ -214,6 +214,6 @@ Affine oval_map(const Object *oval)
 
 bool oval_is_bounded(const Object *oval)
 {
-    const ShapeKind unit = oval->as.oval.unit;
+    const ShapeType unit = oval->as.oval.unit;
     return oval->as.oval.finite || unit == SHAPE_SPHERE || unit == SHAPE_DISC || unit == SHAPE_TORUS;
 }

@@ -122,7 +122,7 @@ Color material_passing(const Material *material)
 static void lamp_add(Scene *scene, const Light *light, uint32_t material)
 {
     const Vector3 u = light->across[0], v = light->across[1], center = light->position;
-    Object lamp = {.kind = SHAPE_SPHERE, .material = material};
+    Object lamp = {.type = SHAPE_SPHERE, .material = material};
     if (light->area == AREA_SPHERE) {
         lamp.as.sphere.center = center;
         lamp.as.sphere.radius = light->radius;
@@ -130,7 +130,7 @@ static void lamp_add(Scene *scene, const Light *light, uint32_t material)
         return;
     }
     if (light->area == AREA_ELLIPSE) {
-        lamp.kind = SHAPE_DISC;
+        lamp.type = SHAPE_DISC;
         lamp.as.disc.center = center;
         lamp.as.disc.normal = vector_cross(vector_normalize(u), vector_normalize(v));
         lamp.as.disc.radius = light->radius;
@@ -139,7 +139,7 @@ static void lamp_add(Scene *scene, const Light *light, uint32_t material)
     }
     if (light->area == AREA_TRIANGLE) {
         const Vector3 vertex = vector_subtract(center, vector_scale(vector_add(u, v), 0.25));
-        lamp.kind = SHAPE_TRIANGLE;
+        lamp.type = SHAPE_TRIANGLE;
         lamp.as.triangle.vertices[0] = vertex;
         lamp.as.triangle.vertices[1] = vector_add(vertex, u);
         lamp.as.triangle.vertices[2] = vector_add(vertex, v);
@@ -149,7 +149,7 @@ static void lamp_add(Scene *scene, const Light *light, uint32_t material)
     const Vector3 first = vector_subtract(center, vector_add(u, v)),
                   last = vector_add(center, vector_add(u, v));
     for (int side = -1; side <= 1; side += 2) {
-        lamp.kind = SHAPE_TRIANGLE;
+        lamp.type = SHAPE_TRIANGLE;
         lamp.as.triangle.vertices[0] = first;
         lamp.as.triangle.vertices[1] = vector_add(center, vector_scale(vector_subtract(u, v), side));
         lamp.as.triangle.vertices[2] = last;
@@ -172,7 +172,7 @@ void scene_add_lamps(Scene *scene)
 
 size_t object_primitive_count(const Scene *scene, const Object *object)
 {
-    return object->kind == SHAPE_MESH ? scene->meshes.items[object->as.mesh.index].triangle_count : 1;
+    return object->type == SHAPE_MESH ? scene->meshes.items[object->as.mesh.index].triangle_count : 1;
 }
 
 size_t scene_primitive_count(const Scene *scene)
@@ -183,15 +183,15 @@ size_t scene_primitive_count(const Scene *scene)
     return count;
 }
 
-ShapeKind object_shape(const Object *object)
+ShapeType object_shape(const Object *object)
 {
-    return object->kind == SHAPE_OVAL ? object->as.oval.unit : object->kind;
+    return object->type == SHAPE_OVAL ? object->as.oval.unit : object->type;
 }
 
 bool object_is_smooth(const Scene *scene, const Object *object)
 {
-    if (object->kind == SHAPE_MESH) return scene->meshes.items[object->as.mesh.index].normals != NULL;
-    return object->kind == SHAPE_TRIANGLE && object->as.triangle.smooth;
+    if (object->type == SHAPE_MESH) return scene->meshes.items[object->as.mesh.index].normals != NULL;
+    return object->type == SHAPE_TRIANGLE && object->as.triangle.smooth;
 }
 
 void scene_free(Scene *scene)

@@ -36,14 +36,14 @@ typedef struct {
     Vector3 focus;
 } Camera;
 
-typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightKind;
+typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightType;
 
 // What a light shines from: its position, a rectangle or an ellipse around it, a sphere, a triangle, or the
 // directions of sky.cells.
 typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE, AREA_SKY } LightArea;
 
 typedef struct {
-    LightKind kind;
+    LightType type;
     Color color;       // times intensity
     Vector3 position;  // point, spot
     Vector3 direction; // directional: where the light travels; spot: look_at - position; not unit
@@ -73,7 +73,7 @@ void light_fold_fading(Light *light);
 typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap;
 
 // What a shadow ray loses at a surface: what is not transmitted, all, or nothing.
-typedef enum { SHADOW_OF_TRANSMISSION, SHADOW_FULL, SHADOW_NONE } ShadowKind;
+typedef enum { SHADOW_OF_TRANSMISSION, SHADOW_FULL, SHADOW_NONE } ShadowType;
 
 typedef struct {
     Color color;
@@ -88,7 +88,7 @@ typedef struct {
     bool fresnel;   // the surface reflects a part of `transmission`, or of `reflection` without it
     Color conductor_n, conductor_k; // reflects by the complex index n + i k; n is 0 if it does not
     double ior;
-    ShadowKind shadow;
+    ShadowType shadow;
     Color absorption; // of what is transmitted exp(-absorption d) is left after a length d within
     bool checker;
     Color checker_colors[2];     // in place of color
@@ -152,14 +152,14 @@ typedef struct {
     SHAPE(PARABOLOID, "paraboloid")
 
 #define SHAPE_ENUMERATOR(NAME, name) SHAPE_##NAME,
-typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_OVAL, SHAPE_MESH, SHAPE_COUNT } ShapeKind;
+typedef enum { SCENE_SHAPE_LIST(SHAPE_ENUMERATOR) SHAPE_OVAL, SHAPE_MESH, SHAPE_COUNT } ShapeType;
 #undef SHAPE_ENUMERATOR
 
 extern const char *const shape_names[SHAPE_COUNT];
 
 // Axes and normals are those of the file: not normalized, never zero.
 typedef struct {
-    ShapeKind kind;
+    ShapeType type;
     uint32_t material; // index into the scene's materials
     uint32_t line;     // of its file, from 1; 0: unknown
     uint32_t file;     // 0: the scene's, else 1 + index into those that it includes
@@ -210,14 +210,14 @@ typedef struct {
             double focal_length, height;
             bool finite, caps;
         } paraboloid;
-        // a round shape that an affine map has left of another kind (host/scene/oval.h): the points center +
+        // a round shape that an affine map has left of another type (host/scene/oval.h): the points center +
         // x axes[0] + y axes[1] + z axes[2] for those of a unit shape. half_height: where finite. radii: of a
         // finite cone at its ends, the larger 1, or of a torus, whose sum is 1. rise: the slope of an
         // infinite cone, or r^2 / z of an infinite paraboloid.
         struct {
             Vector3 center, axes[3];
             double half_height, radii[2], rise;
-            ShapeKind unit;
+            ShapeType unit;
             bool finite, caps;
         } oval;
         struct {
@@ -382,6 +382,6 @@ void scene_choose_image_size(const Scene *scene, uint32_t *width, uint32_t *heig
 size_t object_primitive_count(const Scene *scene, const Object *object);
 size_t scene_primitive_count(const Scene *scene);
 // Returns the shape that the file named: of an oval, that of which a transform made it.
-ShapeKind object_shape(const Object *object);
+ShapeType object_shape(const Object *object);
 // Returns whether an object consists of triangles with the normals of vertices.
 bool object_is_smooth(const Scene *scene, const Object *object);

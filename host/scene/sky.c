@@ -191,7 +191,7 @@ void scene_add_sky_light(Scene *scene)
                  intensity = sky.image ? scene->sky.intensity : 1;
     if (most * intensity < faint_light) return;
     // scaled so that a white surface that sees all of a uniform sky has the sky's color
-    const Light sky_light = {.kind = LIGHT_DIRECTIONAL,
+    const Light sky_light = {.type = LIGHT_DIRECTIONAL,
                              .area = AREA_SKY,
                              .color = vector_all(most * cell_count * intensity / M_PI),
                              .direction = vector_scale(scene->sky.up, -1)};

@@ -170,7 +170,7 @@ Scene scene_empty(void)
 
 void scene_add_triangle(Scene *scene, const Vector3 vertices[3])
 {
-    Object object = {.kind = SHAPE_TRIANGLE};
+    Object object = {.type = SHAPE_TRIANGLE};
     memcpy(object.as.triangle.vertices, vertices, sizeof object.as.triangle.vertices);
     array_push(scene->objects, object);
 }

@@ -92,7 +92,7 @@ void verify_instances(VerifyRun *run)
         array_push(scene.meshes, mesh);
         const Material material = material_default();
         scene_add_object(&scene,
-                         (Object){.kind = SHAPE_MESH,
+                         (Object){.type = SHAPE_MESH,
                                   .as.mesh = {.is_instance = true, .transform = placed[which].transform}},
                          &material);
         for (uint64_t i = 0; i < COUNT; i++) {

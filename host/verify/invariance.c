@@ -183,7 +183,7 @@ static Scene plain_scene(void)
         scene.materials.items[i].reflection = scene.materials.items[i].transmission = 0;
     for (size_t i = 0; i < scene.objects.count; i++) {
         Object *object = &scene.objects.items[i];
-        if (object->kind == SHAPE_CONE && object->as.cone.finite)
+        if (object->type == SHAPE_CONE && object->as.cone.finite)
             object->as.cone.radius[1] = fmax(object->as.cone.radius[1], 0.3);
     }
     return scene;

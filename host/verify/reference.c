@@ -7,7 +7,7 @@
 SHAPE_LIST(SHAPE_DECLARE)
 #undef SHAPE_DECLARE
 
-// By ShapeKind, which follows SHAPE_LIST; a mesh is hit by its triangles.
+// By ShapeType, which follows SHAPE_LIST; a mesh is hit by its triangles.
 #define SHAPE_ROW(feature, Type, name, names) &reference_##name,
 static const ReferenceShape *const shapes[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)};
 #undef SHAPE_ROW
@@ -65,9 +65,9 @@ Object reference_round_object(const Object *object)
 {
     Object result = *object;
     Vector3 *points = (Vector3 *)(void *)&result.as, end = vector_add(points[0], points[1]);
-    bool finite = (object->kind == SHAPE_CYLINDER && object->as.cylinder.finite) ||
-                  (object->kind == SHAPE_CONE && object->as.cone.finite);
-    round_numbers(&points[0].x, shapes[object->kind]->number_count);
+    bool finite = (object->type == SHAPE_CYLINDER && object->as.cylinder.finite) ||
+                  (object->type == SHAPE_CONE && object->as.cone.finite);
+    round_numbers(&points[0].x, shapes[object->type]->number_count);
     round_numbers(&end.x, 3);
     if (finite) points[1] = vector_subtract(end, points[0]);
     return result;
@@ -77,7 +77,7 @@ Object reference_object_from(const Object *object, Vector3 eye)
 {
     Object result = *object;
     Vector3 *points = (Vector3 *)(void *)&result.as;
-    for (unsigned i = 0; i < shapes[object->kind]->point_count; i++)
+    for (unsigned i = 0; i < shapes[object->type]->point_count; i++)
         points[i] = vector_subtract(points[i], eye);
     return result;
 }
@@ -90,7 +90,7 @@ ReferenceHit reference_miss(void)
 static ReferenceHit hit_from(const Object *object, const ReferenceRay *ray)
 {
     ReferenceHit hit = reference_miss();
-    shapes[object->kind]->hit(object, ray, &hit);
+    shapes[object->type]->hit(object, ray, &hit);
     return hit;
 }
 
@@ -131,7 +131,7 @@ ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray)
 ReferenceSurface reference_surface(const Object *object, Quad3 point)
 {
     ReferenceSurface surface = {.normal_condition = 1};
-    shapes[object->kind]->surface(object, point, &surface);
+    shapes[object->type]->surface(object, point, &surface);
     return surface;
 }
 

@@ -57,11 +57,11 @@ static Quad square_of(Quad coordinate, double size, Quad *margin)
 static Color checker_color(const Object *object, const Material *material, const ReferenceHit *hit,
                            Quad3 point, Quad *margin)
 {
-    bool flat = object->kind == SHAPE_PLANE || object->kind == SHAPE_DISC;
+    bool flat = object->type == SHAPE_PLANE || object->type == SHAPE_DISC;
     double size = material->checker_size;
     Quad squares;
     if (flat) {
-        Vector3 given = object->kind == SHAPE_PLANE ? object->as.plane.normal : object->as.disc.normal;
+        Vector3 given = object->type == SHAPE_PLANE ? object->as.plane.normal : object->as.disc.normal;
         Quad3 normal = quad3_unit(quad3(given));
         Quad3 along = quad3_perpendicular(normal), across = quad3_cross(normal, along);
         squares = square_of(quad3_dot(point, along), size, margin) +
@@ -94,7 +94,7 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
 static void surface_lift(ShadedPoint *surface)
 {
     const Object *object = surface->object;
-    if (object->kind != SHAPE_TRIANGLE || !object->as.triangle.smooth) return;
+    if (object->type != SHAPE_TRIANGLE || !object->as.triangle.smooth) return;
     Quad3 vertices[3], normals[3];
     bool agrees = true;
     for (int i = 0; i < 3; i++) {
@@ -126,7 +126,7 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sha
     const Scene *scene = &world->scene;
     const Material *material = surface->material;
     Color base = surface->base;
-    bool directional = light->kind == LIGHT_DIRECTIONAL;
+    bool directional = light->type == LIGHT_DIRECTIONAL;
     Quad3 to_light_unnormalized = directional ? quad3_scale(quad3(light->direction), -1)
                                               : quad3_subtract(quad3(light->position), surface->point);
     Quad3 to_light = quad3_unit(to_light_unnormalized);
@@ -140,7 +140,7 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sha
     ReferenceRay shadow = {quad3_add(surface->point, surface->lift), way, start,
                            directional ? (Quad)LDBL_MAX : 1};
     Quad strength =
-        light->kind == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
+        light->type == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
     if (light_fades(light)) {
         const Quad distance = quad3_length(to_light_unnormalized);
         strength /= light->fading[0] + distance * (light->fading[1] + distance * light->fading[2]);
@@ -435,7 +435,7 @@ static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Col
     Color reflected_weight = vector_scale(tint_factors(material->reflection_tint), reflection);
     ReferenceRay refracted = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, reflected = refracted;
     Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
-    const bool is_smooth = surface.object->kind == SHAPE_TRIANGLE && surface.object->as.triangle.smooth;
+    const bool is_smooth = surface.object->type == SHAPE_TRIANGLE && surface.object->as.triangle.smooth;
     bool is_total = false;
     if (transmission > 0) {
         is_total = !refract(direction, surface.normal, eta, &refracted.direction, &tree->margin);

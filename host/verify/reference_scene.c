@@ -11,7 +11,7 @@ static Object mesh_triangle(const Mesh *mesh, const Object *whole, size_t part)
 {
     const MeshTriangle triangle = mesh_triangle_at(mesh, whole, part);
     const uint32_t *materials = mesh_materials(mesh, whole);
-    Object object = {.kind = SHAPE_TRIANGLE, .material = materials ? materials[part] : whole->material};
+    Object object = {.type = SHAPE_TRIANGLE, .material = materials ? materials[part] : whole->material};
     Vector3 *vertices = object.as.triangle.vertices, *normals = object.as.triangle.normals;
     memcpy(vertices, triangle.vertices, sizeof triangle.vertices);
     memcpy(normals, triangle.normals, sizeof triangle.normals);
@@ -29,7 +29,7 @@ ReferenceScene reference_scene_open(const Scene *scene)
     size_t next = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
-        if (object->kind != SHAPE_MESH) {
+        if (object->type != SHAPE_MESH) {
             objects[next++] = *object;
             continue;
         }
@@ -42,7 +42,7 @@ ReferenceScene reference_scene_open(const Scene *scene)
     for (size_t i = 0; i < count; i++) {
         Bounds bounds;
         made.spheres[i].radius = INFINITY;
-        if (!shape_ops[objects[i].kind]->bounds(&made.scene, &objects[i], &bounds)) continue;
+        if (!shape_ops[objects[i].type]->bounds(&made.scene, &objects[i], &bounds)) continue;
         made.spheres[i].center = vector_scale(vector_add(bounds.min, bounds.max), 0.5);
         made.spheres[i].radius = vector_length(vector_subtract(bounds.max, made.spheres[i].center));
     }
@@ -76,7 +76,7 @@ ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t inde
     if (scene->spheres && sphere_is_missed(&scene->spheres[index], ray)) return reference_miss();
     const Object *object = &scene->scene.objects.items[index];
     const bool is_flat =
-        object->kind == SHAPE_PLANE || object->kind == SHAPE_DISC || object->kind == SHAPE_TRIANGLE;
+        object->type == SHAPE_PLANE || object->type == SHAPE_DISC || object->type == SHAPE_TRIANGLE;
     if (index == left && is_flat) return reference_miss();
     ReferenceRay whole = *ray;
     if (left != UINT32_MAX) whole.tmin = 0;

@@ -49,7 +49,7 @@ static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
             double size = pow(10, 4 * random_symmetric(62, index, k));
             center[k] = verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
         }
-        Object object = {.kind = SHAPE_SPHERE};
+        Object object = {.type = SHAPE_SPHERE};
         object.as.sphere.center = verify_vector(center);
         object.as.sphere.radius = verify_rounded(run, pow(10, 4 * random_symmetric(62, index, 6)));
         array_push(scene.objects, object);

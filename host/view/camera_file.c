@@ -23,7 +23,7 @@ static void camera_file_free(CameraFile *file)
 static bool is_zero(const YamlReader *reader, const YamlNode *node)
 {
     double number = 1;
-    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
     return number_read(text, strlen(text), &number) == NUMBER_READ && number == 0;
 }
 
@@ -55,7 +55,7 @@ static void animated_camera_read(CameraFile *file, uint32_t frame)
 static bool camera_is_constant(CameraFile *file)
 {
     YamlReader *reader = &file->reader;
-    const YamlNode *key = file->camera->kind == YAML_MAPPING ? yaml_first(&reader->tree, file->camera) : NULL;
+    const YamlNode *key = file->camera->type == YAML_MAPPING ? yaml_first(&reader->tree, file->camera) : NULL;
     for (const YamlNode *value; key; key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
         if (yaml_has_keys(reader, value))
@@ -73,8 +73,8 @@ static bool camera_file_read(CameraFile *file, const Source *source, const uint3
     reader->scene = &file->scene;
     if (yaml_tree_read(&reader->tree, &reader->report, 0, NULL)) {
         const YamlNode *root = reader->tree.nodes.items;
-        file->camera = root->kind == YAML_MAPPING ? field_node(reader, root, "camera") : root;
-        const YamlNode *include = root->kind == YAML_MAPPING ? field_node(reader, root, "include") : root;
+        file->camera = root->type == YAML_MAPPING ? field_node(reader, root, "camera") : root;
+        const YamlNode *include = root->type == YAML_MAPPING ? field_node(reader, root, "include") : root;
         if (file->camera == root && include != root)
             report_error(&reader->report, include->offset,
                          "the camera cannot be written: it is in an included file");

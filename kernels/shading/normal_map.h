@@ -26,19 +26,19 @@ static inline Tangents triangle_tangents(Corners corners, Corners uvs)
 }
 
 // Returns the tangents of other shapes, 0 for those without texture coordinates.
-static inline Tangents shape_tangents(const Scene *scene, uint kind, uint index, Vector outward)
+static inline Tangents shape_tangents(const Scene *scene, uint type, uint index, Vector outward)
 {
-    if (HAS_SPHERES && kind == KIND_SPHERES) {
+    if (HAS_SPHERES && type == TYPE_SPHERES) {
         Vector east = {outward.z, (real)(0), -outward.x};
         return (Tangents){east, vector_cross(outward, east)};
     }
-    GridAxes axes = grid_axes(scene, kind, index);
+    GridAxes axes = grid_axes(scene, type, index);
     return (Tangents){vector_of(axes.u), vector_of(axes.v)};
 }
 
 // Returns the unit shading normal tilted by the material's normal map, for the lanes in `wanted`. A map that
 // is mirrored on the surface has its v on the other side of the normal and u.
-static inline Vector normal_tilted(const Scene *scene, uint kind, const Material *material, Tangents tangents,
+static inline Vector normal_tilted(const Scene *scene, uint type, const Material *material, Tangents tangents,
                                    TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
                                    real travelled, mask wanted)
 {
@@ -55,7 +55,7 @@ static inline Vector normal_tilted(const Scene *scene, uint kind, const Material
         vector_fma(tangents.u, (real)(side * row_v.y), vector_scale(tangents.v, (real)(-side * row_v.x)));
     Vector along_v =
         vector_fma(tangents.v, (real)(side * row_u.x), vector_scale(tangents.u, (real)(-side * row_u.y)));
-    Vector texel = texture_color(scene, kind, material->normal_map, mapped, point, ray, travelled, wanted);
+    Vector texel = texture_color(scene, type, material->normal_map, mapped, point, ray, travelled, wanted);
     real x = strength * real_fma(two, texel.x, -one), y = strength * real_fma(two, texel.y, -one),
          z = real_fma(two, texel.z, -one);
     Vector normal = point->shading_normal;

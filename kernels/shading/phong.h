@@ -40,11 +40,11 @@ static inline real light_fading(const Light *light, Vector to_light)
 static inline Vector light_area_offset(const Light *light, uint index, const Surface *surface)
 {
     SquarePoint point = sample_point(&surface->sample, SAMPLED_LIGHTS + index);
-    if (light->kind.y == LIGHT_AREA_TRIANGLE)
+    if (light->type.y == LIGHT_AREA_TRIANGLE)
         point = triangle_of_square(point);
-    else if (light->kind.y != LIGHT_AREA_RECTANGLE)
+    else if (light->type.y != LIGHT_AREA_RECTANGLE)
         point = disc_of_square(point);
-    if (light->kind.y != LIGHT_AREA_SPHERE)
+    if (light->type.y != LIGHT_AREA_SPHERE)
         return vector_fma(vector_of(light->across_u), point.x,
                           vector_scale(vector_of(light->across_v), point.y));
     // Where the basis jumps, a pixel's samples do not complement each other. This one jumps only where a
@@ -97,14 +97,14 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
 // that a surface on which the light lies does not occlude it.
 static inline LightRay light_ray(const Scene *scene, const Light *light, uint index, const Surface *surface)
 {
-    bool has_area = HAS_AREA_LIGHTS && light->kind.y != LIGHT_AREA_NONE;
-    bool is_sky = HAS_SKY_LIGHT && light->kind.y == LIGHT_AREA_SKY;
+    bool has_area = HAS_AREA_LIGHTS && light->type.y != LIGHT_AREA_NONE;
+    bool is_sky = HAS_SKY_LIGHT && light->type.y == LIGHT_AREA_SKY;
     LightRay to_light;
     if (HAS_SKY_LIGHT) to_light.tint = (Color3){(real)(1), (real)(1), (real)(1)};
     Vector start = shadow_ray_origin(surface);
     to_light.strength = to_light.fading = (real)(1);
     bool has_positions = HAS_POINT_LIGHTS || HAS_SPOT_LIGHTS;
-    if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->kind.x == LIGHT_KIND_DIRECTIONAL)) {
+    if (HAS_DIRECTIONAL_LIGHTS && (!has_positions || light->type.x == LIGHT_TYPE_DIRECTIONAL)) {
         to_light.direction = vector_negate(vector_of(light->direction));
         if (is_sky)
             to_light.direction = sky_sample(scene, light, index, surface, &to_light.tint);
@@ -121,7 +121,7 @@ static inline LightRay light_ray(const Scene *scene, const Light *light, uint in
     Vector to_position = vector_subtract(position, surface->position);
     to_light.direction = vector_normalize(to_position);
     to_light.facing = vector_dot(surface->shading_normal, to_light.direction);
-    if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT)
+    if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT)
         to_light.strength = spot_strength(light, vector_negate(to_light.direction));
     if (HAS_FADING_LIGHTS) {
         to_light.fading = light_fading(light, to_position);
@@ -233,7 +233,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real brightest = (real)(light->color.w), strength_error = zero;
     mask far_off = mask_none(), skips_culling = far_off;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
-    if (light->kind.x != LIGHT_KIND_DIRECTIONAL) {
+    if (light->type.x != LIGHT_TYPE_DIRECTIONAL) {
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
         // without another root: a unit vector is off by 14.5 u, a dot product by 3 u
         if (!HAS_SMOOTH_NORMALS)
@@ -288,7 +288,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
     self_doubt = self_doubt | (open & !faint);
     if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
-    if (HAS_SPOT_LIGHTS && light->kind.x == LIGHT_KIND_SPOT) {
+    if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT) {
         Vector difference = vector_subtract(vector_negate(to_light->direction), vector_of(light->direction));
         real s = (real)(0.5f) * vector_dot(difference, difference), edge = (real)(light->cone.x);
         real error = angle_error + (real)(16 * UNIT_ROUNDOFF);
@@ -345,8 +345,8 @@ static inline LightVisibility light_reach(const Scene *scene, const Surface *sur
     visibility.reflected = phong_reflect(surface, &to_light, to_light.shadow_ray.active);
     if (HAS_SKY_LIGHT) visibility.reflected = color_multiply(visibility.reflected, to_light.tint);
     *shadow_ray = to_light.shadow_ray;
-    bool has_area = HAS_AREA_LIGHTS && light.kind.y != LIGHT_AREA_NONE;
-    if (light.kind.x != LIGHT_KIND_DIRECTIONAL && !has_area)
+    bool has_area = HAS_AREA_LIGHTS && light.type.y != LIGHT_AREA_NONE;
+    if (light.type.x != LIGHT_TYPE_DIRECTIONAL && !has_area)
         ray_set_common_origin(shadow_ray, COMMON_ORIGIN_FIRST_LIGHT + index, skips_culling);
     ray_counter_add(scene, RAYS_SHADOW, shadow_ray->active);
     return visibility;

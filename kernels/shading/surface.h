@@ -65,11 +65,11 @@ static inline Vector surface_normal(const Surface *surface)
     return HAS_SHADING_NORMALS ? surface->normal : surface->shading_normal;
 }
 
-static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, uint index, const Ray *ray,
+static inline SurfacePoint shape_surface_point(const Scene *scene, uint type, uint index, const Ray *ray,
                                                real t)
 {
 #define SHAPE_SURFACE_POINT(feature, Type, name, names)                                                      \
-    if (HAS_##feature && kind == KIND_##feature) {                                                           \
+    if (HAS_##feature && type == TYPE_##feature) {                                                           \
         Type shape = scene->names[index];                                                                    \
         return name##_surface_point(&shape, ray, t);                                                         \
     }
@@ -79,11 +79,11 @@ static inline SurfacePoint shape_surface_point(const Scene *scene, uint kind, ui
 
 #if IS_CERTIFIED
 // Sets the errors of a point that a shape returned. Returns the lanes that may be at an edge.
-static inline mask shape_set_errors(const Scene *scene, uint kind, uint index, const Ray *ray, real t,
+static inline mask shape_set_errors(const Scene *scene, uint type, uint index, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {
 #define SHAPE_SET_ERRORS(feature, Type, name, names)                                                         \
-    if (HAS_##feature && kind == KIND_##feature) {                                                           \
+    if (HAS_##feature && type == TYPE_##feature) {                                                           \
         Type shape = scene->names[index];                                                                    \
         return name##_set_errors(&shape, ray, t, place_error, point);                                        \
     }
@@ -158,7 +158,7 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         mask same = objects == (integer)(object);
         objects = lanes_select(same, NO_OBJECT, objects);
         uint4 entry = range_entry(scene, range, object);
-        if (entry.x != KIND_TRIANGLES || entry.z != material) continue;
+        if (entry.x != TYPE_TRIANGLES || entry.z != material) continue;
         hit.lanes = hit.lanes | same;
         Triangle triangle = scene->triangles[entry.y];
         if (has_eye_height(triangle.id)) next_to_eye = next_to_eye | same;
@@ -263,15 +263,15 @@ static inline mask floor_is_doubtful(real a, real error)
 // Returns the lanes where the checker has its second color. On planes and discs squares lie in the surface.
 // Elsewhere they are cubes in space, looked up a 1024th of a cube behind the surface, so that a face on the
 // border between cubes has one color.
-static inline mask checker_odd(const Scene *scene, uint kind, uint index, const SurfacePoint *point,
+static inline mask checker_odd(const Scene *scene, uint type, uint index, const SurfacePoint *point,
                                const Ray *ray, scalar4 grid, real place_error, mask *doubt)
 {
     real cells;
-    if (kind_has_grid(kind)) {
-        GridCoordinates square = grid_coordinates(scene, kind, index, point->position);
+    if (type_has_grid(type)) {
+        GridCoordinates square = grid_coordinates(scene, type, index, point->position);
         cells = real_floor(square.u) + real_floor(square.v);
         if (IS_CERTIFIED) {
-            real error = grid_error(scene, kind, index, point->position, place_error);
+            real error = grid_error(scene, type, index, point->position, place_error);
             *doubt = floor_is_doubtful(square.u, error) | floor_is_doubtful(square.v, error);
         }
     } else {
@@ -297,12 +297,12 @@ static inline mask checker_odd(const Scene *scene, uint kind, uint index, const 
 static inline TextureCoordinates hit_coordinates(const Scene *scene, uint4 entry, const Material *material,
                                                  const LaneSurfacePoints *hit)
 {
-    if (entry.x == KIND_TRIANGLES) return hit->coordinates;
+    if (entry.x == TYPE_TRIANGLES) return hit->coordinates;
     return texture_coordinates(scene, entry.x, entry.y, material, &hit->point);
 }
 
 // Returns the object's color at the hit: plain, checkered or textured. `entry` is the object's
-// kind_index_material.
+// type_index_material.
 static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
                                   const LaneSurfacePoints *hit, const Ray *ray, real travelled,
                                   real place_error, mask *doubt)
@@ -327,7 +327,7 @@ static inline void hit_tilt_normals(const Scene *scene, uint4 entry, const Mater
 {
     if (material->normal_map.x == 0) return;
     TextureCoordinates coordinates = hit_coordinates(scene, entry, material, hit);
-    Tangents tangents = entry.x == KIND_TRIANGLES
+    Tangents tangents = entry.x == TYPE_TRIANGLES
                             ? hit->tangents
                             : shape_tangents(scene, entry.x, entry.y, hit->point.normal);
     hit->point.shading_normal = normal_tilted(scene, entry.x, material, tangents, coordinates, &hit->point,
@@ -459,7 +459,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         const ObjectRange range = object_range(scene, (uint)object);
         uint4 entry = range_entry(scene, &range, object);
         LaneSurfacePoints found;
-        if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
+        if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
             // other precisions pass no pointer, which would keep the surface out of registers
             found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t,
                                             IS_CERTIFIED ? &surface : 0);
@@ -472,12 +472,12 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
         mask at_edge = mask_none();
 #if IS_CERTIFIED
-        if (HAS_CHORDS && entry.x == KIND_SPHERES) {
+        if (HAS_CHORDS && entry.x == TYPE_SPHERES) {
             Sphere sphere = scene->spheres[entry.y];
             surface_set_chord_end(&surface, &sphere, ray, hit, &found);
         }
         at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
-        if (!HAS_TRIANGLES || entry.x != KIND_TRIANGLES)
+        if (!HAS_TRIANGLES || entry.x != TYPE_TRIANGLES)
             surface_narrow_place(&surface, found.lanes & (found.point.height < NEVER), found.point.height,
                                  least_cosine(found.point.normal, ray));
 #endif

@@ -28,11 +28,11 @@ static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere
     return coordinates;
 }
 
-// Returns whether shapes of this kind have a grid in the surface, as planes and discs do.
-static inline bool kind_has_grid(uint kind)
+// Returns whether shapes of this type have a grid in the surface, as planes and discs do.
+static inline bool type_has_grid(uint type)
 {
-    if (HAS_PLANES && kind == KIND_PLANES) return true;
-    return HAS_DISCS && kind == KIND_DISCS;
+    if (HAS_PLANES && type == TYPE_PLANES) return true;
+    return HAS_DISCS && type == TYPE_DISCS;
 }
 
 // The axes of that grid; w is where it begins.
@@ -40,12 +40,12 @@ typedef struct {
     scalar4 u, v;
 } GridAxes;
 
-// Returns the axes of the grid, all 0 for other kinds, which have no grid.
-static inline GridAxes grid_axes(const Scene *scene, uint kind, uint index)
+// Returns the axes of the grid, all 0 for other types, which have no grid.
+static inline GridAxes grid_axes(const Scene *scene, uint type, uint index)
 {
-    if (HAS_PLANES && kind == KIND_PLANES)
+    if (HAS_PLANES && type == TYPE_PLANES)
         return (GridAxes){scene->planes[index].grid_u, scene->planes[index].grid_v};
-    if (HAS_DISCS && kind == KIND_DISCS)
+    if (HAS_DISCS && type == TYPE_DISCS)
         return (GridAxes){scene->discs[index].grid_u, scene->discs[index].grid_v};
     return (GridAxes){(scalar4)(0), (scalar4)(0)};
 }
@@ -54,18 +54,18 @@ typedef struct {
     real u, v; // in checker squares, or texture repeats
 } GridCoordinates;
 
-// Returns the grid coordinates of a point of a plane or disc, (0, 0) for other kinds.
-static inline GridCoordinates grid_coordinates(const Scene *scene, uint kind, uint index, Vector position)
+// Returns the grid coordinates of a point of a plane or disc, (0, 0) for other types.
+static inline GridCoordinates grid_coordinates(const Scene *scene, uint type, uint index, Vector position)
 {
-    GridAxes axes = grid_axes(scene, kind, index);
+    GridAxes axes = grid_axes(scene, type, index);
     return (GridCoordinates){vector_dot(position, vector_of(axes.u)) + (real)(axes.u.w),
                              vector_dot(position, vector_of(axes.v)) + (real)(axes.v.w)};
 }
 
 // Bounds the error of grid coordinates, for a position that is off by `place_error`.
-static inline real grid_error(const Scene *scene, uint kind, uint index, Vector position, real place_error)
+static inline real grid_error(const Scene *scene, uint type, uint index, Vector position, real place_error)
 {
-    GridAxes axes = grid_axes(scene, kind, index);
+    GridAxes axes = grid_axes(scene, type, index);
     scalar4 grid_u = fabs(axes.u), grid_v = fabs(axes.v);
     Vector p = {fabs(position.x), fabs(position.y), fabs(position.z)};
     real moved = real_max(vector_norm1(vector_of(grid_u)), vector_norm1(vector_of(grid_v)));
@@ -74,17 +74,17 @@ static inline real grid_error(const Scene *scene, uint kind, uint index, Vector 
     return real_fma(moved, place_error, (real)(8 * UNIT_ROUNDOFF) * size);
 }
 
-static inline TextureCoordinates texture_coordinates(const Scene *scene, uint kind, uint index,
+static inline TextureCoordinates texture_coordinates(const Scene *scene, uint type, uint index,
                                                      const Material *material, const SurfacePoint *point)
 {
-    if (HAS_SPHERES && kind == KIND_SPHERES) {
+    if (HAS_SPHERES && type == TYPE_SPHERES) {
         Sphere sphere = scene->spheres[index];
         uint first_level = material->texture.x;
         if (HAS_NORMAL_MAPS && first_level == 0) first_level = material->normal_map.x;
         return sphere_texture_coordinates(&sphere, point->normal,
                                           scene->texture_levels[first_level - 1].place);
     }
-    GridCoordinates grid = grid_coordinates(scene, kind, index, point->position);
+    GridCoordinates grid = grid_coordinates(scene, type, index, point->position);
     return (TextureCoordinates){grid.u, grid.v, (real)(material->reflection_transmission_ior.w)};
 }
 
@@ -234,7 +234,7 @@ static inline Vector background_color(const Scene *scene, Vector direction, mask
 
 // Returns the texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance
 // `travelled` from the eye. At a grazing angle the footprint grows by at most 2^10.
-static inline Vector texture_color(const Scene *scene, uint kind, uint4 texture,
+static inline Vector texture_color(const Scene *scene, uint type, uint4 texture,
                                    TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
                                    real travelled, mask wanted)
 {
@@ -243,7 +243,7 @@ static inline Vector texture_color(const Scene *scene, uint kind, uint4 texture,
     if (HAS_ORTHOGRAPHIC && scene->header->sample.z > 0) width = (real)(scene->header->sample.z);
     return texture_lookup(scene, texture, coordinates.u, coordinates.v,
                           real_divide(width * coordinates.density, cosine),
-                          kind == KIND_SPHERES ? WRAP_CLAMPED : texture.w, wanted);
+                          type == TYPE_SPHERES ? WRAP_CLAMPED : texture.w, wanted);
 }
 
 #endif

@@ -114,7 +114,7 @@ static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
     OvalRay own = oval_ray(oval, ray);
     mask hit = mask_none();
 #define OVAL_HIT(feature, Type, name)                                                                        \
-    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
         const Type shape = oval_##name(oval);                                                                \
         hit = name##_hit(&shape, &own.ray, &unit_t);                                                         \
     }
@@ -135,7 +135,7 @@ static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, 
     const OvalRay own = oval_ray(oval, ray);
     SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
 #define OVAL_SURFACE_POINT(feature, Type, name)                                                              \
-    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
         const Type shape = oval_##name(oval);                                                                \
         unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
     }
@@ -155,7 +155,7 @@ static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
 {
     const OvalRay own = oval_ray(oval, ray);
 #define OVAL_CERTAIN_HIT(feature, Type, name)                                                                \
-    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
         const Type shape = oval_##name(oval);                                                                \
         return name##_certain_hit(&shape, &own.ray);                                                         \
     }
@@ -174,7 +174,7 @@ static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, rea
     SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
     mask at_edge = mask_none();
 #define OVAL_SET_ERRORS(feature, Type, name)                                                                 \
-    if (HAS_##feature && oval->id.z == KIND_##feature) {                                                     \
+    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
         const Type shape = oval_##name(oval);                                                                \
         unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
         at_edge =                                                                                            \

@@ -14,12 +14,12 @@
 #include "traversal/query.h"
 
 // Returns the texture coordinates of a hit, without their density. `entry` is the object's
-// kind_index_material. Shading computes the same coordinates.
+// type_index_material. Shading computes the same coordinates.
 static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 entry, const Ray *ray, real t)
 {
     TextureCoordinates coordinates = {(real)(0), (real)(0), (real)(0)};
     Vector position = {(real)(0), (real)(0), (real)(0)};
-    if (HAS_TRIANGLES && entry.x == KIND_TRIANGLES) {
+    if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
         const Triangle triangle = scene->triangles[entry.y];
         if (triangle.id.z == 0) return coordinates;
         const TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
@@ -30,15 +30,15 @@ static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 en
         coordinates.v = uv.y;
         return coordinates;
     }
-    if (HAS_SPHERES && entry.x == KIND_SPHERES) {
+    if (HAS_SPHERES && entry.x == TYPE_SPHERES) {
         const Sphere sphere = scene->spheres[entry.y];
         return sphere_texture_coordinates(&sphere, sphere_normal(&sphere, ray, t), (uint4)(0));
     }
-    if (HAS_PLANES && entry.x == KIND_PLANES) {
+    if (HAS_PLANES && entry.x == TYPE_PLANES) {
         const Plane plane = scene->planes[entry.y];
         position = plane_surface_point(&plane, ray, t).position;
     }
-    if (HAS_DISCS && entry.x == KIND_DISCS) {
+    if (HAS_DISCS && entry.x == TYPE_DISCS) {
         const Disc disc = scene->discs[entry.y];
         position = disc_surface_point(&disc, ray, t).position;
     }
@@ -71,7 +71,7 @@ static OUT_OF_LINE mask object_hole_lanes(const Traversal *traversal, const Scen
     const uint4 entry = object_entry(traversal, scene, id);
     const uint4 cutout = scene->materials[entry.z].cutout;
     if (cutout.x == 0) return mask_none();
-    return alpha_is_low(scene, cutout, entry.x == KIND_SPHERES ? WRAP_CLAMPED : cutout.w,
+    return alpha_is_low(scene, cutout, entry.x == TYPE_SPHERES ? WRAP_CLAMPED : cutout.w,
                         cutout_coordinates(scene, entry, ray, t), wanted);
 }
 

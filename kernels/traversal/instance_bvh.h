@@ -17,10 +17,10 @@ static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.entry <= tmax) {
-            if (next.child_kind == BVH_NODE) {
+            if (next.child_type == BVH_NODE) {
                 visit_node(&stack, &scene->nodes[next.child_index], box_ray, octant, tmax);
             } else {
-                const uint first = next.child_index, last = first + (next.child_kind >> 8);
+                const uint first = next.child_index, last = first + (next.child_type >> 8);
                 intersect_triangles(traversal, scene, ray, first, last);
                 if (!traversal->active) return;
                 tmax = traversal_tmax(traversal);

@@ -39,7 +39,7 @@ typedef struct {
 // A child of a node.
 typedef struct {
     SeenRectangle seen;
-    uint index, kind; // of BvhNode
+    uint index, type; // of BvhNode
     uint packets;     // that may hit it, as bits
 } TileEntry;
 

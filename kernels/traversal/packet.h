@@ -230,8 +230,8 @@ static inline uint child_lanes(const RayGroup *group, const MetChildren *met, ui
 // The children that are leaves, as bits.
 static inline uint node_leaves(global const BvhNode *node)
 {
-    integer kinds = LANES_CONVERT(INTEGER_BASE)(JOIN(vload, LANES)(0, (global const uint *)node->child_kind));
-    return lanes_bits(kinds != (integer)(BVH_NODE));
+    integer types = LANES_CONVERT(INTEGER_BASE)(JOIN(vload, LANES)(0, (global const uint *)node->child_type));
+    return lanes_bits(types != (integer)(BVH_NODE));
 }
 
 // Intersects what is in the leaves among a node's children that any of the lanes intersects, and pushes the
@@ -246,13 +246,13 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
         uint leaf = lowest_bit(left);
         uint hit_by = child_lanes(group, &met, leaf, boxes);
         uint first = ((global const uint *)node->child_index)[leaf];
-        uint kind = ((global const uint *)node->child_kind)[leaf];
-        if (hit_by == 0 || kind == BVH_EMPTY) continue;
-        if (HAS_INSTANCES && (kind & 0xff) == KIND_INSTANCES) {
+        uint type = ((global const uint *)node->child_type)[leaf];
+        if (hit_by == 0 || type == BVH_EMPTY) continue;
+        if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES) {
             stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, met.entry.each[leaf]});
             continue;
         }
-        if (intersect_leaf_or_block(traversal, scene, ray, kind, first, hit_by))
+        if (intersect_leaf_or_block(traversal, scene, ray, type, first, hit_by))
             group_shrink(group, traversal);
         if (group->active == 0) return;
     }

@@ -14,10 +14,10 @@
 #include "traversal/cutout.h"
 
 // Prefetches what shading reads of the closest hit.
-static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
+static inline void object_prefetch(const Scene *scene, uint type, uint4 id)
 {
     if (!HAS_INSTANCES) memory_prefetch((global const char *)&scene->objects[id.x], sizeof(ObjectEntry));
-    if (HAS_TRIANGLES && kind == KIND_TRIANGLES && id.y > 0)
+    if (HAS_TRIANGLES && type == TYPE_TRIANGLES && id.y > 0)
         memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
@@ -26,7 +26,7 @@ static inline void object_prefetch(const Scene *scene, uint kind, uint4 id)
 static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ray *ray, CertainHit *hit)
 {
     if (!lanes_any(hit->doubt & (ray->left >= (integer)(0)))) return;
-    Triangle triangle = scene->triangles[scene->objects[id].kind_index_material.y];
+    Triangle triangle = scene->triangles[scene->objects[id].type_index_material.y];
     TriangleNeighbors neighbors = scene->triangle_neighbors[id];
     hit->doubt = hit->doubt & !triangle_left_behind(&triangle, &neighbors, ray, hit->doubt);
 }
@@ -39,7 +39,7 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
                                         Type shape)                                                          \
     {                                                                                                        \
         CertainHit hit = name##_certain_hit(&shape, ray);                                                    \
-        if (KIND_##feature == KIND_TRIANGLES && lanes_any(hit.doubt))                                        \
+        if (TYPE_##feature == TYPE_TRIANGLES && lanes_any(hit.doubt))                                        \
             triangle_skip_neighbors(scene, shape.id.x, ray, &hit);                                           \
         if (!lanes_any(hit.found | hit.doubt)) return false;                                                 \
         traversal_record_certain(traversal, scene, &hit, shape.id.x);                                        \
@@ -55,7 +55,7 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
         if (!lanes_any(found)) return false;                                                                 \
         if (HAS_CUTOUTS) {                                                                                   \
             const mask cut = traversal_cut(traversal, scene, ray, shape.id.x, &found, t);                    \
-            if (KIND_##feature == KIND_SPHERES && lanes_any(cut)) { /* the far side may be hit */            \
+            if (TYPE_##feature == TYPE_SPHERES && lanes_any(cut)) { /* the far side may be hit */            \
                 Ray behind = *ray;                                                                           \
                 behind.active = cut;                                                                         \
                 behind.tmin = lanes_select(cut, t, ray->tmin);                                               \
@@ -68,7 +68,7 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
             if (!lanes_any(found)) return false;                                                             \
         }                                                                                                    \
         traversal_record(traversal, scene, found, t, shape.id.x);                                            \
-        if (traversal->query != OCCLUSION) object_prefetch(scene, KIND_##feature, shape.id);                 \
+        if (traversal->query != OCCLUSION) object_prefetch(scene, TYPE_##feature, shape.id);                 \
         return true;                                                                                         \
     }
 #endif
@@ -79,8 +79,8 @@ SHAPE_LIST(INTERSECT_SHAPE)
 static bool instance_traverse(Traversal *traversal, const Scene *scene, const Ray *ray, uint index,
                               uint lanes);
 
-// Intersects primitives first .. last - 1 of one kind. One function per kind: if one function tested all
-// kinds, Mesa, which inlines before it knows the kind asked for, would compile them all at each call.
+// Intersects primitives first .. last - 1 of one type. One function per type: if one function tested all
+// types, Mesa, which inlines before it knows the type asked for, would compile them all at each call.
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
     static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
                                          uint first, uint last)                                              \
@@ -104,7 +104,7 @@ static inline bool intersect_instances(Traversal *traversal, const Scene *scene,
     return found_any;
 }
 
-// Intersects those of `count` primitives of one kind whose bits are set in `near` and whose cull spheres, if
+// Intersects those of `count` primitives of one type whose bits are set in `near` and whose cull spheres, if
 // these are not 0, a ray may hit. More than 32 primitives have no bits: all count as near.
 #define INTERSECT_NEAR_SHAPES(feature, Type, name, names)                                                    \
     static inline void intersect_near_##names(Traversal *traversal, const Scene *scene, const Ray *ray,      \
@@ -247,20 +247,20 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 }
 #endif
 
-// Whether the leaves of a kind are blocks.
-static inline bool kind_has_blocks(uint kind)
+// Whether the leaves of a type are blocks.
+static inline bool type_has_blocks(uint type)
 {
-    return LANES > 1 && (kind == KIND_SPHERES || kind == KIND_TRIANGLES);
+    return LANES > 1 && (type == TYPE_SPHERES || type == TYPE_TRIANGLES);
 }
 
-// Intersects a leaf, count << 8 | kind (BvhNode.child_kind) and its first primitive. Blocks and instances are
+// Intersects a leaf, count << 8 | type (BvhNode.child_type) and its first primitive. Blocks and instances are
 // left out.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint first)
 {
-    const uint kind = leaf & 0xff, last = first + (leaf >> 8);
+    const uint type = leaf & 0xff, last = first + (leaf >> 8);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
-    if (HAS_##feature && !kind_has_blocks(KIND_##feature) && kind == KIND_##feature)                         \
+    if (HAS_##feature && !type_has_blocks(TYPE_##feature) && type == TYPE_##feature)                         \
         return intersect_##names(traversal, scene, ray, first, last);
     SHAPE_LIST(INTERSECT_LEAF)
     return false;
@@ -271,10 +271,10 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
 static inline bool intersect_leaf_or_block(Traversal *traversal, const Scene *scene, const Ray *ray,
                                            uint leaf, uint index, uint lanes)
 {
-    const uint kind = leaf & 0xff, count = leaf >> 8;
-    if (HAS_SPHERES && kind == KIND_SPHERES)
+    const uint type = leaf & 0xff, count = leaf >> 8;
+    if (HAS_SPHERES && type == TYPE_SPHERES)
         return intersect_sphere_block(traversal, scene, ray, index, count, lanes);
-    if (HAS_TRIANGLES && kind == KIND_TRIANGLES)
+    if (HAS_TRIANGLES && type == TYPE_TRIANGLES)
         return intersect_triangle_block(traversal, scene, ray, index, count, lanes);
     return intersect_leaf(traversal, scene, ray, leaf, index);
 }
@@ -284,7 +284,7 @@ static inline bool intersect_leaf_or_block(Traversal *traversal, const Scene *sc
 static inline void intersect_all_planes(Traversal *traversal, const Scene *scene, const Ray *ray)
 {
     global const uint *counts = (global const uint *)scene->header->counts;
-    if (HAS_PLANES) intersect_planes(traversal, scene, ray, 0, counts[KIND_PLANES]);
+    if (HAS_PLANES) intersect_planes(traversal, scene, ray, 0, counts[TYPE_PLANES]);
 }
 
 // Intersects all other primitives outside the BVH: the unbounded and the huge, or all in a scene without a
@@ -293,14 +293,14 @@ static OUT_OF_LINE void intersect_outside_bvh(Traversal *traversal, const Scene 
 {
     global const uint *counts = (global const uint *)scene->header->counts;
     global const uint *bvh_counts = (global const uint *)scene->header->bvh_counts;
-    uint box_count = HAS_BOXES ? counts[KIND_BOXES] - bvh_counts[KIND_BOXES] : 0;
-    uint triangle_count = HAS_TRIANGLES ? counts[KIND_TRIANGLES] - bvh_counts[KIND_TRIANGLES] : 0;
+    uint box_count = HAS_BOXES ? counts[TYPE_BOXES] - bvh_counts[TYPE_BOXES] : 0;
+    uint triangle_count = HAS_TRIANGLES ? counts[TYPE_TRIANGLES] - bvh_counts[TYPE_TRIANGLES] : 0;
     if (box_count + triangle_count > 0) ray_prepare(ray);
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
     if (cull_spheres) cull_spheres++; // the first is the BVH's
 #define INTERSECT_OUTSIDE_BVH(feature, Type, name, names)                                                    \
-    if (HAS_##feature && KIND_##feature != KIND_PLANES && lanes_any(traversal->active)) {                    \
-        uint first = bvh_counts[KIND_##feature], count = counts[KIND_##feature] - first;                     \
+    if (HAS_##feature && TYPE_##feature != TYPE_PLANES && lanes_any(traversal->active)) {                    \
+        uint first = bvh_counts[TYPE_##feature], count = counts[TYPE_##feature] - first;                     \
         intersect_near_##names(traversal, scene, ray, first, count, near, cull_spheres);                     \
         near = count < 32 ? ~(~near >> count) : ~0u;                                                         \
         if (cull_spheres) cull_spheres += count;                                                             \

@@ -38,10 +38,10 @@ typedef struct {
 #define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
 
-// Returns an object's kind_index_material. In an instance ids are those of its mesh, from 0 on.
+// Returns an object's type_index_material. In an instance ids are those of its mesh, from 0 on.
 static inline uint4 object_entry(const Traversal *traversal, const Scene *scene, uint id)
 {
-    if (!HAS_INSTANCES) return scene->objects[id].kind_index_material;
+    if (!HAS_INSTANCES) return scene->objects[id].type_index_material;
     if (traversal->within.is_instance)
         return range_entry(scene, &traversal->within, traversal->within.first + id);
     const ObjectRange range = object_range(scene, id);

@@ -16,7 +16,7 @@ static inline void visit_node(TraversalStack *stack, global const BvhNode *node,
     const uint bottom = stack->count;
     for (uint child = 0; child < BVH_WIDTH; child++) {
         StackEntry entry = {((global const uint *)node->child_index)[child],
-                            ((global const uint *)node->child_kind)[child], 0};
+                            ((global const uint *)node->child_type)[child], 0};
         if (box_rays_intersect_child(box_ray, octant, boxes + child, tmax, &entry.entry))
             stack_push(stack, bottom, entry);
     }
@@ -35,13 +35,13 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
         if (next.entry <= tmax) {
-            if (next.child_kind == BVH_NODE) {
+            if (next.child_type == BVH_NODE) {
                 visit_node(&stack, &scene->nodes[next.child_index], &box_ray, octant, tmax);
             } else {
-                if (HAS_INSTANCES && (next.child_kind & 0xff) == KIND_INSTANCES)
+                if (HAS_INSTANCES && (next.child_type & 0xff) == TYPE_INSTANCES)
                     instance_traverse(traversal, scene, ray, next.child_index, 1);
                 else
-                    intersect_leaf(traversal, scene, ray, next.child_kind, next.child_index);
+                    intersect_leaf(traversal, scene, ray, next.child_type, next.child_index);
                 if (!traversal->active) return;
                 tmax = traversal_tmax(traversal);
             }

@@ -9,7 +9,7 @@
 typedef struct {
     uint child_index; // the node, or the leaf's first primitive
 #if LANES == 1
-    uint child_kind; // BVH_NODE, or a leaf
+    uint child_type; // BVH_NODE, or a leaf
 #else
     uint lanes; // whose rays intersect the node's box, as bits; leaves are intersected at once
 #endif

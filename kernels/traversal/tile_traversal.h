@@ -4,7 +4,7 @@
 // packets of each child that is left all at once, a lane per packet; and the rays of each packet that is not
 // wholly inside the child's rectangle all at once, a lane per ray. Groups of rays are culled by bounds at
 // several levels in Reshetov, Soupikov, Hurley, Multi-level ray tracing algorithm, SIGGRAPH 2005, without
-// lanes of three kinds.
+// lanes of three types.
 #ifndef TILE_TRAVERSAL_H
 #define TILE_TRAVERSAL_H
 
@@ -82,16 +82,16 @@ static inline uint packets_within(const MacroTile *tile, uint packets, const See
 }
 
 // Prefetches what a visit will read first.
-static inline void entry_prefetch(const Scene *scene, uint kind, uint index)
+static inline void entry_prefetch(const Scene *scene, uint type, uint index)
 {
-    if (kind == BVH_NODE)
+    if (type == BVH_NODE)
         memory_prefetch((global const char *)&scene->nodes[index], sizeof(BvhNode));
-    else if (HAS_TRIANGLES && (kind & 0xff) == KIND_TRIANGLES)
+    else if (HAS_TRIANGLES && (type & 0xff) == TYPE_TRIANGLES)
         memory_prefetch((global const char *)&scene->triangle_blocks[index], sizeof(TriangleBlock));
-    else if (HAS_SPHERES && (kind & 0xff) == KIND_SPHERES)
+    else if (HAS_SPHERES && (type & 0xff) == TYPE_SPHERES)
         memory_prefetch((global const char *)&scene->sphere_blocks[index],
                         sizeof(scene->sphere_blocks->rows) + sizeof(scene->sphere_blocks->ids));
-    else if (HAS_INSTANCES && (kind & 0xff) == KIND_INSTANCES)
+    else if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES)
         memory_prefetch((global const char *)&scene->instances[index], sizeof(Instance));
 }
 
@@ -100,7 +100,7 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
 {
     for (; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
-        if (HAS_INSTANCES && (leaf->kind & 0xff) == KIND_INSTANCES) {
+        if (HAS_INSTANCES && (leaf->type & 0xff) == TYPE_INSTANCES) {
             const uint rays = rays_within(tile, packet, &leaf->seen);
             if (rays != 0 &&
                 instance_traverse(&tile->traversals[packet], scene, &tile->rays[packet], leaf->index, rays))
@@ -108,7 +108,7 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
             continue;
         }
         tile_prepare(tile, packet);
-        if (intersect_leaf(&tile->traversals[packet], scene, &tile->rays[packet], leaf->kind, leaf->index))
+        if (intersect_leaf(&tile->traversals[packet], scene, &tile->rays[packet], leaf->type, leaf->index))
             tile_update(tile, packet);
     }
 }
@@ -116,11 +116,11 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
 // Returns whether a child is visited only after all that are nearer to the common origin: nodes, blocks and
 // instances.
 // Shadow rays do not end at the nearest hit, and gain nothing from that order between blocks of spheres.
-static inline bool child_waits(uint kind, bool is_shadow)
+static inline bool child_waits(uint type, bool is_shadow)
 {
-    if (HAS_INSTANCES && (kind & 0xff) == KIND_INSTANCES) return true;
-    return kind == BVH_NODE || (kind & 0xff) == KIND_TRIANGLES ||
-           (!is_shadow && (kind & 0xff) == KIND_SPHERES);
+    if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES) return true;
+    return type == BVH_NODE || (type & 0xff) == TYPE_TRIANGLES ||
+           (!is_shadow && (type & 0xff) == TYPE_SPHERES);
 }
 
 // Visits the children of a node that the packets may hit, or pushes those that wait, the nearest to the
@@ -144,20 +144,20 @@ static inline ALWAYS_INLINE uint tile_visit_node(MacroTile *tile, const Scene *s
         TileEntry entry;
         entry.seen = (SeenRectangle){boxes.u_min.each[child], boxes.u_max.each[child],
                                      boxes.v_min.each[child], boxes.v_max.each[child], boxes.w.each[child]};
-        entry.kind = ((global const uint *)node->child_kind)[child];
+        entry.type = ((global const uint *)node->child_type)[child];
         entry.packets = tile->active & (by_packet ? (uint)overlapping.each[child]
                                                   : packets_overlap(tile, packets, &entry.seen));
         entry.packets = packets_within(tile, entry.packets, &entry.seen);
-        if (entry.packets == 0 || entry.kind == BVH_EMPTY) continue;
+        if (entry.packets == 0 || entry.type == BVH_EMPTY) continue;
         entry.index = ((global const uint *)node->child_index)[child];
-        if (!child_waits(entry.kind, is_shadow)) {
-            if (HAS_SPHERES && is_shadow && (entry.kind & 0xff) == KIND_SPHERES)
+        if (!child_waits(entry.type, is_shadow)) {
+            if (HAS_SPHERES && is_shadow && (entry.type & 0xff) == TYPE_SPHERES)
                 tile_visit_spheres(tile, scene, &entry, entry.packets, true);
             else
                 tile_visit_leaf(tile, scene, &entry, entry.packets);
             continue;
         }
-        entry_prefetch(scene, entry.kind, entry.index);
+        entry_prefetch(scene, entry.type, entry.index);
         uint slot = count++;
         for (; slot > bottom && entries[slot - 1].seen.w < entry.seen.w; slot--)
             entries[slot] = entries[slot - 1];
@@ -171,7 +171,7 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
     TileEntry entries[STACK_CAPACITY];
     entries[0] = (TileEntry){.seen = {-LARGEST, LARGEST, -LARGEST, LARGEST, -LARGEST},
                              .index = 0,
-                             .kind = BVH_NODE,
+                             .type = BVH_NODE,
                              .packets = tile->active};
     uint count = 1;
     while (count > 0 && tile->active != 0) {
@@ -179,12 +179,12 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
         const uint packets =
             entry.packets & tile->active & lanes_bits((real)(entry.seen.w) <= tile->reach_max.all);
         if (packets == 0) continue;
-        if (entry.kind == BVH_NODE)
+        if (entry.type == BVH_NODE)
             count =
                 tile_visit_node(tile, scene, &scene->nodes[entry.index], packets, entries, count, is_shadow);
-        else if (HAS_TRIANGLES && (entry.kind & 0xff) == KIND_TRIANGLES)
+        else if (HAS_TRIANGLES && (entry.type & 0xff) == TYPE_TRIANGLES)
             tile_visit_triangles(tile, scene, &entry, packets, is_shadow);
-        else if (HAS_INSTANCES && (entry.kind & 0xff) == KIND_INSTANCES)
+        else if (HAS_INSTANCES && (entry.type & 0xff) == TYPE_INSTANCES)
             tile_visit_leaf(tile, scene, &entry, packets);
         else if (HAS_SPHERES && !is_shadow)
             tile_visit_spheres(tile, scene, &entry, packets, false);

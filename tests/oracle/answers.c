@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-enum { OBJECTS_OF_A_KIND = 4 };
+enum { OBJECTS_OF_A_TYPE = 4 };
 
 static void numbers_print(const char *key, const double *numbers, size_t count)
 {
@@ -45,8 +45,8 @@ static void flags_print(bool finite, bool caps)
 
 static void object_print(const Object *object)
 {
-    printf("{\"shape\": \"%s\", ", shape_names[object->kind]);
-    switch (object->kind) {
+    printf("{\"shape\": \"%s\", ", shape_names[object->type]);
+    switch (object->type) {
     case SHAPE_CYLINDER:
         flags_print(object->as.cylinder.finite, object->as.cylinder.caps);
         break;
@@ -137,7 +137,7 @@ static void case_print(const VerifyRays *set, bool is_double, size_t further)
 static void shapes_print(const ShapeForm *form, uint64_t seed, size_t samples)
 {
     Random random = {seed};
-    for (int i = 0; i < OBJECTS_OF_A_KIND; i++) {
+    for (int i = 0; i < OBJECTS_OF_A_TYPE; i++) {
         RandomShape shape = random_shape(form, &random);
         set_print(form->name, true);
         object_print(&shape.object);

@@ -138,7 +138,7 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
     double scale = u * (tier->of_size ? shape->radius : distance);
     // flat shapes have no compensated edges; a triangle's are undecided below 16 u of edge and distance
-    double flat = shape->object.kind == SHAPE_TRIANGLE ? 16 : 4;
+    double flat = shape->object.type == SHAPE_TRIANGLE ? 16 : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
 
     tally->compared++;
@@ -239,10 +239,10 @@ typedef struct {
 } LadderShape;
 
 // Makes a shape of the first form.
-static LadderShape shape_make(ShapeKind kind)
+static LadderShape shape_make(ShapeType type)
 {
-    LadderShape shape = {.name = shape_names[kind]};
-    const ShapeForm form = {.kind = kind};
+    LadderShape shape = {.name = shape_names[type]};
+    const ShapeForm form = {.type = type};
     Random random = {1};
     for (int i = 0; i < INSTANCES; i++)
         shape.instances[i] = random_shape(&form, &random);
@@ -250,9 +250,9 @@ static LadderShape shape_make(ShapeKind kind)
 }
 
 // Ovals are made of other shapes (tests/test_ovals.c).
-static bool is_measured(ShapeKind kind, const LadderOptions *options)
+static bool is_measured(ShapeType type, const LadderOptions *options)
 {
-    return kind != SHAPE_OVAL && (!options->shape || strcmp(options->shape, shape_names[kind]) == 0);
+    return type != SHAPE_OVAL && (!options->shape || strcmp(options->shape, shape_names[type]) == 0);
 }
 
 static void shape_close(LadderShape *shape)
@@ -393,8 +393,8 @@ int main(int argument_count, char **arguments)
     json_text(json, "device", device->name);
     json_begin_array(json, "rungs");
     for (int i = 0; options.ray_count > 0 && i < SHAPE_MESH; i++) {
-        if (!is_measured((ShapeKind)i, &options)) continue;
-        LadderShape shape = shape_make((ShapeKind)i);
+        if (!is_measured((ShapeType)i, &options)) continue;
+        LadderShape shape = shape_make((ShapeType)i);
         for (int rung = 0; rung < RUNG_COUNT; rung++)
             for (int is_double = 0; is_double < 2; is_double++)
                 within_bounds &= rung_run(&compute, &shape, rung, is_double, &options, json);
@@ -403,8 +403,8 @@ int main(int argument_count, char **arguments)
     json_end(json);
     json_begin_array(json, "tests");
     for (int i = 0; options.time && i < SHAPE_MESH; i++) {
-        if (!is_measured((ShapeKind)i, &options)) continue;
-        LadderShape shape = shape_make((ShapeKind)i);
+        if (!is_measured((ShapeType)i, &options)) continue;
+        LadderShape shape = shape_make((ShapeType)i);
         for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
             if (!(options.precisions >> precision & 1)) continue;
             json_begin_object(json, NULL);

@@ -18,7 +18,7 @@ static void box_flatten(Flattening *flattening, const Object *object)
 {
     const Box box = {.low = scalar4_of(point_from_eye(&flattening->rounding, object->as.box.min), 0),
                      .high = scalar4_of(point_from_eye(&flattening->rounding, object->as.box.max), 0)};
-    primitive_add(flattening, KIND_BOXES, &box, object->material);
+    primitive_add(flattening, TYPE_BOXES, &box, object->material);
 }
 
 static bool box_primitive_bounds(const void *primitive, Bounds *bounds)
@@ -40,7 +40,7 @@ static void box_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps box_ops = {
-    .kind = KIND_BOXES,
+    .type = TYPE_BOXES,
     .vectors = {offsetof(Object, as.box.min), offsetof(Object, as.box.max)},
     .restore = box_restore,
     .bounds = box_bounds,

@@ -38,7 +38,7 @@ static void disc_flatten(Flattening *flattening, const Object *object)
                  .normal = normal_and_inverse_length(&flattening->rounding, normal)};
     disc_take_power(&disc, flattening, object);
     surface_grid(flattening, object->material, normal, &disc.grid_u, &disc.grid_v);
-    primitive_add(flattening, KIND_DISCS, &disc, object->material);
+    primitive_add(flattening, TYPE_DISCS, &disc, object->material);
 }
 
 static BoundingSphere disc_bounding_sphere(const void *primitive)
@@ -71,7 +71,7 @@ static void disc_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps disc_ops = {
-    .kind = KIND_DISCS,
+    .type = TYPE_DISCS,
     .vectors = {offsetof(Object, as.disc.center), offsetof(Object, as.disc.normal)},
     .lengths = {offsetof(Object, as.disc.radius)},
     .bounds = disc_bounds,

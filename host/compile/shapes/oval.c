@@ -74,7 +74,7 @@ static void oval_flatten(Flattening *flattening, const Object *object)
     } else if (object->as.oval.unit == SHAPE_PARABOLOID) {
         oval.sizes.y = unit * (object->as.oval.finite ? 0.5 / half_height : object->as.oval.rise);
     }
-    primitive_add(flattening, KIND_OVALS, &oval, object->material);
+    primitive_add(flattening, TYPE_OVALS, &oval, object->material);
 }
 
 static bool oval_primitive_bounds(const void *primitive, Bounds *bounds)
@@ -94,7 +94,7 @@ static double oval_largest_coordinate(const void *primitive)
 
 // Not among the random shapes: tests/test_ovals.c transforms those.
 const ShapeOps oval_ops = {
-    .kind = KIND_OVALS,
+    .type = TYPE_OVALS,
     .vectors = {offsetof(Object, as.oval.center), offsetof(Object, as.oval.axes[0]),
                 offsetof(Object, as.oval.axes[1]), offsetof(Object, as.oval.axes[2])},
     .bounds = oval_bounds,

@@ -73,7 +73,7 @@ static void paraboloid_flatten(Flattening *flattening, const Object *object)
                 (finite && object->as.paraboloid.caps ? REVOLUTION_CAPPED : 0u),
     };
     paraboloid_take_power(&paraboloid, flattening, object);
-    primitive_add(flattening, KIND_PARABOLOIDS, &paraboloid, object->material);
+    primitive_add(flattening, TYPE_PARABOLOIDS, &paraboloid, object->material);
 }
 
 // How far the shape reaches from its apex in a direction with the part `along` the unit axis and `across` it:
@@ -143,7 +143,7 @@ static void paraboloid_randomize(RandomShape *made, unsigned form, Random *rando
 }
 
 const ShapeOps paraboloid_ops = {
-    .kind = KIND_PARABOLOIDS,
+    .type = TYPE_PARABOLOIDS,
     .vectors = {offsetof(Object, as.paraboloid.apex), offsetof(Object, as.paraboloid.axis)},
     .lengths = {offsetof(Object, as.paraboloid.focal_length), offsetof(Object, as.paraboloid.height)},
     .bounds = paraboloid_bounds,

@@ -14,7 +14,7 @@ static void plane_flatten(Flattening *flattening, const Object *object)
     Plane plane = {.point = scalar4_of(point, 0),
                    .normal = normal_and_inverse_length(&flattening->rounding, normal)};
     surface_grid(flattening, object->material, normal, &plane.grid_u, &plane.grid_v);
-    primitive_add(flattening, KIND_PLANES, &plane, object->material);
+    primitive_add(flattening, TYPE_PLANES, &plane, object->material);
 }
 
 static void plane_plane(const void *primitive, Vector3 *point, Vector3 *normal)
@@ -38,7 +38,7 @@ static void plane_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps plane_ops = {
-    .kind = KIND_PLANES,
+    .type = TYPE_PLANES,
     .vectors = {offsetof(Object, as.plane.point), offsetof(Object, as.plane.normal)},
     .bounds = plane_bounds,
     .flatten = plane_flatten,

@@ -142,12 +142,12 @@ static void revolution_take_power(Revolution *shape, Flattening *flattening, con
                              (double)squared, given->finite ? (double)(exact.low * length) : 0};
 }
 
-static void revolution_flatten(Flattening *flattening, int kind, const Object *object,
+static void revolution_flatten(Flattening *flattening, int type, const Object *object,
                                const RevolutionGiven *given)
 {
     Revolution shape = revolution_rounded(&flattening->rounding, given);
     revolution_take_power(&shape, flattening, given);
-    primitive_add(flattening, kind, &shape, object->material);
+    primitive_add(flattening, type, &shape, object->material);
 }
 
 static void cylinder_flatten(Flattening *flattening, const Object *object)
@@ -160,7 +160,7 @@ static void cylinder_flatten(Flattening *flattening, const Object *object)
                                    .finite = object->as.cylinder.finite,
                                    .caps = object->as.cylinder.caps,
                                    .only_inside = object->as.cylinder.only_inside};
-    revolution_flatten(flattening, KIND_CYLINDERS, object, &given);
+    revolution_flatten(flattening, TYPE_CYLINDERS, object, &given);
 }
 
 static void cone_flatten(Flattening *flattening, const Object *object)
@@ -174,7 +174,7 @@ static void cone_flatten(Flattening *flattening, const Object *object)
                                    .finite = finite,
                                    .caps = object->as.cone.caps,
                                    .only_inside = object->as.cone.only_inside};
-    revolution_flatten(flattening, KIND_CONES, object, &given);
+    revolution_flatten(flattening, TYPE_CONES, object, &given);
 }
 
 // Sides without caps reach as far as the discs that end them.
@@ -250,7 +250,7 @@ static void cylinder_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps cylinder_ops = {
-    .kind = KIND_CYLINDERS,
+    .type = TYPE_CYLINDERS,
     .vectors = {offsetof(Object, as.cylinder.from), offsetof(Object, as.cylinder.axis)},
     .lengths = {offsetof(Object, as.cylinder.radius)},
     .bounds = cylinder_bounds,
@@ -282,7 +282,7 @@ static void cone_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps cone_ops = {
-    .kind = KIND_CONES,
+    .type = TYPE_CONES,
     .vectors = {offsetof(Object, as.cone.from), offsetof(Object, as.cone.axis)},
     .lengths = {offsetof(Object, as.cone.radius[0]), offsetof(Object, as.cone.radius[1])},
     .bounds = cone_bounds,

@@ -51,7 +51,7 @@ static void sphere_flatten(Flattening *flattening, const Object *object)
     Sphere sphere = {.center_radius = scalar4_of(center, object->as.sphere.radius),
                      .id.y = object->as.sphere.only_inside ? IGNORES_FRONT_FACES : 0u};
     sphere_take_power(&sphere, flattening, object, center);
-    primitive_add(flattening, KIND_SPHERES, &sphere, object->material);
+    primitive_add(flattening, TYPE_SPHERES, &sphere, object->material);
 }
 
 static BoundingSphere sphere_bounding_sphere(const void *primitive)
@@ -75,7 +75,7 @@ static void sphere_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps sphere_ops = {
-    .kind = KIND_SPHERES,
+    .type = TYPE_SPHERES,
     .vectors = {offsetof(Object, as.sphere.center)},
     .lengths = {offsetof(Object, as.sphere.radius)},
     .bounds = sphere_bounds,

@@ -63,7 +63,7 @@ static void torus_flatten(Flattening *flattening, const Object *object)
         .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
     };
     torus_take_power(&torus, flattening, object);
-    primitive_add(flattening, KIND_TORI, &torus, object->material);
+    primitive_add(flattening, TYPE_TORI, &torus, object->material);
 }
 
 static bool torus_primitive_bounds(const void *primitive, Bounds *bounds)
@@ -102,7 +102,7 @@ static void torus_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps torus_ops = {
-    .kind = KIND_TORI,
+    .type = TYPE_TORI,
     .vectors = {offsetof(Object, as.torus.center), offsetof(Object, as.torus.axis)},
     .lengths = {offsetof(Object, as.torus.major), offsetof(Object, as.torus.minor)},
     .bounds = torus_bounds,

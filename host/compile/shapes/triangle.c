@@ -178,7 +178,7 @@ static void triangle_flatten(Flattening *flattening, const Object *object)
     else if (object->as.triangle.smooth)
         triangle.id.y = normals_add(flattening, vertices, vector_normalize(normals[0]),
                                     vector_normalize(normals[1]), vector_normalize(normals[2]));
-    primitive_add(flattening, KIND_TRIANGLES, &triangle, object->material);
+    primitive_add(flattening, TYPE_TRIANGLES, &triangle, object->material);
 }
 
 // Corners of the triangle in the order of mesh_triangle_at.
@@ -207,7 +207,7 @@ static void mesh_flatten(Flattening *flattening, const Object *object)
         corners_ordered(mesh, object, flattening->part, corners);
         triangle.id.z = uvs_add(flattening, mesh, &placed, corners, material);
     }
-    primitive_add(flattening, KIND_TRIANGLES, &triangle, material);
+    primitive_add(flattening, TYPE_TRIANGLES, &triangle, material);
 }
 
 static bool triangle_bounds(const Scene *scene, const Object *object, Bounds *bounds)
@@ -260,7 +260,7 @@ static void triangle_randomize(RandomShape *made, unsigned form, Random *random)
 }
 
 const ShapeOps triangle_ops = {
-    .kind = KIND_TRIANGLES,
+    .type = TYPE_TRIANGLES,
     .vectors = {offsetof(Object, as.triangle.vertices[0]), offsetof(Object, as.triangle.vertices[1]),
                 offsetof(Object, as.triangle.vertices[2]), offsetof(Object, as.triangle.normals[0]),
                 offsetof(Object, as.triangle.normals[1]), offsetof(Object, as.triangle.normals[2])},
@@ -272,7 +272,7 @@ const ShapeOps triangle_ops = {
 };
 
 const ShapeOps mesh_ops = {
-    .kind = KIND_TRIANGLES,
+    .type = TYPE_TRIANGLES,
     .bounds = mesh_bounds,
     .flatten = mesh_flatten,
     .primitive_bounds = instance_primitive_bounds,

@@ -326,7 +326,7 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
         const double outer = fmin(fmax(light->mAngleOuterCone, 1e-3), M_PI) * (90 / M_PI),
                      inner = fmin(fmax(light->mAngleInnerCone, 0) * (90 / M_PI), outer);
         const Light added = {
-            .kind = is_sun    ? LIGHT_DIRECTIONAL
+            .type = is_sun    ? LIGHT_DIRECTIONAL
                     : is_spot ? LIGHT_SPOT
                               : LIGHT_POINT,
             .color = {light->mColorDiffuse.r, light->mColorDiffuse.g, light->mColorDiffuse.b},

@@ -227,7 +227,7 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
         // a white surface reflects 1 / pi of the illuminance
         const double part = fmax(intensity, 0) / M_PI;
         const Light added = {
-            .kind = is_sun    ? LIGHT_DIRECTIONAL
+            .type = is_sun    ? LIGHT_DIRECTIONAL
                     : is_spot ? LIGHT_SPOT
                               : LIGHT_POINT,
             .color = {fmax(color[0], 0) * part, fmax(color[1], 0) * part, fmax(color[2], 0) * part},

@@ -64,27 +64,27 @@ static void lights_around(Scene *scene)
     const Vector3 key = vector_add(vector_add(forward, vector_scale(right, 0.6)), vector_scale(up, -0.8)),
                   fill = vector_add(vector_add(forward, vector_scale(right, -0.9)), vector_scale(up, -0.1));
     array_push(scene->lights,
-               ((Light){.kind = LIGHT_DIRECTIONAL, .color = {0.75, 0.75, 0.75}, .direction = key}));
+               ((Light){.type = LIGHT_DIRECTIONAL, .color = {0.75, 0.75, 0.75}, .direction = key}));
     array_push(scene->lights,
-               ((Light){.kind = LIGHT_DIRECTIONAL, .color = {0.25, 0.25, 0.25}, .direction = fill}));
+               ((Light){.type = LIGHT_DIRECTIONAL, .color = {0.25, 0.25, 0.25}, .direction = fill}));
 }
 
 static bool light_is_sound(const Light *light)
 {
     const bool has_cone = light->half_angle > 0 && light->half_angle < 180 && light->penumbra >= 0 &&
                           light->penumbra <= light->half_angle;
-    return light->kind <= LIGHT_SPOT && vector_is_within(light->position, NUMBER_MAX) &&
+    return light->type <= LIGHT_SPOT && vector_is_within(light->position, NUMBER_MAX) &&
            vector_is_within(light->direction, NUMBER_MAX) && vector_is_within(light->color, NUMBER_MAX) &&
            vector_is_zero(vector_min(light->color, vector_all(0))) &&
-           (light->kind == LIGHT_POINT || !vector_is_zero(light->direction)) &&
-           (light->kind != LIGHT_SPOT || has_cone);
+           (light->type == LIGHT_POINT || !vector_is_zero(light->direction)) &&
+           (light->type != LIGHT_SPOT || has_cone);
 }
 
 // Clears a fading that is negative, out of range or zero.
 static void fading_check(Light *light)
 {
     double sum = 0;
-    bool is_sound = light->kind != LIGHT_DIRECTIONAL;
+    bool is_sound = light->type != LIGHT_DIRECTIONAL;
     for (int i = 0; i < 3; i++) {
         sum += light->fading[i];
         is_sound = is_sound && light->fading[i] >= 0 && light->fading[i] <= NUMBER_MAX;
@@ -114,7 +114,7 @@ static void lights_add(Scene *scene, const MeshView *view, Report *report)
         fading_check(&light);
         if (!light_is_sound(&light)) continue;
         array_push(scene->lights, light);
-        sum += light_arriving(&light, center, light.kind == LIGHT_DIRECTIONAL ? 0 : radius);
+        sum += light_arriving(&light, center, light.type == LIGHT_DIRECTIONAL ? 0 : radius);
     }
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
     report_warning(
@@ -151,7 +151,7 @@ void scene_of_mesh(Scene *scene, Mesh *mesh)
     *scene = (Scene){.background = vector_all(gray)};
     array_push(scene->meshes, *mesh);
     *mesh = (Mesh){0};
-    scene_add_object(scene, (Object){.kind = SHAPE_MESH}, &material);
+    scene_add_object(scene, (Object){.type = SHAPE_MESH}, &material);
     const Mesh *own = &scene->meshes.items[0];
     scene->camera = camera_around(own, mesh_center(own), (Vector3){0, 1, 0});
     lights_around(scene);
@@ -169,7 +169,7 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
                                .options = options,
                                .report = &report,
                                .offset = MESSAGE_WHOLE_FILE};
-    Object object = {.kind = SHAPE_MESH};
+    Object object = {.type = SHAPE_MESH};
     *scene = (Scene){0};
     if (mesh_import(scene, &import, &object.as.mesh.index)) {
         const Material material = material_default();

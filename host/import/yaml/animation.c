@@ -28,7 +28,7 @@ static const YamlNode *node_at(const YamlReader *reader, uint32_t index)
 
 static bool node_number(const YamlReader *reader, const YamlNode *node, double *value)
 {
-    if (node->kind != YAML_SCALAR) return false;
+    if (node->type != YAML_SCALAR) return false;
     const char *text = yaml_text(&reader->tree, node);
     return number_read(text, strlen(text), value) == NUMBER_READ;
 }
@@ -37,11 +37,11 @@ static bool node_number(const YamlReader *reader, const YamlNode *node, double *
 bool yaml_has_keys(const YamlReader *reader, const YamlNode *node)
 {
     const YamlTree *tree = &reader->tree;
-    if (node->kind != YAML_MAPPING) return false;
+    if (node->type != YAML_MAPPING) return false;
     for (const YamlNode *key = yaml_first(tree, node); key; key = yaml_next(tree, yaml_next(tree, key))) {
-        if (key->kind != YAML_SCALAR || strcmp(yaml_text(tree, key), "keys") != 0) continue;
+        if (key->type != YAML_SCALAR || strcmp(yaml_text(tree, key), "keys") != 0) continue;
         const YamlNode *frames = yaml_next(tree, key);
-        const YamlNode *first = frames->kind == YAML_MAPPING ? yaml_first(tree, frames) : NULL;
+        const YamlNode *first = frames->type == YAML_MAPPING ? yaml_first(tree, frames) : NULL;
         double frame;
         return first && node_number(reader, first, &frame);
     }
@@ -54,7 +54,7 @@ static bool values_match(YamlReader *reader, const YamlNode *a, const YamlNode *
     const YamlTree *tree = &reader->tree;
     double number;
     bool match = node_number(reader, a, &number) && node_number(reader, b, &number);
-    if (a->kind == YAML_SEQUENCE && b->kind == YAML_SEQUENCE) {
+    if (a->type == YAML_SEQUENCE && b->type == YAML_SEQUENCE) {
         match = a->child_count == b->child_count && a->child_count <= NUMBERS_MAX;
         for (a = yaml_first(tree, a); a && match; a = yaml_next(tree, a))
             match = node_number(reader, a, &number);
@@ -100,7 +100,7 @@ static bool read_ease(YamlReader *reader, const Field *field, const YamlNode *no
 {
     size_t i = 0;
     while (i < EASE_COUNT &&
-           (node->kind != YAML_SCALAR || strcmp(yaml_text(&reader->tree, node), ease_names[i]) != 0))
+           (node->type != YAML_SCALAR || strcmp(yaml_text(&reader->tree, node), ease_names[i]) != 0))
         i++;
     if (i == EASE_COUNT) return expected_report(reader, field->name, "linear, smooth or step", node);
     *(Ease *)target = (Ease)i;
@@ -126,7 +126,7 @@ static uint32_t number_between(YamlReader *reader, const YamlNode *a, const Yaml
 // Adds the value between two and returns its index.
 static uint32_t value_between(YamlReader *reader, uint32_t a, uint32_t b, double part)
 {
-    if (node_at(reader, a)->kind == YAML_SCALAR)
+    if (node_at(reader, a)->type == YAML_SCALAR)
         return number_between(reader, node_at(reader, a), node_at(reader, b), part);
     YamlTree *tree = &reader->tree;
     const YamlNode list = *node_at(reader, a);
@@ -184,13 +184,13 @@ static bool node_animate(YamlReader *reader, uint32_t index, uint8_t *visited)
 {
     if (yaml_has_keys(reader, node_at(reader, index))) return value_animate(reader, index);
     bool all_read = true;
-    const uint32_t first = node_at(reader, index)->kind == YAML_SCALAR ? 0 : node_at(reader, index)->first;
+    const uint32_t first = node_at(reader, index)->type == YAML_SCALAR ? 0 : node_at(reader, index)->first;
     if (first > 0 && visited) {
         if (visited[first / 8] >> first % 8 & 1) return true;
         visited[first / 8] |= (uint8_t)(1 << first % 8);
     }
     for (uint32_t child = first; child > 0; child = node_at(reader, child)->next)
-        if (node_at(reader, child)->kind != YAML_SCALAR) all_read &= node_animate(reader, child, visited);
+        if (node_at(reader, child)->type != YAML_SCALAR) all_read &= node_animate(reader, child, visited);
     return all_read;
 }
 

@@ -18,7 +18,7 @@ static bool read_date(YamlReader *reader, const Field *field, const YamlNode *no
 {
     static const int lengths[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
     static const char form[] = "0000-00-00";
-    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
     int parts[3] = {0}, *part = parts; // year, month and day
     bool fits = strlen(text) == strlen(form);
     for (size_t i = 0; fits && form[i]; i++) {
@@ -87,7 +87,7 @@ bool read_background(YamlReader *reader, const Field *field, const YamlNode *nod
         {"light", read_boolean, offsetof(Background, is_light), FORM_ANY, OPTIONAL, NULL},
     };
     Background *background = target;
-    if (node->kind != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
+    if (node->type != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
     background->up = (Vector3){0, 1, 0};
     background->nadir = vector_all(NAN);
     background->intensity = 1;
@@ -113,7 +113,7 @@ static void sun_add(Scene *scene, const Background *background, Vector3 forward,
     const Vector3 to_sun = vector_add(vector_scale(forward, portable_cosine(elevation)),
                                       vector_scale(up, portable_sine(elevation)));
     const Color color = sun_color(background->sun.position.elevation, background->turbidity);
-    Light light = {.kind = LIGHT_DIRECTIONAL,
+    Light light = {.type = LIGHT_DIRECTIONAL,
                    .color = vector_scale(color, background->intensity),
                    .direction = vector_scale(to_sun, -1)};
     light_set_angle(&light, background->sun.angle);

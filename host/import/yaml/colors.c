@@ -73,7 +73,7 @@ bool is_color_text(const char *text)
 static bool not_a_color_report(YamlReader *reader, const Field *field, const YamlNode *node)
 {
     const char *expected = "a color, such as [1, 0.2, 0], 0.5, '#ff8000' or red", *names[NAMED_COUNT];
-    if (node->kind != YAML_SCALAR) return expected_report(reader, field->name, expected, node);
+    if (node->type != YAML_SCALAR) return expected_report(reader, field->name, expected, node);
     const char *text = yaml_text(&reader->tree, node);
     for (size_t i = 0; i < NAMED_COUNT; i++)
         names[i] = named_colors[i].name;
@@ -100,11 +100,11 @@ static bool color_is_linear(YamlReader *reader, const Field *field, const YamlNo
 {
     const double values[] = {color->x, color->y, color->z};
     double largest = 0;
-    const YamlNode *item = node->kind == YAML_SCALAR ? node : yaml_first(&reader->tree, node);
+    const YamlNode *item = node->type == YAML_SCALAR ? node : yaml_first(&reader->tree, node);
     for (size_t i = 0; i < 3; i++) {
         if (!is_display_value(yaml_text(&reader->tree, item), values[i])) return true;
         if (values[i] > largest) largest = values[i];
-        if (node->kind != YAML_SCALAR) item = yaml_next(&reader->tree, item);
+        if (node->type != YAML_SCALAR) item = yaml_next(&reader->tree, item);
     }
     if (largest <= most) return true;
     const uint32_t rgb = (uint32_t)values[0] << 16 | (uint32_t)values[1] << 8 | (uint32_t)values[2];
@@ -120,10 +120,10 @@ static bool color_read(YamlReader *reader, const Field *field, const YamlNode *n
 {
     Field channels = *field;
     channels.range = &range_not_negative;
-    if (node->kind == YAML_SEQUENCE)
+    if (node->type == YAML_SEQUENCE)
         return read_vector(reader, &channels, node, color) &&
                color_is_linear(reader, field, node, most, color);
-    if (node->kind == YAML_MAPPING) return not_a_color_report(reader, field, node);
+    if (node->type == YAML_MAPPING) return not_a_color_report(reader, field, node);
     const char *text = yaml_text(&reader->tree, node);
     uint32_t rgb;
     if (srgb_read(text, &rgb)) {

@@ -15,9 +15,9 @@ enum {
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node)
 {
     char found[WORD_SHOWN + sizeof "''"];
-    if (node->kind == YAML_MAPPING)
+    if (node->type == YAML_MAPPING)
         snprintf(found, sizeof found, "a mapping");
-    else if (node->kind == YAML_SEQUENCE)
+    else if (node->type == YAML_SEQUENCE)
         snprintf(found, sizeof found, "a list of %u", node->child_count);
     else if (yaml_text(&reader->tree, node)[0] == '\0')
         snprintf(found, sizeof found, "nothing");
@@ -55,27 +55,27 @@ void choices_describe(Text *text, const char *word, const char *const *known, si
         text_appendf(text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, known[i]);
 }
 
-void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
+void unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
                     size_t known_count)
 {
     const char *word = yaml_text(&reader->tree, node);
     Text choices = {0};
     choices_describe(&choices, word, known, known_count);
-    report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", kind, WORD_SHOWN, word,
+    report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", type, WORD_SHOWN, word,
                  text_c(&choices));
     text_free(&choices);
 }
 
-void twice_report(YamlReader *reader, const char *kind, const char *name, size_t offset, size_t before)
+void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before)
 {
     const Source *source = reader->report.source;
     size_t in_file = offset, before_in_file = before;
     if (source_at(source, &in_file) == source_at(source, &before_in_file)) {
-        report_error(&reader->report, offset, "%s '%.*s' is given twice", kind, WORD_SHOWN, name);
+        report_error(&reader->report, offset, "%s '%.*s' is given twice", type, WORD_SHOWN, name);
         return;
     }
     char *place = message_place_text(source, before);
-    report_error(&reader->report, offset, "%s '%.*s' is already given at %s", kind, WORD_SHOWN, name, place);
+    report_error(&reader->report, offset, "%s '%.*s' is already given at %s", type, WORD_SHOWN, name, place);
     free(place);
 }
 
@@ -85,14 +85,14 @@ static void unknown_field_report(YamlReader *reader, const YamlNode *key, const 
     const char *known[FIELDS_MAX] = {NULL};
     for (size_t i = 0; i < field_count; i++)
         known[i] = fields[i].name;
-    char kind[64];
-    snprintf(kind, sizeof kind, "%s key", what);
-    unknown_report(reader, key, kind, known, field_count);
+    char type[64];
+    snprintf(type, sizeof type, "%s key", what);
+    unknown_report(reader, key, type, known, field_count);
 }
 
 bool key_is_word(YamlReader *reader, const YamlNode *key)
 {
-    if (key->kind == YAML_SCALAR) return true;
+    if (key->type == YAML_SCALAR) return true;
     return report_error(&reader->report, key->offset, "a key must be a word");
 }
 
@@ -124,7 +124,7 @@ static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *fi
 bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target, Form *form)
 {
-    if (mapping->kind != YAML_MAPPING) return expected_report(reader, what, "a mapping", mapping);
+    if (mapping->type != YAML_MAPPING) return expected_report(reader, what, "a mapping", mapping);
     size_t errors_before = reader->report.error_count;
     bool seen[FIELDS_MAX] = {false};
     unsigned forms = FORM_ANY;
@@ -157,12 +157,12 @@ bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
 
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name)
 {
-    if (mapping->kind != YAML_MAPPING) return mapping;
+    if (mapping->type != YAML_MAPPING) return mapping;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, mapping); key;
          key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
-        if (key->kind == YAML_SCALAR && !strcmp(yaml_text(&reader->tree, key), name)) return value;
+        if (key->type == YAML_SCALAR && !strcmp(yaml_text(&reader->tree, key), name)) return value;
     }
     return mapping;
 }
@@ -170,7 +170,7 @@ const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, co
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value)
 {
-    if (node->kind != YAML_MAPPING || node->child_count != 2)
+    if (node->type != YAML_MAPPING || node->child_count != 2)
         return report_error(&reader->report, node->offset, "expected %s", expected);
     *key = yaml_first(&reader->tree, node);
     *value = yaml_next(&reader->tree, *key);
@@ -186,7 +186,7 @@ bool read_node(YamlReader *reader, const Field *field, const YamlNode *node, voi
 
 bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    if (node->kind != YAML_SCALAR) return expected_report(reader, field->name, "a number", node);
+    if (node->type != YAML_SCALAR) return expected_report(reader, field->name, "a number", node);
     const char *text = yaml_text(&reader->tree, node);
     return number_read_field(&reader->report, node->offset, field->name, text, strlen(text), field->range,
                              target);
@@ -195,7 +195,7 @@ bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, v
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target)
 {
-    if (node->kind != YAML_SEQUENCE || node->child_count != count)
+    if (node->type != YAML_SEQUENCE || node->child_count != count)
         return expected_report(reader, field->name, what, node);
     bool all_read = true;
     char *place = target;
@@ -231,7 +231,7 @@ bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node
 
 bool read_boolean(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
     bool is_true = !strcmp(text, "true");
     if (!is_true && strcmp(text, "false") != 0)
         return expected_report(reader, field->name, "true or false", node);

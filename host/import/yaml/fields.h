@@ -96,14 +96,14 @@ bool is_color_text(const char *text);
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target);
 
-// Reports at an offset that the name of a `kind`, such as a material, was given before, and in which file.
-void twice_report(YamlReader *reader, const char *kind, const char *name, size_t offset, size_t before);
+// Reports at an offset that the name of a `type`, such as a material, was given before, and in which file.
+void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before);
 // Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
 // Appends the known word that `word` may stand for, if there is one, and the known words unless they are
 // many.
 void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count);
-// Reports `unknown kind 'word'`, with a suggestion if a known word is similar or means the same, and with the
+// Reports `unknown type 'word'`, with a suggestion if a known word is similar or means the same, and with the
 // known words unless they are many.
-void unknown_report(YamlReader *reader, const YamlNode *node, const char *kind, const char *const *known,
+void unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
                     size_t known_count);

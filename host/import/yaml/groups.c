@@ -31,10 +31,10 @@ static bool pattern_ignores_transform(const Scene *scene, const Object *object, 
     const Material *material = &scene->materials.items[object->material];
     const double(*m)[4] = affine->rows;
     if (material->checker) return true;
-    if (material_any_texture(material) == 0 || object->kind == SHAPE_MESH) return false;
+    if (material_any_texture(material) == 0 || object->type == SHAPE_MESH) return false;
     const bool turns = m[0][1] != 0 || m[0][2] != 0 || m[1][0] != 0 || m[1][2] != 0 || m[2][0] != 0 ||
                        m[2][1] != 0 || m[0][0] < 0 || m[1][1] < 0 || m[2][2] < 0;
-    return object->kind != SHAPE_SPHERE || turns;
+    return object->type != SHAPE_SPHERE || turns;
 }
 
 void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine, const YamlNode *transform)
@@ -42,7 +42,7 @@ void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affi
     Scene *scene = reader->scene;
     for (size_t i = first; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
-        const ShapeKind kind = object_shape(object);
+        const ShapeType type = object_shape(object);
         if (!reader->warned_of_pattern && pattern_ignores_transform(scene, object, affine)) {
             report_warning(&reader->report, transform->offset,
                            "checkers and images other than those of meshes do not move with their objects");
@@ -50,7 +50,7 @@ void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affi
         }
         const char *why = object_transform(scene, object, affine);
         if (!why) continue;
-        report_error(&reader->report, transform->offset, "under this transform a %s %s", shape_names[kind],
+        report_error(&reader->report, transform->offset, "under this transform a %s %s", shape_names[type],
                      why);
         return;
     }
@@ -88,7 +88,7 @@ static Definition definition_move(YamlReader *reader, const YamlNode *key, size_
     for (size_t i = 0; i < definition.object_count; i++) {
         Object *object = &definition.objects[i];
         *object = scene->objects.items[first_object + i];
-        if (object->kind != SHAPE_MESH || object->as.mesh.is_instance) continue;
+        if (object->type != SHAPE_MESH || object->as.mesh.is_instance) continue;
         mesh_bound(&scene->meshes.items[object->as.mesh.index]);
         object->as.mesh.is_instance = true;
         object->as.mesh.transform = affine_identity;
@@ -109,14 +109,14 @@ static size_t definition_cost(const Definition *definition)
 {
     size_t cost = 1;
     for (size_t i = 0; i < definition->object_count; i++)
-        cost += definition->objects[i].kind == SHAPE_BOX ? 4 : 1;
+        cost += definition->objects[i].type == SHAPE_BOX ? 4 : 1;
     return cost;
 }
 
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 {
     static const Field fields[] = {{"objects", read_node, 0, FORM_ANY, REQUIRED, NULL}};
-    if (node->kind != YAML_MAPPING) {
+    if (node->type != YAML_MAPPING) {
         expected_report(reader, "define", "a mapping", node);
         return;
     }
@@ -151,7 +151,7 @@ static void unused_meshes_free(Scene *scene)
 {
     bool *is_used = memory_allocate_zeroed(scene->meshes.count + 1, sizeof *is_used);
     for (size_t i = 0; i < scene->objects.count; i++)
-        if (scene->objects.items[i].kind == SHAPE_MESH) is_used[scene->objects.items[i].as.mesh.index] = true;
+        if (scene->objects.items[i].type == SHAPE_MESH) is_used[scene->objects.items[i].as.mesh.index] = true;
     for (size_t i = 0; i < scene->meshes.count; i++)
         if (!is_used[i]) mesh_free(&scene->meshes.items[i]);
     free(is_used);
@@ -168,7 +168,7 @@ void yaml_definitions_free(YamlReader *reader)
 // Returns NULL after an error if nothing before the node defines the name.
 static const Definition *definition_named(YamlReader *reader, const YamlNode *node)
 {
-    if (node->kind != YAML_SCALAR) {
+    if (node->type != YAML_SCALAR) {
         expected_report(reader, "of", "a name of 'define'", node);
         return NULL;
     }
@@ -205,7 +205,7 @@ void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)
     for (size_t i = 0; i < definition->object_count; i++) {
         Object object = definition->objects[i];
         if (own_material) object.material = instance.material;
-        if (object.kind == SHAPE_MESH) object.as.mesh.has_own_material |= own_material;
+        if (object.type == SHAPE_MESH) object.as.mesh.has_own_material |= own_material;
         if (!yaml_material_fits(reader, &object, field_node(reader, mapping, "material"))) return;
         array_push(scene->objects, object);
     }

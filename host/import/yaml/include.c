@@ -33,7 +33,7 @@ enum { SECTION_COUNT = 9 };
 static const struct {
     const char *name;
     bool is_joined;
-    YamlKind kind;
+    YamlType type;
     const char *must; // be
 } sections[SECTION_COUNT] = {
     {"camera", false, YAML_MAPPING, NULL},       {"background", false, YAML_MAPPING, NULL},
@@ -59,7 +59,7 @@ static YamlNode *node_at(const Includes *includes, uint32_t index)
 static size_t section_of(const Includes *includes, uint32_t key)
 {
     size_t i = 0;
-    if (node_at(includes, key)->kind != YAML_SCALAR) return SECTION_COUNT;
+    if (node_at(includes, key)->type != YAML_SCALAR) return SECTION_COUNT;
     const char *name = yaml_text(&includes->reader->tree, node_at(includes, key));
     while (i < SECTION_COUNT && strcmp(sections[i].name, name) != 0)
         i++;
@@ -120,7 +120,7 @@ static void pair_join(const Includes *includes, Joined *joined, size_t section, 
 {
     YamlReader *reader = includes->reader;
     const uint32_t value = node_at(includes, key)->next, own = joined->values[section];
-    if (sections[section].is_joined && node_at(includes, value)->kind != sections[section].kind) {
+    if (sections[section].is_joined && node_at(includes, value)->type != sections[section].type) {
         expected_report(reader, sections[section].name, sections[section].must, node_at(includes, value));
     } else if (own == 0) {
         joined->values[section] = value;
@@ -129,7 +129,7 @@ static void pair_join(const Includes *includes, Joined *joined, size_t section, 
             joined->joined[section] = last_child(includes, value);
         }
         pair_append(includes, joined, key);
-    } else if (sections[section].is_joined && node_at(includes, own)->kind == sections[section].kind) {
+    } else if (sections[section].is_joined && node_at(includes, own)->type == sections[section].type) {
         children_join(includes, joined, section, value);
     }
 }
@@ -180,7 +180,7 @@ static bool text_parse(Includes *includes, Source *source, uint32_t *root)
     const bool is_read = yaml_tree_read(&reader->tree, &report, includes->base, reader->options->stage);
     includes->base += source->length + 1;
     report_include(&reader->report, &report);
-    if (!is_read || node_at(includes, *root)->kind == YAML_MAPPING) return is_read;
+    if (!is_read || node_at(includes, *root)->type == YAML_MAPPING) return is_read;
     return expected_report(reader, "scene", "a mapping", node_at(includes, *root));
 }
 
@@ -213,7 +213,7 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
 {
     YamlReader *reader = includes->reader;
     const char *name = "";
-    if (node->kind == YAML_SCALAR) name = yaml_text(&reader->tree, node);
+    if (node->type == YAML_SCALAR) name = yaml_text(&reader->tree, node);
     if (!scene_is_yaml(name) || strcmp(name, "-") == 0)
         return expected_report(reader, "include", "a YAML file (.yaml, .yml or .json)", node);
     char *path = yaml_read_path(reader, "include", node);
@@ -250,7 +250,7 @@ static uint32_t include_remove(const Includes *includes, uint32_t root)
     while (*link > 0) {
         const YamlNode *key = node_at(includes, *link);
         YamlNode *value = node_at(includes, key->next);
-        if (key->kind != YAML_SCALAR || strcmp(yaml_text(&reader->tree, key), "include") != 0) {
+        if (key->type != YAML_SCALAR || strcmp(yaml_text(&reader->tree, key), "include") != 0) {
             link = &value->next;
             continue;
         }
@@ -269,7 +269,7 @@ static bool includes_read(Includes *includes, uint32_t root)
 {
     const uint32_t include = include_remove(includes, root);
     if (include == 0) return true;
-    const bool is_list = node_at(includes, include)->kind == YAML_SEQUENCE;
+    const bool is_list = node_at(includes, include)->type == YAML_SEQUENCE;
     Joined joined = joined_open(includes, root);
     bool all_read = true;
     for (uint32_t file = is_list ? node_at(includes, include)->first : include; file > 0;) {
@@ -284,7 +284,7 @@ bool yaml_include(YamlReader *reader, Source *source)
 {
     struct stat status;
     Includes includes = {.reader = reader, .last = source, .base = source->length + 1};
-    if (reader->tree.nodes.items->kind != YAML_MAPPING) return true; // is reported with its keys
+    if (reader->tree.nodes.items->type != YAML_MAPPING) return true; // is reported with its keys
     if (stat(source->file, &status) == 0)
         includes.files[includes.file_count++] = (KnownFile){status.st_dev, status.st_ino, true};
     return includes_read(&includes, 0) && reader->report.error_count == 0;

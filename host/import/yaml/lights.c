@@ -23,11 +23,11 @@ static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode 
         {"quadratic", read_number, 2 * sizeof(double), FORM_ANY, OPTIONAL, &range_not_negative},
     };
     double *fading = target;
-    if (node->kind == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "inverse_square") == 0) {
+    if (node->type == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "inverse_square") == 0) {
         fading[2] = 1;
         return true;
     }
-    if (node->kind != YAML_MAPPING)
+    if (node->type != YAML_MAPPING)
         return expected_report(reader, field->name, "inverse_square or a mapping", node);
     if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), fading, NULL)) return false;
     return fading[0] + fading[1] + fading[2] > 0 ||
@@ -144,7 +144,7 @@ void light_set_angle(Light *light, double degrees)
 static void area_set(LightFields *read)
 {
     Light *light = &read->light;
-    if (light->kind == LIGHT_DIRECTIONAL) {
+    if (light->type == LIGHT_DIRECTIONAL) {
         light_set_angle(light, read->angle);
     } else if (light->area == AREA_ELLIPSE) {
         across_set(light->across, read->normal, light->radius);
@@ -165,11 +165,11 @@ static void area_set(LightFields *read)
 #define FIELDS(fields) fields, COUNT_OF(fields)
 static const struct {
     const char *name;
-    LightKind kind;
+    LightType type;
     LightArea area;
     const Field *fields;
     size_t field_count;
-} light_kinds[] = {
+} light_types[] = {
     {"point", LIGHT_POINT, AREA_NONE, FIELDS(point_fields)},
     {"directional", LIGHT_DIRECTIONAL, AREA_NONE, FIELDS(directional_fields)},
     {"spot", LIGHT_SPOT, AREA_NONE, FIELDS(spot_fields)},
@@ -183,25 +183,25 @@ static void light_read(YamlReader *reader, const YamlNode *item)
 {
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one light, such as `point: {...}`", &key, &mapping)) return;
-    const char *names[COUNT_OF(light_kinds)];
-    size_t row = COUNT_OF(light_kinds);
-    for (size_t i = 0; i < COUNT_OF(light_kinds); i++) {
-        names[i] = light_kinds[i].name;
+    const char *names[COUNT_OF(light_types)];
+    size_t row = COUNT_OF(light_types);
+    for (size_t i = 0; i < COUNT_OF(light_types); i++) {
+        names[i] = light_types[i].name;
         if (strcmp(yaml_text(&reader->tree, key), names[i]) == 0) row = i;
     }
-    if (row == COUNT_OF(light_kinds)) {
-        unknown_report(reader, key, "light", names, COUNT_OF(light_kinds));
+    if (row == COUNT_OF(light_types)) {
+        unknown_report(reader, key, "light", names, COUNT_OF(light_types));
         return;
     }
     LightFields fields = {
-        .light = {.kind = light_kinds[row].kind, .color = {1, 1, 1}, .area = light_kinds[row].area},
+        .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area = light_types[row].area},
         .intensity = 1,
     };
     Form form;
-    if (!fields_read(reader, mapping, names[row], light_kinds[row].fields, light_kinds[row].field_count,
+    if (!fields_read(reader, mapping, names[row], light_types[row].fields, light_types[row].field_count,
                      &fields, &form))
         return;
-    if (fields.light.kind == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
+    if (fields.light.type == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
     const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1]));
     if (fields.light.area == AREA_RECTANGLE && vector_length(across) < 1e-9) {
         report_error(&reader->report, field_node(reader, mapping, "edges")->offset,
@@ -222,7 +222,7 @@ static void light_read(YamlReader *reader, const YamlNode *item)
 
 void yaml_read_lights(YamlReader *reader, const YamlNode *node)
 {
-    if (node->kind != YAML_SEQUENCE) {
+    if (node->type != YAML_SEQUENCE) {
         expected_report(reader, "lights", "a list", node);
         return;
     }

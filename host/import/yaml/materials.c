@@ -66,7 +66,7 @@ typedef struct {
 static bool read_channels(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     double number;
-    if (node->kind != YAML_SCALAR) return read_vector(reader, field, node, target);
+    if (node->type != YAML_SCALAR) return read_vector(reader, field, node, target);
     if (!read_number(reader, field, node, &number)) return false;
     *(Color *)target = vector_all(number);
     return true;
@@ -95,7 +95,7 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
     };
     Material *material = target;
     Conductor index = {0};
-    if (node->kind == YAML_SCALAR) {
+    if (node->type == YAML_SCALAR) {
         const char *names[COUNT_OF(conductors)], *text = yaml_text(&reader->tree, node);
         for (size_t i = 0; i < COUNT_OF(conductors); i++) {
             names[i] = conductors[i].name;
@@ -105,7 +105,7 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
             unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
             return false;
         }
-    } else if (node->kind == YAML_SEQUENCE) {
+    } else if (node->type == YAML_SEQUENCE) {
         return expected_report(reader, field->name, "the name of a metal or a mapping of n and k", node);
     } else if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &index, NULL)) {
         return false;
@@ -128,7 +128,7 @@ static const char *node_file(const YamlReader *reader, const YamlNode *node)
 
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 {
-    if (node->kind != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
+    if (node->type != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
         expected_report(reader, name, "the name of a file", node);
         return NULL;
     }
@@ -153,10 +153,10 @@ static bool content_read(YamlReader *reader, const Field *field, const YamlNode 
         {"layer", read_node, offsetof(Names, layer), FORM_ANY, OPTIONAL, NULL},
     };
     Names names = {.file = node};
-    if (node->kind == YAML_MAPPING &&
+    if (node->type == YAML_MAPPING &&
         !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &names, NULL))
         return false;
-    if (names.layer && (names.layer->kind != YAML_SCALAR || !yaml_text(&reader->tree, names.layer)[0]))
+    if (names.layer && (names.layer->type != YAML_SCALAR || !yaml_text(&reader->tree, names.layer)[0]))
         return expected_report(reader, "layer", "the name of a layer", names.layer);
     char *path = yaml_read_path(reader, field->name, names.file);
     if (!path) return false;
@@ -185,7 +185,7 @@ static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *
                         Color *tint)
 {
     Color channels = {0, 0, 0};
-    const char *text = node->kind == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
     *tint = vector_all(0);
     if (text[0] != '\0' && strchr("+-.0123456789", text[0])) return read_number(reader, field, node, largest);
     if (!read_strength(reader, field, node, &channels)) return false;
@@ -217,7 +217,7 @@ static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *
 {
     bool has_shadow;
     if (!read_boolean(reader, field, node, &has_shadow)) return false;
-    *(ShadowKind *)target = has_shadow ? SHADOW_OF_TRANSMISSION : SHADOW_NONE;
+    *(ShadowType *)target = has_shadow ? SHADOW_OF_TRANSMISSION : SHADOW_NONE;
     return true;
 }
 
@@ -305,7 +305,7 @@ static int name_matches(const void *word, const void *name)
 
 void yaml_read_materials(YamlReader *reader, const YamlNode *node)
 {
-    if (node->kind != YAML_MAPPING) {
+    if (node->type != YAML_MAPPING) {
         expected_report(reader, "materials", "a mapping", node);
         return;
     }
@@ -347,12 +347,12 @@ static void unknown_material_report(YamlReader *reader, const YamlNode *node)
 bool read_material(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     uint32_t *index = target;
-    if (node->kind == YAML_MAPPING) {
+    if (node->type == YAML_MAPPING) {
         *index = (uint32_t)reader->scene->materials.count;
         material_append(reader, node, "");
         return true;
     }
-    if (node->kind == YAML_SEQUENCE || !yaml_text(&reader->tree, node)[0])
+    if (node->type == YAML_SEQUENCE || !yaml_text(&reader->tree, node)[0])
         return expected_report(reader, field->name, "the name of a material or a mapping", node);
     const MaterialName *name = reader->names.count
                                    ? bsearch(yaml_text(&reader->tree, node), reader->names.items,

@@ -36,7 +36,7 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
         .report = &reader->report,
         .offset = read.file->offset,
     };
-    Object object = {.kind = SHAPE_MESH, .material = read.material};
+    Object object = {.type = SHAPE_MESH, .material = read.material};
     if (mesh_import(reader->scene, &import, &object.as.mesh.index)) {
         reader->scene->meshes.items[object.as.mesh.index].path = path;
         path = NULL;

@@ -184,17 +184,17 @@ typedef struct {
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
 
-// Indexed by ShapeKind; a mesh has its own reader.
+// Indexed by ShapeType; a mesh has its own reader.
 static const Shape shapes[SHAPE_OVAL] = {
-    {{.kind = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL, true},
-    {{.kind = SHAPE_PLANE}, FIELDS(plane_fields), NULL, true},
-    {{.kind = SHAPE_DISC}, FIELDS(disc_fields), NULL, true},
-    {{.kind = SHAPE_BOX}, FIELDS(box_fields), box_finish, false},
-    {{.kind = SHAPE_CYLINDER, .as.cylinder.caps = true}, FIELDS(cylinder_fields), cylinder_finish, false},
-    {{.kind = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish, false},
-    {{.kind = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish, false},
-    {{.kind = SHAPE_TORUS}, FIELDS(torus_fields), NULL, false},
-    {{.kind = SHAPE_PARABOLOID, .as.paraboloid.caps = true},
+    {{.type = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL, true},
+    {{.type = SHAPE_PLANE}, FIELDS(plane_fields), NULL, true},
+    {{.type = SHAPE_DISC}, FIELDS(disc_fields), NULL, true},
+    {{.type = SHAPE_BOX}, FIELDS(box_fields), box_finish, false},
+    {{.type = SHAPE_CYLINDER, .as.cylinder.caps = true}, FIELDS(cylinder_fields), cylinder_finish, false},
+    {{.type = SHAPE_CONE, .as.cone.caps = true}, FIELDS(cone_fields), cone_finish, false},
+    {{.type = SHAPE_TRIANGLE}, FIELDS(triangle_fields), triangle_finish, false},
+    {{.type = SHAPE_TORUS}, FIELDS(torus_fields), NULL, false},
+    {{.type = SHAPE_PARABOLOID, .as.paraboloid.caps = true},
      FIELDS(paraboloid_fields),
      paraboloid_finish,
      false},
@@ -203,23 +203,23 @@ static const Shape shapes[SHAPE_OVAL] = {
 bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *node)
 {
     if (material_any_texture(&reader->scene->materials.items[object->material]) == 0) return true;
-    if (object->kind == SHAPE_MESH)
+    if (object->type == SHAPE_MESH)
         return reader->scene->meshes.items[object->as.mesh.index].uvs ||
                report_error(&reader->report, node->offset, "the mesh has no uv for the material's images");
-    return (object->kind != SHAPE_OVAL && shapes[object->kind].takes_texture) ||
+    return (object->type != SHAPE_OVAL && shapes[object->type].takes_texture) ||
            report_error(&reader->report, node->offset,
                         "images and normal maps lie on a sphere, plane, disc or mesh, not on a %s%s",
-                        object->kind == SHAPE_OVAL ? "stretched " : "", shape_names[object_shape(object)]);
+                        object->type == SHAPE_OVAL ? "stretched " : "", shape_names[object_shape(object)]);
 }
 
-static void shape_read(YamlReader *reader, ShapeKind kind, const YamlNode *mapping)
+static void shape_read(YamlReader *reader, ShapeType type, const YamlNode *mapping)
 {
-    const Shape *shape = &shapes[kind];
+    const Shape *shape = &shapes[type];
     PlacedObject placed = {.object = shape->start, .transform = affine_identity};
     Object *object = &placed.object;
     object->material = UINT32_MAX;
     Form form;
-    if (!fields_read(reader, mapping, shape_names[kind], shape->fields, shape->field_count, &placed, &form))
+    if (!fields_read(reader, mapping, shape_names[type], shape->fields, shape->field_count, &placed, &form))
         return;
     if (shape->finish && !shape->finish(reader, mapping, form, object)) return;
     if (object->material == UINT32_MAX) object->material = material_default_index(reader);
@@ -239,20 +239,20 @@ static void object_read(YamlReader *reader, const YamlNode *item)
         yaml_read_mesh, yaml_read_group, yaml_read_instance};
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
-    size_t kind = 0;
-    while (kind < COUNT_OF(names) && strcmp(yaml_text(&reader->tree, key), names[kind]) != 0)
-        kind++;
-    if (kind == COUNT_OF(names))
+    size_t type = 0;
+    while (type < COUNT_OF(names) && strcmp(yaml_text(&reader->tree, key), names[type]) != 0)
+        type++;
+    if (type == COUNT_OF(names))
         unknown_report(reader, key, "shape", names, COUNT_OF(names));
-    else if (kind < SHAPE_OVAL)
-        shape_read(reader, (ShapeKind)kind, mapping);
+    else if (type < SHAPE_OVAL)
+        shape_read(reader, (ShapeType)type, mapping);
     else
-        compound_readers[kind - SHAPE_OVAL](reader, mapping);
+        compound_readers[type - SHAPE_OVAL](reader, mapping);
 }
 
 void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_progress)
 {
-    if (list->kind != YAML_SEQUENCE) {
+    if (list->type != YAML_SEQUENCE) {
         expected_report(reader, "objects", "a list", list);
         return;
     }

@@ -38,7 +38,7 @@ static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
     const YamlNode node = {.offset = (uint32_t)start,
                            .end = (uint32_t)(start + strlen(text)),
                            .text = (uint32_t)texts->count,
-                           .kind = YAML_SCALAR};
+                           .type = YAML_SCALAR};
     text_append(texts, text, strlen(text) + 1);
     array_push(path->tree->nodes, node);
     return (uint32_t)(path->tree->nodes.count - 1);
@@ -51,15 +51,15 @@ static void child_append(const Path *path, uint32_t last, uint32_t child)
     node_at(path, path->node)->child_count++;
 }
 
-// Returns whether the path's node is of a kind, and reports an error if it is not.
-static bool node_is(const Path *path, YamlKind kind)
+// Returns whether the path's node is of a type, and reports an error if it is not.
+static bool node_is(const Path *path, YamlType type)
 {
     static const char *const names[] = {
         [YAML_SCALAR] = "a value", [YAML_SEQUENCE] = "a list", [YAML_MAPPING] = "a mapping"};
-    const YamlKind found = node_at(path, path->node)->kind;
-    if (found == kind) return true;
+    const YamlType found = node_at(path, path->node)->type;
+    if (found == type) return true;
     return report_error(path->report, path->parent_end, "'%.*s' is %s, not %s", PARENT(path), names[found],
-                        names[kind]);
+                        names[type]);
 }
 
 static bool path_report(const Path *path)
@@ -91,7 +91,7 @@ static bool missing_report(const Path *path, const char *name, size_t start)
     size_t known_count = 0;
     for (const YamlNode *key = yaml_first(path->tree, node_at(path, path->node));
          key && known_count < NAMES_COMPARED; key = yaml_next(path->tree, yaml_next(path->tree, key)))
-        if (key->kind == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
+        if (key->type == YAML_SCALAR) known[known_count++] = yaml_text(path->tree, key);
     Text choices = {0};
     choices_describe(&choices, name, known, known_count);
     report_error(path->report, start, "'%.*s' has no '%.*s'%s", PARENT(path), WORD_SHOWN, name,
@@ -116,7 +116,7 @@ static bool key_follow(Path *path, const char *name, size_t start)
     uint32_t last = 0, key = node_at(path, path->node)->first;
     for (; key; key = node_at(path, last)->next) {
         const YamlNode *node = node_at(path, key);
-        if (node->kind == YAML_SCALAR && strcmp(yaml_text(path->tree, node), name) == 0) break;
+        if (node->type == YAML_SCALAR && strcmp(yaml_text(path->tree, node), name) == 0) break;
         last = node->next;
     }
     if (!key) {
@@ -212,7 +212,7 @@ static void node_remove(const Path *path)
     const uint32_t next = node_at(path, path->node)->next;
     YamlNode *parent = node_at(path, path->parent);
     *(path->previous ? &node_at(path, path->previous)->next : &parent->first) = next;
-    parent->child_count -= parent->kind == YAML_MAPPING ? 2 : 1;
+    parent->child_count -= parent->type == YAML_MAPPING ? 2 : 1;
 }
 
 static bool override_apply(YamlTree *tree, Report *report, size_t base)

@@ -25,7 +25,7 @@ typedef struct {
 static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Vector3 *scale = target;
-    if (node->kind == YAML_SEQUENCE) {
+    if (node->type == YAML_SEQUENCE) {
         if (!read_vector(reader, field, node, scale)) return false;
     } else {
         if (!read_number(reader, field, node, &scale->x)) return false;
@@ -43,7 +43,7 @@ static bool read_rotation(YamlReader *reader, const Field *field, const YamlNode
         {"angle", read_number, offsetof(Rotation, angle), FORM_ANY, REQUIRED, NULL},
     };
     Rotation *rotation = target;
-    return node->kind == YAML_MAPPING
+    return node->type == YAML_MAPPING
                ? fields_read(reader, node, field->name, fields, COUNT_OF(fields), rotation, NULL)
                : read_vector(reader, field, node, &rotation->angles);
 }
@@ -101,7 +101,7 @@ static bool has_inverse(const Affine *affine)
 bool read_transform(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Affine *affine = target;
-    if (node->kind != YAML_SEQUENCE) {
+    if (node->type != YAML_SEQUENCE) {
         if (!step_read(reader, field, node, affine)) return false;
     } else {
         *affine = affine_identity;

@@ -70,7 +70,7 @@ static bool token_append_text(Text *text, struct fy_token *token)
 static bool scalar_append(TreeBuilder *builder, struct fy_token *token, YamlNode node)
 {
     Text *texts = &builder->tree->texts;
-    node.kind = YAML_SCALAR;
+    node.type = YAML_SCALAR;
     node.text = (uint32_t)texts->count;
     if (token && !token_append_text(texts, token))
         return report_error(builder->report, node.offset, "not well-formed YAML");
@@ -169,10 +169,10 @@ static bool event_take(TreeBuilder *builder, struct fy_event *event)
         return alias_append(builder, name, length, node.offset - strlen("*"));
     }
     case FYET_SEQUENCE_START:
-        node.kind = YAML_SEQUENCE;
+        node.type = YAML_SEQUENCE;
         return collection_open(builder, node);
     case FYET_MAPPING_START:
-        node.kind = YAML_MAPPING;
+        node.type = YAML_MAPPING;
         return collection_open(builder, node);
     case FYET_SEQUENCE_END:
     case FYET_MAPPING_END:
@@ -311,7 +311,7 @@ void yaml_tree_free(YamlTree *tree)
 
 const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node)
 {
-    return node->kind != YAML_SCALAR && node->first ? &tree->nodes.items[node->first] : NULL;
+    return node->type != YAML_SCALAR && node->first ? &tree->nodes.items[node->first] : NULL;
 }
 
 const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node)

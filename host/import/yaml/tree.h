@@ -6,7 +6,7 @@
 #include "host/import/report.h"
 #include <stdint.h>
 
-typedef enum { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING } YamlKind;
+typedef enum { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING } YamlType;
 
 // A scene of ten million spheres has 120 million nodes.
 typedef struct {
@@ -17,7 +17,7 @@ typedef struct {
         uint32_t text;  // scalar: start of its text in the tree's texts
     };
     uint32_t child_count; // mapping: keys and values
-    YamlKind kind;
+    YamlType type;
 } YamlNode;
 
 typedef struct {

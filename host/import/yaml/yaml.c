@@ -24,7 +24,7 @@ static bool read_pair(YamlReader *reader, const Field *field, const YamlNode *no
 static bool read_projection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     *(bool *)target = true;
-    return (node->kind == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "equirectangular") == 0) ||
+    return (node->type == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "equirectangular") == 0) ||
            expected_report(reader, field->name, "equirectangular", node);
 }
 
@@ -32,7 +32,7 @@ static bool read_projection(YamlReader *reader, const Field *field, const YamlNo
 static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     CameraFields *read = target;
-    read->camera.has_focus = node->kind != YAML_SCALAR;
+    read->camera.has_focus = node->type != YAML_SCALAR;
     if (read->camera.has_focus) return read_vector(reader, field, node, &read->camera.focus);
     Field distance = *field;
     distance.range = &range_positive;
@@ -149,7 +149,7 @@ static void document_read(YamlReader *reader)
     yaml_set_background(reader, &document.background, document.ambient);
     if (document.camera)
         yaml_read_camera(reader, document.camera);
-    else if (!reader->options->camera && root->kind == YAML_MAPPING)
+    else if (!reader->options->camera && root->type == YAML_MAPPING)
         report_error(&reader->report, root->offset, "scene lacks 'camera'");
     if (document.lights) yaml_read_lights(reader, document.lights);
     if (document.materials) // before the objects that name them

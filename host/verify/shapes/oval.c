@@ -59,7 +59,7 @@ static void hit_oval(const Object *object, const ReferenceRay *ray, ReferenceHit
     const Quad3 from = quad3_subtract(ray->origin, quad3(object->as.oval.center));
     const ReferenceRay own = {mapped_inward(&inverse, from), mapped_inward(&inverse, ray->direction),
                               ray->tmin, ray->tmax};
-    units[unit.kind]->hit(&unit, &own, hit);
+    units[unit.type]->hit(&unit, &own, hit);
     hit->margin = hit->margin == UNBOUNDED ? UNBOUNDED : hit->margin / inverse.norm;
     if (!hit->found) return;
     Quad length;
@@ -73,7 +73,7 @@ static void surface_oval(const Object *object, Quad3 point, ReferenceSurface *su
 {
     const Inverse inverse = inverse_of(object);
     const Object unit = oval_unit(object);
-    units[unit.kind]->surface(
+    units[unit.type]->surface(
         &unit, mapped_inward(&inverse, quad3_subtract(point, quad3(object->as.oval.center))), surface);
     Quad squares = 0;
     for (int i = 0; i < 3; i++)

@@ -13,7 +13,7 @@ typedef struct {
 
 static Revolution revolution_of(const Object *object)
 {
-    bool is_cylinder = object->kind == SHAPE_CYLINDER;
+    bool is_cylinder = object->type == SHAPE_CYLINDER;
     Quad3 axis = quad3(is_cylinder ? object->as.cylinder.axis : object->as.cone.axis);
     Quad height = quad3_length(axis);
     axis = quad3_scale(axis, 1 / height);
