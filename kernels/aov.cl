@@ -23,7 +23,7 @@ typedef struct {
 
 // Fills the AOVs of a tile. light_count is 0 if there is no shadow layer.
 static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const HitLayers *layers,
-                                  uint light_count, global int *doubts)
+                                  uint light_count, global int *flags)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, SAMPLE_CENTER, tile->inside);
     Hit hit = closest_hit(scene, &ray);
@@ -35,26 +35,26 @@ static OUT_OF_LINE void tile_aovs(const Scene *scene, const Tile *tile, const Hi
     film_store_color(layers->normal, tile, vector_select(found, surface.shading_normal, zero));
     film_store_color(layers->position, tile, vector_select(found, surface.position, zero));
     film_store_integer(layers->object, tile, 1, 0, hit.object);
-    mask doubt = mask_none();
-    if (IS_CERTIFIED) doubt = hit.doubt | (found & surface.doubt);
+    mask uncertain = mask_none();
+    if (IS_CERTIFIED) uncertain = hit.uncertain | (found & surface.uncertain);
     for (uint i = 0; i < light_count; i++) {
         LightVisibility light = light_visibility(scene, &surface, i);
-        if (IS_CERTIFIED) doubt = doubt | (found & (light.doubt | light.facing_doubt));
+        if (IS_CERTIFIED) uncertain = uncertain | (found & (light.uncertain | light.facing_uncertain));
         mask shadowed = found & !light.lit;
         film_store_integer(layers->shadow, tile, light_count, i,
                            lanes_select(shadowed, (integer)(1), (integer)(0)));
     }
-    if (IS_CERTIFIED) film_note_doubts(doubts, tile, doubt, true);
+    if (IS_CERTIFIED) film_flag_pixels(flags, tile, uncertain, true);
 }
 
-kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
-                global int *doubts, uint light_count)
+kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers, global int *flags,
+                uint light_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, doubts};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, flags};
     const HitLayers hit_layers = {HIT_AOV_LIST(LAYER_POINTER)};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &hit_layers, light_count, doubts);
+        if (lanes_any(tile.inside)) tile_aovs(&scene, &tile, &hit_layers, light_count, flags);
     }
 }

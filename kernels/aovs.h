@@ -34,7 +34,7 @@
 #define COLOR_LAYER(LAYER) \
     LAYER(COLOR, color, REAL, 3, "linear RGB, the mean of all samples")
 
-// host/render/repeat.c
+// host/render/rerender.c
 #define HOST_AOV_LIST(LAYER) \
     LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where re-rendered in double, 2 where uncertified, else 0")
 

@@ -5,7 +5,7 @@
 #include "traversal/traversal.h"
 
 static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, global const scalar *offsets,
-                                      global scalar *coverage, global scalar *backdrop, global int *doubts)
+                                      global scalar *coverage, global scalar *backdrop, global int *flags)
 {
     const uint count = scene->header->image.z;
     const real one = (real)(1), zero = (real)(0), divisor = (real)((scalar)count);
@@ -16,7 +16,7 @@ static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, glob
         Ray ray = camera_ray(scene->header, tile->pixels, offsets[2 * sample], offsets[2 * sample + 1],
                              sample, tile->inside);
         Hit hit = closest_hit(scene, &ray);
-        if (IS_CERTIFIED) film_note_doubts(doubts, tile, hit.doubt, sample == 0);
+        if (IS_CERTIFIED) film_flag_pixels(flags, tile, hit.uncertain, sample == 0);
         const mask found = hit_found(&hit);
         covered = covered + lanes_select(found, one, zero);
         Vector seen = background_color(scene, ray.direction, ray.active & !found);
@@ -29,14 +29,14 @@ static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, glob
 }
 
 kernel void coverage(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
-                     global int *doubts, global const scalar *sample_offsets)
+                     global int *flags, global const scalar *sample_offsets)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     global scalar *covered = (global scalar *)(film + (size_t)layers.coverage * ARENA_UNIT);
     global scalar *backdrop = (global scalar *)(film + (size_t)layers.backdrop * ARENA_UNIT);
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, doubts};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, flags};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_coverage(&scene, &tile, sample_offsets, covered, backdrop, doubts);
+        if (lanes_any(tile.inside)) tile_coverage(&scene, &tile, sample_offsets, covered, backdrop, flags);
     }
 }

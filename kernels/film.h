@@ -211,20 +211,20 @@ static inline void film_merge(global float *band_film, const Band *band, const T
 
 // Records the uncertain lanes: as bits, all of which were 0 before; in a list, in the pixels' counts, which
 // follow its pixels. `is_first` means that a count has no value yet.
-static inline void film_note_doubts(global int *doubts, const Tile *tile, mask doubt, bool is_first)
+static inline void film_flag_pixels(global int *flags, const Tile *tile, mask uncertain, bool is_first)
 {
-    if (!(IS_PIXEL_LIST && is_first) && !lanes_any(doubt)) return;
+    if (!(IS_PIXEL_LIST && is_first) && !lanes_any(uncertain)) return;
     if (!IS_PIXEL_LIST) {
         uint first = tile->number * LANES;
-        atomic_or(&doubts[first >> 5], (int)(lanes_bits(doubt & tile->inside) << (first & 31)));
+        atomic_or(&flags[first >> 5], (int)(lanes_bits(uncertain & tile->inside) << (first & 31)));
         return;
     }
-    doubts += 3 * (size_t)tile->width;
-    IntegerLanes counted = {doubt}, inside = {tile->inside}, index = {tile_index(tile)};
+    flags += 3 * (size_t)tile->width;
+    IntegerLanes counted = {uncertain}, inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++) {
         if (!inside.each[lane]) continue;
-        int before = is_first ? 0 : doubts[index.each[lane]];
-        doubts[index.each[lane]] = before + (counted.each[lane] != 0);
+        int before = is_first ? 0 : flags[index.each[lane]];
+        flags[index.each[lane]] = before + (counted.each[lane] != 0);
     }
 }
 

@@ -5,25 +5,25 @@
 #include "shading/path.h"
 
 static OUT_OF_LINE void tile_path_signature(const Scene *scene, const Tile *tile, global int *paths,
-                                            global int *doubts)
+                                            global int *flags)
 {
     Ray ray = camera_ray(scene->header, tile->pixels, 0, 0, SAMPLE_CENTER, tile->inside);
     ShadedHit hits[1];
     unsigned_integer signature;
-    mask doubt;
-    ray_tree_color(scene, ray, false, hits, &signature, &doubt);
-    if (IS_CERTIFIED) film_note_doubts(doubts, tile, doubt, true);
+    mask uncertain;
+    ray_tree_color(scene, ray, false, hits, &signature, &uncertain);
+    if (IS_CERTIFIED) film_flag_pixels(flags, tile, uncertain, true);
     film_store_integer(paths, tile, 1, 0, integer_from_unsigned(signature));
 }
 
 kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,
-                 global int *doubts)
+                 global int *flags)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     global int *paths = (global int *)(film + (size_t)layers.path * ARENA_UNIT);
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, doubts};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, flags};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
-        if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths, doubts);
+        if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths, flags);
     }
 }

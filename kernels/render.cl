@@ -10,7 +10,7 @@
 static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint first_tile,
                                      global const scalar *offsets, global scalar *film,
                                      global scalar *compensation, uint first_sample, uint last_sample,
-                                     global int *doubts, global float *band_film)
+                                     global int *flags, global float *band_film)
 {
     Tile tiles[PACKETS];
     Ray rays[PACKETS];
@@ -36,9 +36,9 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
         for (uint i = 0; i < PACKETS; i++) {
             if (!lanes_any(tiles[i].inside)) continue;
             unsigned_integer path;
-            mask doubt;
-            Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path, &doubt);
-            if (IS_CERTIFIED) film_note_doubts(doubts, &tiles[i], doubt, sample == 0);
+            mask uncertain;
+            Color3 traced = ray_tree_color(scene, rays[i], PACKETS > 1, &hits[i], &path, &uncertain);
+            if (IS_CERTIFIED) film_flag_pixels(flags, &tiles[i], uncertain, sample == 0);
             if (count == 1) {
                 sums[i] = traced;
                 continue;
@@ -59,13 +59,13 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
 
 kernel void render(SCENE_ARGUMENTS, global const scalar *sample_offsets, global scalar *film,
                    uint4 band_pixels, uint first_sample, uint last_sample, global uint *ray_counts, uint cell,
-                   global int *doubts, global float *band_film)
+                   global int *flags, global float *band_film)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, doubts};
+    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, flags};
     global scalar *compensation = film + (size_t)band.width * band.height * 3;
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
         tiles_render(&scene, &band, first_tile, sample_offsets, film, compensation, first_sample, last_sample,
-                     doubts, band_film);
+                     flags, band_film);
 }

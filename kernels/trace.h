@@ -29,9 +29,9 @@ static inline void vector_store(Vector vector, RealLanes *to)
 }
 
 // Traces up to LANES rays from `first` on. `rays` has RAY_SCALARS per ray and `results` RESULTS per ray, at
-// the offsets RESULT_… (types.h). On a miss only bounds, doubt and transmittance are valid. At `certified`
-// the bounds are those of Hit, for rays from tmin = 0 that have no end; otherwise they are t. Doubt is 1 if
-// the hit is uncertain.
+// the offsets RESULT_… (types.h). On a miss only the bounds, RESULT_UNCERTAIN and the transmittance are
+// valid. At `certified` the bounds are those of Hit, for rays from tmin = 0 that have no end; otherwise they
+// are t. RESULT_UNCERTAIN is 1 if the hit is uncertain.
 static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const scalar *rays, uint ray_count,
                                    global scalar *results, global int *objects_hit)
 {
@@ -52,7 +52,7 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
         const real size = vector_norm1(origin);
         const mask in_range =
             (size == (real)(0)) | ((size >= (real)(ORIGIN_MIN)) & (size < (real)(ORIGIN_MAX)));
-        hit.doubt = hit.doubt | !(ray.active & in_range);
+        hit.uncertain = hit.uncertain | !(ray.active & in_range);
     }
     Surface surface = surface_interaction(scene, &ray, &hit);
     RealLanes result[RESULTS];
@@ -61,7 +61,8 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
     vector_store(surface.position, result + RESULT_POSITION);
     result[RESULT_LOW].all = IS_CERTIFIED ? hit.low : hit.t;
     result[RESULT_HIGH].all = IS_CERTIFIED ? hit.high : hit.t;
-    result[RESULT_DOUBT].all = IS_CERTIFIED ? lanes_select(hit.doubt, (real)(1), (real)(0)) : (real)(0);
+    result[RESULT_UNCERTAIN].all =
+        IS_CERTIFIED ? lanes_select(hit.uncertain, (real)(1), (real)(0)) : (real)(0);
 #if TRACES_BOUNCES
     const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
     Bounce reflected = {origin, direction, black}, refracted = reflected;

@@ -14,8 +14,8 @@ static Random random_state;
 enum { AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT };
 
 typedef struct {
-    size_t wrong, wrong_decided; // pixels; the latter are not listed as undecided
-    uint64_t repeated, undecided;
+    size_t wrong, wrong_decided; // pixels; the latter are not listed as uncertified
+    uint64_t rerendered, uncertified;
 } Answer;
 
 // Renderers at each precision. Their kernels serve scene after scene.
@@ -48,7 +48,7 @@ static inline Answer answer(const Scene *scene, const CertifySample *reference,
     Film film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(reference, &film);
     const Answer counted = {errors.object + errors.shadow + errors.path, errors.wrong_decided,
-                            film.repeats.repeated, film.repeats.undecided};
+                            film.rerenders.rerendered, film.rerenders.uncertified};
     film_free(&film);
     return counted;
 }
@@ -66,7 +66,7 @@ static inline RenderSettings small_settings(uint32_t bounce_count)
 }
 
 // Renders a small image. Its decided pixels must have the reference's decisions and colors. Returns the
-// number of undecided samples and frees the scene.
+// number of uncertified samples and frees the scene.
 static inline size_t check_image(Scene *scene, const RenderSettings *settings, const char *what,
                                  double number)
 {
@@ -76,13 +76,13 @@ static inline size_t check_image(Scene *scene, const RenderSettings *settings, c
     Film film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(&reference, &film);
     if (errors.wrong_decided > 0)
-        fail_msg("%s, %g: of the pixels not undecided %zu are wrong, at most %zu of them in color", what,
+        fail_msg("%s, %g: of the pixels not uncertified %zu are wrong, at most %zu of them in color", what,
                  number, errors.wrong_decided, errors.color);
-    const size_t undecided = (size_t)film.repeats.undecided;
+    const size_t uncertified = (size_t)film.rerenders.uncertified;
     film_free(&film);
     certify_sample_close(&reference);
     scene_free(scene);
-    return undecided;
+    return uncertified;
 }
 
 static inline size_t check_small(Scene *scene, uint32_t bounce_count, const char *what, double number)

@@ -306,15 +306,15 @@ static const uint32_t bounce_counts[FAMILY_COUNT] = {2, 2, 2, 2, 5};
 // The shares of these crowded scenes' samples that may be re-rendered, a little above the measured 0.62,
 // 0.18, 0.19, 0.54, 0.22 and 0.002, 0.02, 0.007, 0.03, 0.00035. For optics without chords 0.26 and 0.003 were
 // measured.
-static const double repeated_max[FAMILY_COUNT] = {0.7, 0.25, 0.25, 0.65, 0.24},
-                    undecided_max[FAMILY_COUNT] = {0.005, 0.03, 0.01, 0.06, 0.0005};
+static const double rerendered_max[FAMILY_COUNT] = {0.7, 0.25, 0.25, 0.65, 0.24},
+                    uncertified_max[FAMILY_COUNT] = {0.005, 0.03, 0.01, 0.06, 0.0005};
 
 static void check_family(Family family)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const unsigned scene_count = tests_are_long() ? 70 : 3;
     size_t single_wrong = 0, compared = 0;
-    uint64_t repeated = 0, undecided = 0;
+    uint64_t rerendered = 0, uncertified = 0;
     for (unsigned seed = 0; seed < scene_count; seed++) {
         Scene scene = scene_attacking(family, seed);
         CertifySample reference;
@@ -332,24 +332,25 @@ static void check_family(Family family)
             if (run == 2 && !tests_are_long()) continue;
             const Answer certified = answer(&scene, &reference, &settings);
             if (certified.wrong_decided > 0)
-                fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not undecided",
+                fail_msg("%s, scene %u, run %u: %zu pixels are wrong, %zu of them not uncertified",
                          family_names[family], seed, run, certified.wrong, certified.wrong_decided);
-            repeated += certified.repeated;
-            undecided += certified.undecided;
+            rerendered += certified.rerendered;
+            uncertified += certified.uncertified;
         }
         compared += reference.count;
         certify_sample_close(&reference);
         scene_free(&scene);
     }
     const double samples = (double)(compared * (tests_are_long() ? 3 : 2)),
-                 repeated_share = (double)repeated / samples, undecided_share = (double)undecided / samples;
+                 rerendered_share = (double)rerendered / samples,
+                 uncertified_share = (double)uncertified / samples;
     print_message("%s: %zu pixels, of which single has %zu wrong; of the samples %.4f repeated, %.5f "
-                  "undecided\n",
-                  family_names[family], compared, single_wrong, repeated_share, undecided_share);
+                  "uncertified\n",
+                  family_names[family], compared, single_wrong, rerendered_share, uncertified_share);
     assert_true(single_wrong >= scene_count);
     // a bound that flags every pixel would be right but useless
-    assert_true(repeated_share < repeated_max[family]);
-    assert_true(undecided_share < undecided_max[family]);
+    assert_true(rerendered_share < rerendered_max[family]);
+    assert_true(uncertified_share < uncertified_max[family]);
 }
 
 TEST(flat_shapes_are_decided)
@@ -383,7 +384,7 @@ TEST(horizons_are_decided)
     settings.extra_features = family_features[PLANETS];
     settings.perturb_seed = 3;
     settings.lanes = 1; // built sooner
-    size_t undecided = 0;
+    size_t uncertified = 0;
     random_state.state = 1;
     for (int i = 0; i < count; i++) {
         const bool is_planet = i % 2 == 0;
@@ -399,10 +400,10 @@ TEST(horizons_are_decided)
                               .as.cylinder = {.from = center, .axis = {1, 0, 0}, .radius = radius}};
         array_push(scene.objects, object);
         if (tests_are_long()) settings.perturb_seed = 1 + (uint32_t)i * PERTURB_SEEDS / (uint32_t)count;
-        undecided +=
+        uncertified +=
             check_image(&scene, &settings, is_planet ? "a planet's horizon" : "a cylinder's horizon", radius);
     }
-    assert_int_equal(undecided, 0);
+    assert_int_equal(uncertified, 0);
 }
 
 TEST(mirrors_glass_and_spots_are_decided)
@@ -441,7 +442,7 @@ TEST(terminators_of_ovals_are_decided)
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { LIGHTS = 16, TRIES = 1000 };
     size_t single_wrong = 0;
-    uint64_t repeated = 0;
+    uint64_t rerendered = 0;
     const unsigned scene_count = tests_are_long() ? 100 : 10;
     for (unsigned seed = 0; seed < scene_count; seed++) {
         Scene scene = scene_attacking(FLAT, 0);
@@ -475,16 +476,16 @@ TEST(terminators_of_ovals_are_decided)
         settings.extra_features = CERTIFIED_FEATURES;
         const Answer certified = answer(&scene, &reference, &settings);
         if (certified.wrong_decided > 0)
-            fail_msg("scene %u: %zu pixels are wrong, %zu of them not undecided", seed, certified.wrong,
+            fail_msg("scene %u: %zu pixels are wrong, %zu of them not uncertified", seed, certified.wrong,
                      certified.wrong_decided);
-        repeated += certified.repeated;
+        rerendered += certified.rerendered;
         certify_sample_close(&reference);
         scene_free(&scene);
     }
     print_message("single has %zu wrong, %.4f of the samples repeated\n", single_wrong,
-                  (double)repeated / (double)(scene_count * WIDTH * HEIGHT));
+                  (double)rerendered / (double)(scene_count * WIDTH * HEIGHT));
     assert_true(single_wrong >= scene_count);
-    assert_true(repeated < scene_count * WIDTH * HEIGHT / 4);
+    assert_true(rerendered < scene_count * WIDTH * HEIGHT / 4);
 }
 
 // The results of the certified images of the hard cases.
@@ -502,7 +503,7 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
     certified.precision = PRECISION_CERTIFIED;
     const Answer found = answer(scene, &reference, &certified);
     if (found.wrong_decided > 0)
-        print_message("image %zu: %zu of %zu wrong, %zu of them not undecided\n", pictures->images,
+        print_message("image %zu: %zu of %zu wrong, %zu of them not uncertified\n", pictures->images,
                       found.wrong, reference.count, found.wrong_decided);
     pictures->images++;
     pictures->compared += reference.count;
@@ -526,7 +527,7 @@ TEST(hard_cases_are_decided)
         .render = film_settings(1, 1, PRECISION_SINGLE), .picture = picture_compare, .context = &pictures};
     VerifyKernels kernels = {0};
     verify_run(&probe_compute, &settings, NULL, &(VerifySink){.take = case_print}, &kernels);
-    print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not undecided\n",
+    print_message("%zu images of the hard cases, %zu pixels: %zu wrong, %zu of them not uncertified\n",
                   pictures.images, pictures.compared, pictures.wrong, pictures.wrong_decided);
     assert_true(pictures.images > 100);
     assert_int_equal(pictures.wrong_decided, 0);
@@ -537,7 +538,7 @@ TEST(hard_cases_are_decided)
 TEST(smooth_meshes_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
-    size_t undecided = 0;
+    size_t uncertified = 0;
     const unsigned count = tests_are_long() ? 300 : 12;
     for (unsigned seed = 0; seed < count; seed++) {
         random_state.state = seed;
@@ -556,10 +557,10 @@ TEST(smooth_meshes_are_decided)
         array_push(scene.lights, ((Light){.type = LIGHT_DIRECTIONAL,
                                           .color = {0.5, 0.5, 0.5},
                                           .direction = {random_between(&random_state, -1, 1), 1, 0.3}}));
-        undecided += check_small(&scene, 0, "a smooth mesh", seed);
+        uncertified += check_small(&scene, 0, "a smooth mesh", seed);
     }
-    print_message("%zu pixels undecided of %u\n", undecided, count * SMALL_SIDE * SMALL_SIDE);
-    assert_true(undecided * 200 < count * SMALL_SIDE * SMALL_SIDE);
+    print_message("%zu pixels uncertified of %u\n", uncertified, count * SMALL_SIDE * SMALL_SIDE);
+    assert_true(uncertified * 200 < count * SMALL_SIDE * SMALL_SIDE);
 }
 
 int main(int argc, char **argv)

@@ -22,13 +22,13 @@ TEST(lights_on_surfaces_are_decided)
         Scene scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
         array_push(scene.objects, wall);
         point_light_add(&scene, (Vector3){0, 0, heights[i]}, 1);
-        size_t undecided = check_small(&scene, 0, "a light above a wall", heights[i]);
+        size_t uncertified = check_small(&scene, 0, "a light above a wall", heights[i]);
         scene = scene_seen_from((Vector3){0, 0, 1}, 0.5);
         array_push(scene.objects, wall);
         array_push(scene.objects, ((Object){.type = SHAPE_SPHERE, .as.sphere = {{0.5, 0, 0}, 0.25}}));
         point_light_add(&scene, (Vector3){10, 0, heights[i]}, 1e6);
-        undecided += check_small(&scene, 0, "a light that grazes a wall", heights[i]);
-        if (heights[i] >= 1e-9) assert_int_equal(undecided, 0); // double tells them apart
+        uncertified += check_small(&scene, 0, "a light that grazes a wall", heights[i]);
+        if (heights[i] >= 1e-9) assert_int_equal(uncertified, 0); // double tells them apart
     }
     for (int digits = 15; digits < 24; digits += 2) {
         const double distance = pow(10, digits);
@@ -161,8 +161,8 @@ TEST(needles_have_an_area)
             seen += film.color[3 * i] != 0.25; // not the background
         film_free(&film);
         assert_int_not_equal(seen, 0);
-        const size_t undecided = check_small(&scene, 0, "a strip", far);
-        if (far < 1e13) assert_true(undecided < 3 * SMALL_SIDE); // farther off all may be
+        const size_t uncertified = check_small(&scene, 0, "a strip", far);
+        if (far < 1e13) assert_true(uncertified < 3 * SMALL_SIDE); // farther off all may be
     }
     for (unsigned seed = 0; seed < 20; seed++) {
         random_state.state = seed;
@@ -209,7 +209,7 @@ static Mesh ribbons_in_view(void)
 
 // Mirrors and glass of ribbons, and a checkered wall. As floats the vertices have other planes, which would
 // show other squares. An image and its AOVs take three samples per pixel.
-TEST(slim_triangles_are_seldom_repeated)
+TEST(slim_triangles_are_seldom_rerendered)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { SIDE = 20 };
@@ -237,9 +237,9 @@ TEST(slim_triangles_are_seldom_repeated)
         RenderSettings settings = film_settings(SIDE, SIDE, PRECISION_CERTIFIED);
         settings.bounce_count = 2;
         const Answer found = answer(&scene, &reference, &settings);
-        print_message("%zu of %u samples repeated\n", (size_t)found.repeated, 3 * SIDE * SIDE);
+        print_message("%zu of %u samples repeated\n", (size_t)found.rerendered, 3 * SIDE * SIDE);
         assert_int_equal(found.wrong_decided, 0);
-        assert_true(found.repeated < 64);
+        assert_true(found.rerendered < 64);
         certify_sample_close(&reference);
         scene_free(&scene);
     }
@@ -247,7 +247,7 @@ TEST(slim_triangles_are_seldom_repeated)
 
 // A ball of 40,000 smooth triangles, with waves on it: single certifies most pixels, although rays to lights
 // start close to other triangles.
-TEST(fine_meshes_are_seldom_repeated)
+TEST(fine_meshes_are_seldom_rerendered)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     enum { AROUND = 200, DOWN = 100 };
@@ -273,11 +273,11 @@ TEST(fine_meshes_are_seldom_repeated)
     RenderSettings settings = small_settings(0);
     settings.width = settings.height = settings.region_width = settings.region_height = 100;
     Film film = image_render(&scene, &settings);
-    print_message("%zu of %u pixels repeated\n", (size_t)film.repeats.repeated, 100 * 100);
+    print_message("%zu of %u pixels repeated\n", (size_t)film.rerenders.rerendered, 100 * 100);
     size_t seen = 0;
     for (size_t i = 0; i < 100 * 100; i++)
         seen += film.color[3 * i] != 0.25; // not the background
-    assert_true(seen > 5000 && film.repeats.repeated > 0 && film.repeats.repeated < 60);
+    assert_true(seen > 5000 && film.rerenders.rerendered > 0 && film.rerenders.rerendered < 60);
     film_free(&film);
     scene_free(&scene);
 }
@@ -314,7 +314,7 @@ TEST(mixed_sizes_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int steps = tests_are_long() ? 10 : 2; // on either side of 1
-    size_t undecided = 0, count = 0;
+    size_t uncertified = 0, count = 0;
     for (unsigned form = 0; form < FORMS; form++)
         for (int i = -steps; i <= steps; i++)
             for (int k = -steps; k <= steps; k++) {
@@ -327,11 +327,11 @@ TEST(mixed_sizes_are_decided)
                 array_push(scene.lights, ((Light){.type = LIGHT_DIRECTIONAL,
                                                   .color = {0.5, 0.5, 0.5},
                                                   .direction = {-3, -5, -1}}));
-                undecided += check_small(&scene, 0, shape_names[scene.objects.items[0].type], exponent);
+                uncertified += check_small(&scene, 0, shape_names[scene.objects.items[0].type], exponent);
                 count++;
             }
-    print_message("%zu pixels undecided of %zu\n", undecided, count * SMALL_SIDE * SMALL_SIDE);
-    assert_true(undecided * 16 < count * SMALL_SIDE * SMALL_SIDE);
+    print_message("%zu pixels uncertified of %zu\n", uncertified, count * SMALL_SIDE * SMALL_SIDE);
+    assert_true(uncertified * 16 < count * SMALL_SIDE * SMALL_SIDE);
 }
 
 int main(int argc, char **argv)
@@ -342,8 +342,8 @@ int main(int argc, char **argv)
                                        cmocka_unit_test(skimming_rays_are_decided),
                                        cmocka_unit_test(thin_walls_are_decided),
                                        cmocka_unit_test(needles_have_an_area),
-                                       cmocka_unit_test(slim_triangles_are_seldom_repeated),
-                                       cmocka_unit_test(fine_meshes_are_seldom_repeated),
+                                       cmocka_unit_test(slim_triangles_are_seldom_rerendered),
+                                       cmocka_unit_test(fine_meshes_are_seldom_rerendered),
                                        cmocka_unit_test(mixed_sizes_are_decided)};
     if (argc > 1) cmocka_set_test_filter(argv[1]);
     return cmocka_run_group_tests(tests, probe_open, painters_close);

@@ -9,9 +9,9 @@
 enum { WIDTH = 96, HEIGHT = 64, PIXELS = WIDTH * HEIGHT };
 
 // Renders the scene, `scale` times as wide and high as WIDTH and HEIGHT, and compares about `count` pixels.
-// `doubts` is of pixels undecided at certified; NULL: not wanted.
+// `uncertified` is of pixels uncertain at certified; NULL: not wanted.
 static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t scale, size_t count,
-                             CertifyDoubts *doubts)
+                             CertifyUncertified *uncertified)
 {
     const RenderSettings settings = film_settings(WIDTH * scale, HEIGHT * scale, precision);
     CertifySample reference;
@@ -19,14 +19,14 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
                                     (ReferencePath){.bounce_count = settings.bounce_count}, NULL));
     Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT);
     const CertifyErrors errors = certify_compare(&reference, &film);
-    size_t undecided = 0;
+    size_t uncertain = 0;
     for (size_t i = 0; i < reference.count; i++)
-        undecided += reference_is_undecided(&reference.pixels[i]);
-    assert_int_equal(errors.compared, reference.count - undecided);
-    assert_true(undecided < reference.count / 10);
-    if (doubts)
-        *doubts = certify_doubts(scene, &film, count / 10 + 1,
-                                 (ReferencePath){.bounce_count = settings.bounce_count}, NULL);
+        uncertain += reference_is_uncertain(&reference.pixels[i]);
+    assert_int_equal(errors.compared, reference.count - uncertain);
+    assert_true(uncertain < reference.count / 10);
+    if (uncertified)
+        *uncertified = certify_uncertified(scene, &film, count / 10 + 1,
+                                           (ReferencePath){.bounce_count = settings.bounce_count}, NULL);
     film_free(&film);
     certify_sample_close(&reference);
     return errors;
@@ -152,10 +152,10 @@ TEST(there_are_no_false_alarms)
         "  - disc: {center: [0, 1e-10, 0], normal: [0.1, 1, 0.2], radius: 2, material: glass}\n");
     for (int shifts = 0; shifts < 2; shifts++) {
         scene.camera.shift[1] = shifts;
-        CertifyDoubts doubts;
-        const CertifyErrors errors = certify(&scene, PRECISION_CERTIFIED, 1, PIXELS, &doubts);
+        CertifyUncertified uncertified;
+        const CertifyErrors errors = certify(&scene, PRECISION_CERTIFIED, 1, PIXELS, &uncertified);
         assert_int_equal(errors.wrong_decided + errors.unconfirmed + errors.contradicted, 0);
-        assert_true(errors.compared > 6000 && doubts.count < 600);
+        assert_true(errors.compared > 6000 && uncertified.count < 600);
     }
     scene_free(&scene);
 }

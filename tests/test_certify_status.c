@@ -77,8 +77,8 @@ TEST(test_status)
 {
     const Case fails[] = {{"single,certified", AN_OBJECT, 0}, {"certified", A_COLOR, 0}};
     const Case mirrored[] = {{"certified", THE_CHECKER, 0}, {"certified", A_SHADOW, 0}};
-    const Case passing[] = {{"certified", AN_OBJECT, DOUBT_UNDECIDED}, // it says so itself
-                            {"certified", A_COLOR, DOUBT_UNDECIDED},
+    const Case passing[] = {{"certified", AN_OBJECT, FLAG_UNCERTIFIED}, // it says so itself
+                            {"certified", A_COLOR, FLAG_UNCERTIFIED},
                             {"single", AN_OBJECT, 0}, // which promises nothing
                             {"certified", NOTHING, 0}};
     Case one = {"certified", NOTHING, 0};

@@ -73,9 +73,9 @@ static bool give(Scheduler *scheduler, size_t worker, BandRows rows)
     Film band = {
         .width = WIDTH, .height = rows.row_count, .first_row = rows.first_row, .real_size = sizeof(float)};
     band.layers[LAYER_COLOR] = values;
-    bool go_on = scheduler_give(scheduler, worker, &band);
+    bool continues = scheduler_give(scheduler, worker, &band);
     memset(values, 0, sizeof values); // the renderer's memory is for its next band
-    return go_on;
+    return continues;
 }
 
 static void work(Scheduler *scheduler, size_t worker)

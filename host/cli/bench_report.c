@@ -139,7 +139,7 @@ static void launches_print(FILE *stream, const RenderReport *report)
         const LaunchTime *time = &report->launches.items[i].time;
         fprintf(stream, "    %-9s %9.3f ms, by the host %9.3f ms%s%s\n", report->launches.items[i].name,
                 1e3 * time->event_seconds, 1e3 * time->host_seconds, time->trusted ? "" : "; ",
-                time->trusted ? "" : launch_time_doubt(time));
+                time->trusted ? "" : launch_clock_fault(time));
     }
 }
 
@@ -216,15 +216,15 @@ static void row_print(const BenchReport *report, size_t i, FILE *stream)
         variant_print(report, i, stream);
         return;
     }
-    const char *doubt = bench_doubt(&row->times);
+    const char *clock_fault = bench_clock_fault(&row->times);
     summary_print(stream, series_summarize(&row->times.frame));
     summary_print(stream, bench_kernel(&row->times));
-    fprintf(stream, "  %-5s %4zu", doubt ? "host" : "event", row->times.frame.count);
+    fprintf(stream, "  %-5s %4zu", clock_fault ? "host" : "event", row->times.frame.count);
     milliseconds_print(stream, 6, row->build_cold);
     milliseconds_print(stream, 5, row->build_cached);
     fprintf(stream, " %7.1f  %016" PRIx64 "\n", bench_rays_per_second(row) / 1e6, row->kernel_hash);
     variant_print(report, i, stream);
-    if (doubt) fprintf(stream, "    using the host's clock: %s\n", doubt);
+    if (clock_fault) fprintf(stream, "    using the host's clock: %s\n", clock_fault);
     if (row->energy.source)
         fprintf(stream, "    %.3g mJ per frame, %.3g W, by %s\n", 1e3 * row->energy.joules,
                 row->energy.joules / row->energy.seconds, row->energy.source);
@@ -293,7 +293,7 @@ static void launches_json(Json *json, const RenderReport *report)
         const LaunchTime *time = &report->launches.items[i].time;
         json_begin_object(json, NULL);
         json_text(json, "name", report->launches.items[i].name);
-        figure_json(json, "event_ms", 1e3, (Figure){time->event_seconds, launch_time_doubt(time)});
+        figure_json(json, "event_ms", 1e3, (Figure){time->event_seconds, launch_clock_fault(time)});
         json_number(json, "host_ms", 1e3 * time->host_seconds);
         command_json(json, report, time);
         json_end(json);
@@ -403,7 +403,8 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     times_json(json, row);
     json_number(json, "processor_ms", 1e3 * series_summarize(&row->times.processor).median);
     samples_json(json, "frame_samples_ms", &row->times.frame);
-    samples_json(json, "kernel_samples_ms", bench_doubt(&row->times) ? &row->times.host : &row->times.event);
+    samples_json(json, "kernel_samples_ms",
+                 bench_clock_fault(&row->times) ? &row->times.host : &row->times.event);
     samples_json(json, "processor_samples_ms", &row->times.processor);
     json_begin_object(json, "drift");
     const Comparison drift = row_drift(report, row);

@@ -93,32 +93,33 @@ typedef struct {
         bool measured;
         char *failure; // why a requested precision is not measured, or NULL
         CertifyErrors errors;
-        CertifyDoubts doubts; // only at `certified`
+        CertifyUncertified uncertified; // only at `certified`
     } rows[PRECISION_COUNT];
 } Certification;
 
-static void certified_print(const CertifyErrors *errors, const CertifyDoubts *doubts)
+static void certified_print(const CertifyErrors *errors, const CertifyUncertified *uncertified)
 {
     printf("             colors are certified to %.2g of their largest channel, or of 1 if that is more\n",
            CERTIFIED_COLOR_ERROR);
     if (errors->unconfirmed > 0)
-        printf("             %zu pixels decided that the reference leaves undecided; %zu differ from it\n",
+        printf("             %zu pixels decided that the reference leaves uncertain; %zu differ from it\n",
                errors->unconfirmed, errors->contradicted);
-    if (doubts->count == 0) return;
-    printf("             %zu pixel%s undecided; examined: %zu, of which %zu change with errors of 2^-50, %zu "
-           "are "
-           "within 2^-49, %zu neither\n",
-           doubts->count, text_plural(doubts->count), doubts->examined, doubts->witnessed, doubts->close,
-           doubts->examined - doubts->witnessed - doubts->close);
+    if (uncertified->count == 0) return;
+    printf(
+        "             %zu pixel%s uncertified; examined: %zu, of which %zu change with errors of 2^-50, %zu "
+        "are "
+        "within 2^-49, %zu neither\n",
+        uncertified->count, text_plural(uncertified->count), uncertified->examined, uncertified->witnessed,
+        uncertified->close, uncertified->examined - uncertified->witnessed - uncertified->close);
 }
 
 static void text_print(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
     const Device *device = certification->compute->device;
-    size_t undecided = 0, textured = 0;
+    size_t uncertain = 0, textured = 0;
     for (size_t i = 0; i < sample->count; i++) {
-        undecided += reference_is_undecided(&sample->pixels[i]);
+        uncertain += reference_is_uncertain(&sample->pixels[i]);
         textured += sample->pixels[i].has_texture;
     }
     printf("%s, %s %s\n", device->name, device->platform_name, device->driver);
@@ -126,7 +127,7 @@ static void text_print(const Certification *certification)
     printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
            sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
            certification->reference_seconds);
-    if (undecided > 0) printf("; %zu undecided in it are not counted as right or wrong", undecided);
+    if (uncertain > 0) printf("; %zu uncertain in it are not counted as right or wrong", uncertain);
     if (textured > 0) printf("; of %zu with a texture no color is compared", textured);
     puts("\n                         wrong                 largest error of color        largest margin\n"
          "  precision   object  shadow    path   color   right     wrong     at         of a wrong pixel");
@@ -141,12 +142,12 @@ static void text_print(const Certification *certification)
         if (errors->object + errors->shadow + errors->path + errors->color > 0)
             printf("    %.2g of the distance", errors->margin);
         putchar('\n');
-        if (i == PRECISION_CERTIFIED) certified_print(errors, &certification->rows[i].doubts);
+        if (i == PRECISION_CERTIFIED) certified_print(errors, &certification->rows[i].uncertified);
     }
 }
 
 static void row_json(Json *json, Precision precision, const CertifyErrors *errors,
-                     const CertifyDoubts *doubts)
+                     const CertifyUncertified *uncertified)
 {
     json_begin_object(json, NULL);
     json_text(json, "precision", precision_names[precision]);
@@ -172,10 +173,10 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
         json_int64(json, "unconfirmed", (int64_t)errors->unconfirmed);
         json_int64(json, "contradicted", (int64_t)errors->contradicted);
         json_begin_object(json, "undecided");
-        json_int64(json, "pixels", (int64_t)doubts->count);
-        json_int64(json, "examined", (int64_t)doubts->examined);
-        json_int64(json, "witnessed", (int64_t)doubts->witnessed);
-        json_int64(json, "close", (int64_t)doubts->close);
+        json_int64(json, "pixels", (int64_t)uncertified->count);
+        json_int64(json, "examined", (int64_t)uncertified->examined);
+        json_int64(json, "witnessed", (int64_t)uncertified->witnessed);
+        json_int64(json, "close", (int64_t)uncertified->close);
         json_end(json);
     }
     json_end(json);
@@ -205,14 +206,14 @@ static Json *certify_json(const Certification *certification)
     json_int64(json, "pixels", (int64_t)sample->count);
     json_int64(json, "reference_bits", QUAD_BITS);
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
-    size_t undecided = 0;
+    size_t uncertain = 0;
     for (size_t i = 0; i < sample->count; i++)
-        undecided += reference_is_undecided(&sample->pixels[i]);
-    json_int64(json, "reference_undecided", (int64_t)undecided);
+        uncertain += reference_is_uncertain(&sample->pixels[i]);
+    json_int64(json, "reference_undecided", (int64_t)uncertain);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured)
-            row_json(json, (Precision)i, &certification->rows[i].errors, &certification->rows[i].doubts);
+            row_json(json, (Precision)i, &certification->rows[i].errors, &certification->rows[i].uncertified);
         if (!certification->rows[i].failure) continue;
         json_begin_object(json, NULL);
         json_text(json, "precision", precision_names[i]);
@@ -245,9 +246,9 @@ static int precision_compare(Certification *certification, RenderSettings settin
         certification->rows[precision].measured = true;
         certification->rows[precision].errors = certify_compare(&certification->sample, &film);
         if (precision == PRECISION_CERTIFIED)
-            certification->rows[precision].doubts =
-                certify_doubts(certification->scene, &film, certification->options->pixels / 10 + 1,
-                               path_of(certification->options), progress_interrupted);
+            certification->rows[precision].uncertified =
+                certify_uncertified(certification->scene, &film, certification->options->pixels / 10 + 1,
+                                    path_of(certification->options), progress_interrupted);
         film_free(&film);
     }
     renderer_close(renderer);
@@ -261,12 +262,13 @@ static int precision_compare(Certification *certification, RenderSettings settin
 static int decided_check(const CertifyErrors *certified)
 {
     if (certified->wrong_decided == 0) return EXIT_DONE;
-    fprintf(
-        stderr,
-        "glint certify: certified is wrong at %zu pixel%s that it does not list as undecided, most at %u,%u: "
-        "%.2g of the distance\n",
-        certified->wrong_decided, text_plural(certified->wrong_decided), certified->wrong_decided_place[0],
-        certified->wrong_decided_place[1], certified->wrong_decided_margin);
+    fprintf(stderr,
+            "glint certify: certified is wrong at %zu pixel%s that it does not list as uncertified, most at "
+            "%u,%u: "
+            "%.2g of the distance\n",
+            certified->wrong_decided, text_plural(certified->wrong_decided),
+            certified->wrong_decided_place[0], certified->wrong_decided_place[1],
+            certified->wrong_decided_margin);
     return EXIT_CHECK;
 }
 

@@ -45,7 +45,7 @@ struct ImageOutput {
     Scratch layers[LAYER_COUNT]; // the memory of the band's layers
     double seconds;
 
-    RepeatCounts repeats; // the sum over all bands so far
+    RerenderCounts rerenders; // the sum over all bands so far
     // All bands, if the file records their counts before their pixels.
     struct {
         Film *items;
@@ -108,9 +108,9 @@ static const char certified_key[] = "Certified";
 
 static void certified_describe(Text *text, const ImageOutput *output)
 {
-    text_appendf(text, "%llu sample%s re-rendered in double, %llu undecided",
-                 (unsigned long long)output->repeats.repeated, text_plural(output->repeats.repeated),
-                 (unsigned long long)output->repeats.undecided);
+    text_appendf(text, "%llu sample%s re-rendered in double, %llu uncertified",
+                 (unsigned long long)output->rerenders.rerendered, text_plural(output->rerenders.rerendered),
+                 (unsigned long long)output->rerenders.uncertified);
 }
 
 static bool is_exr(const ImageOutput *output)
@@ -433,7 +433,7 @@ static bool band_output(ImageOutput *output, const Film *band, MessageList *mess
 
 bool image_output_write(ImageOutput *output, const Film *band, MessageList *messages)
 {
-    output->repeats = repeat_counts_add(output->repeats, band->repeats);
+    output->rerenders = rerender_counts_add(output->rerenders, band->rerenders);
     if (!keeps_bands(output)) return band_output(output, band, messages);
     array_push(output->kept, film_copy(band));
     return true;
@@ -459,9 +459,9 @@ static bool late_notes_write(ImageOutput *output, MessageList *messages)
     return written;
 }
 
-RepeatCounts image_output_repeats(const ImageOutput *output)
+RerenderCounts image_output_rerenders(const ImageOutput *output)
 {
-    return output->repeats;
+    return output->rerenders;
 }
 
 static void image_output_free(ImageOutput *output)

@@ -25,7 +25,7 @@ bool image_output_write(ImageOutput *output, const Film *band, MessageList *mess
 // Returns the total bytes of all files before compression, or 0 until they are open.
 double image_output_bytes(const ImageOutput *output);
 // Returns the counts of all bands so far at `certified`.
-RepeatCounts image_output_repeats(const ImageOutput *output);
+RerenderCounts image_output_rerenders(const ImageOutput *output);
 // Puts all files in place and frees the output. Returns false with a message if a file could not be put in
 // place. Sets *seconds to the time spent on encoding and writing, even if other work ran at the same time.
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds);

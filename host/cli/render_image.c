@@ -99,10 +99,10 @@ static void warnings_add(ImageRender *render)
 {
     const OpenDevices *devices = &render->open->devices;
     const size_t device_count = shutter_is_last(&render->shutter) ? devices->count : 0;
-    const uint64_t undecided = render->times->repeats.undecided;
-    if (undecided > 0)
-        message_warning(&render->messages, "%" PRIu64 " sample%s undecided, as at precision double",
-                        undecided, undecided == 1 ? " is" : "s are");
+    const uint64_t uncertified = render->times->rerenders.uncertified;
+    if (uncertified > 0)
+        message_warning(&render->messages, "%" PRIu64 " sample%s uncertified, as at precision double",
+                        uncertified, uncertified == 1 ? " is" : "s are");
     for (size_t i = 0; i < device_count; i++) {
         const RenderReport *report = renderer_report(render->open->renderers[i]);
         if (report->is_out_of_line)
@@ -163,7 +163,7 @@ static int image_render(ImageRender *render)
     double start = clock_seconds();
     bool whole = render_job_run(&job);
     times->render_seconds += clock_seconds() - start;
-    if (is_last) times->repeats = image_output_repeats(render->output);
+    if (is_last) times->rerenders = image_output_rerenders(render->output);
     progress_close(&shutter->progress);
     whole = files_write(render, whole);
     if (whole) warnings_add(render);

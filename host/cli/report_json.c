@@ -140,11 +140,11 @@ void perturb_json(Json *json, uint32_t seed, uint32_t scale)
 
 void times_json(Json *json, const BenchRow *row)
 {
-    const char *doubt = bench_doubt(&row->times);
+    const char *clock_fault = bench_clock_fault(&row->times);
     summary_json(json, "frame_ms", series_summarize(&row->times.frame));
     summary_json(json, "kernel_ms", bench_kernel(&row->times));
-    json_text(json, "clock", doubt ? "host" : "event");
-    if (doubt) json_text(json, "clock_doubt", doubt);
+    json_text(json, "clock", clock_fault ? "host" : "event");
+    if (clock_fault) json_text(json, "clock_doubt", clock_fault);
 }
 
 void rays_json(Json *json, const BenchRow *row)

@@ -77,7 +77,7 @@ static const double *sums_add(Shutter *shutter, const Film *band)
 void shutter_add(Shutter *shutter, const Film *band)
 {
     sums_add(shutter, band);
-    shutter->repeats = repeat_counts_add(shutter->repeats, band->repeats);
+    shutter->rerenders = rerender_counts_add(shutter->rerenders, band->rerenders);
 }
 
 Film shutter_mean(Shutter *shutter, const Film *band)
@@ -90,7 +90,7 @@ Film shutter_mean(Shutter *shutter, const Film *band)
         memcpy(mean.layers[LAYER_COLOR], sums, size);
     else
         numbers_narrow(mean.layers[LAYER_COLOR], sums, size / sizeof(float));
-    mean.repeats = repeat_counts_add(shutter->repeats, band->repeats);
-    shutter->repeats = (RepeatCounts){0};
+    mean.rerenders = rerender_counts_add(shutter->rerenders, band->rerenders);
+    shutter->rerenders = (RerenderCounts){0};
     return mean;
 }

@@ -12,7 +12,7 @@ typedef struct {
     uint32_t sample_count;     // of a pixel
     uint32_t time, time_count; // a count of 1 means that nothing accumulates
     double *sums;              // of the region's colors over the earlier times, divided by sample_count
-    RepeatCounts repeats;      // of the earlier times
+    RerenderCounts rerenders;  // of the earlier times
     Progress progress;         // over all times
     bool is_estimated;         // whether the render's time was estimated
 } Shutter;

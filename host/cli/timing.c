@@ -63,10 +63,10 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
     for (size_t i = 0; i < count && i < SHOWN_MAX; i++) {
         const LaunchTime *time = &launches[i].time;
-        const char *doubt = launch_time_doubt(time);
-        if (doubt)
+        const char *clock_fault = launch_clock_fault(time);
+        if (clock_fault)
             fprintf(stderr, "    %-9s %9.3f ms  by the host's clock: %s\n", launches[i].name,
-                    1e3 * time->host_seconds, doubt);
+                    1e3 * time->host_seconds, clock_fault);
         else
             fprintf(stderr, "    %-9s %9.3f ms  host %.3f ms\n", launches[i].name, 1e3 * time->event_seconds,
                     1e3 * time->host_seconds);
@@ -122,13 +122,13 @@ static void pilot_print(const Pilot *pilot)
     }
 }
 
-// Prints how much of the image `certified` re-rendered in double, and how much remained undecided.
-static void repeats_print(RepeatCounts counts, const RenderSettings *settings)
+// Prints how much of the image `certified` re-rendered in double, and how much remained uncertified.
+static void rerenders_print(RerenderCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    fprintf(stderr, "certified: %llu sample%s re-rendered in double, %llu undecided\n",
-            (unsigned long long)counts.repeated, text_plural(counts.repeated),
-            (unsigned long long)counts.undecided);
+    fprintf(stderr, "certified: %llu sample%s re-rendered in double, %llu uncertified\n",
+            (unsigned long long)counts.rerendered, text_plural(counts.rerendered),
+            (unsigned long long)counts.uncertified);
 }
 
 static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,
@@ -137,7 +137,7 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
     fprintf(stderr, "%ux%u, %u %s per pixel, precision %s\n", settings->region_width, settings->region_height,
             settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
             precision_names[settings->precision]);
-    repeats_print(host->repeats, settings);
+    rerenders_print(host->rerenders, settings);
     line_print("parse", host->parse_seconds, "");
     if (host->pilot) pilot_print(host->pilot);
     for (size_t i = 0; i < count; i++) {
@@ -173,7 +173,7 @@ static void launches_json(Json *json, const char *key, const RenderReport *repor
             json_none(json, "event_ms");
         json_number(json, "host_ms", 1e3 * time->host_seconds);
         command_json(json, report, time);
-        if (!time->trusted) json_text(json, "doubt", launch_time_doubt(time));
+        if (!time->trusted) json_text(json, "doubt", launch_clock_fault(time));
         json_end(json);
     }
     json_end(json);
@@ -274,8 +274,8 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     json_int64(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     if (settings->precision == PRECISION_CERTIFIED) {
-        json_int64(json, "repeated_samples", (int64_t)host->repeats.repeated);
-        json_int64(json, "undecided_samples", (int64_t)host->repeats.undecided);
+        json_int64(json, "repeated_samples", (int64_t)host->rerenders.rerendered);
+        json_int64(json, "undecided_samples", (int64_t)host->rerenders.uncertified);
     }
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);

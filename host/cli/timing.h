@@ -20,10 +20,10 @@ typedef struct {
     double frame;    // NAN without --frames
     bool is_several; // a JSON report is one line of several
     double parse_seconds, encode_seconds;
-    const Pilot *pilot;    // chose the precision, or NULL
-    double render_seconds; // from the first band to the last, builds included
-    RepeatCounts repeats;  // only at `certified`
-    Stage *stage;          // keeps its spans; NULL unless they are wanted
+    const Pilot *pilot;       // chose the precision, or NULL
+    double render_seconds;    // from the first band to the last, builds included
+    RerenderCounts rerenders; // only at `certified`
+    Stage *stage;             // keeps its spans; NULL unless they are wanted
 } HostTimes;
 
 // Prints the times of all renderers of the image. `ranks`, which rendered parts of it, may be NULL. Text goes

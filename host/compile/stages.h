@@ -66,7 +66,7 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings);
 Bounds contact_find(const CompiledScene *compiled);
 
 // certified_range.c: whether no error bound of `certified` underflows or overflows, by the sizes of the
-// primitives and their distances from the eye. Otherwise every pixel is undecided.
+// primitives and their distances from the eye. Otherwise every pixel is uncertified.
 bool bounds_hold(const CompiledScene *compiled, const CompileSettings *settings);
 
 // header.c: FLAT_HEADER.

@@ -34,11 +34,11 @@ static bool clock_drifts(BenchTimes *times, const LaunchTime *launch)
 
 void bench_add_launch(BenchTimes *times, const LaunchTime *launch)
 {
-    if (!times->doubt) {
+    if (!times->clock_fault) {
         if (!launch->trusted)
-            times->doubt = launch_time_doubt(launch);
+            times->clock_fault = launch_clock_fault(launch);
         else if (clock_drifts(times, launch))
-            times->doubt = "the device's clock drifts from the host's by more than 1 %";
+            times->clock_fault = "the device's clock drifts from the host's by more than 1 %";
     }
     times->run_event += launch->event_seconds;
     times->run_host += launch->host_seconds;
@@ -61,14 +61,14 @@ void bench_times_free(BenchTimes *times)
     series_free(&times->host);
 }
 
-const char *bench_doubt(const BenchTimes *times)
+const char *bench_clock_fault(const BenchTimes *times)
 {
-    return times->doubt;
+    return times->clock_fault;
 }
 
 Summary bench_kernel(const BenchTimes *times)
 {
-    return series_summarize(bench_doubt(times) ? &times->host : &times->event);
+    return series_summarize(bench_clock_fault(times) ? &times->host : &times->event);
 }
 
 static bool is_narrow(const Summary *seconds)
@@ -87,7 +87,7 @@ static const double drift_tolerance = 1.05;
 
 Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count)
 {
-    const Series *all = is_cpu ? &times->processor : bench_doubt(times) ? &times->host : &times->event;
+    const Series *all = is_cpu ? &times->processor : bench_clock_fault(times) ? &times->host : &times->event;
     return comparison_of_ends(all, row_count, drift_tolerance);
 }
 

@@ -50,7 +50,7 @@ static RatioInterval median_interval(const Series *values, double error)
     return interval;
 }
 
-static Comparison comparison_judge(double log_ratio, RatioInterval interval, double tolerance)
+static Comparison comparison_classify(double log_ratio, RatioInterval interval, double tolerance)
 {
     Comparison comparison = {.ratio = exp(log_ratio), .low = exp(interval.low), .high = exp(interval.high)};
     if (comparison.low >= 1 / tolerance && comparison.high <= tolerance)
@@ -84,8 +84,8 @@ Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, siz
                                double tolerance)
 {
     if (earlier.verdict != VERDICT_UNDECIDED) return earlier;
-    return comparison_judge(series_summarize(log_ratios).median,
-                            median_interval(log_ratios, look_error(look, row_count)), tolerance);
+    return comparison_classify(series_summarize(log_ratios).median,
+                               median_interval(log_ratios, look_error(look, row_count)), tolerance);
 }
 
 double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds)
@@ -127,7 +127,7 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
     const RatioInterval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
     const double log_ratio = series_summarize(&blocks).median;
     series_free(&blocks);
-    return comparison_judge(log_ratio, interval, tolerance);
+    return comparison_classify(log_ratio, interval, tolerance);
 }
 
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance)
@@ -181,7 +181,7 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
         series_free(&new_blocks);
         series_free(&old_blocks);
     }
-    return comparison_judge(log_ratio, interval_widen(covering), tolerance);
+    return comparison_classify(log_ratio, interval_widen(covering), tolerance);
 }
 
 Verdict verdict_of_row(Verdict frame, Verdict processor)

@@ -156,7 +156,7 @@ typedef struct {
 LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
 
 // Returns why the event's times are not trusted, or NULL if they are.
-const char *launch_time_doubt(const LaunchTime *time);
+const char *launch_clock_fault(const LaunchTime *time);
 
 // Halves the longest side of a work-group, the last among equals, until it has at most `largest` work-items
 // and no side exceeds its own limit.

@@ -18,7 +18,7 @@ LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, 
     return time;
 }
 
-const char *launch_time_doubt(const LaunchTime *time)
+const char *launch_clock_fault(const LaunchTime *time)
 {
     if (time->trusted) return NULL;
     if (time->fault) return time->fault;

@@ -54,7 +54,7 @@ static size_t words_of_items(const size_t items[2], TileShape item)
     return (items[0] * items[1] * item.width * item.height + 31) / 32;
 }
 
-size_t film_doubt_words(const Renderer *renderer, const Film *film)
+size_t film_flag_words(const Renderer *renderer, const Film *film)
 {
     const TileShape item = item_shape(renderer->report.lanes);
     const size_t items[] = {divide_up(film->width, item.width), divide_up(film->height, item.height)};
@@ -90,19 +90,19 @@ void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, 
     buffers->film = spare_buffer_acquire(renderer, band_film_size(&film, aovs, buffers));
     buffers->ray_counts = spare_buffer_acquire(renderer, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = renderer->pass != PASS_ALL;
-    const size_t words = is_list            ? 4 * film_pixel_count(&film)
-                         : renderer->repeat ? film_doubt_words(renderer, &film)
-                                            : 0;
-    buffers->doubts = spare_buffer_acquire(renderer, words * sizeof(uint32_t));
-    buffers->center_doubts = spare_buffer_acquire(renderer, is_list ? 0 : words * sizeof(uint32_t));
+    const size_t words = is_list               ? 4 * film_pixel_count(&film)
+                         : renderer->next_pass ? film_flag_words(renderer, &film)
+                                               : 0;
+    buffers->flags = spare_buffer_acquire(renderer, words * sizeof(uint32_t));
+    buffers->center_flags = spare_buffer_acquire(renderer, is_list ? 0 : words * sizeof(uint32_t));
 }
 
 void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
 {
     spare_buffer_release(renderer, buffers->film);
     spare_buffer_release(renderer, buffers->ray_counts);
-    spare_buffer_release(renderer, buffers->doubts);
-    spare_buffer_release(renderer, buffers->center_doubts);
+    spare_buffer_release(renderer, buffers->flags);
+    spare_buffer_release(renderer, buffers->center_flags);
     *buffers = (BandBuffers){0};
 }
 
@@ -208,12 +208,12 @@ static bool place_launch(Renderer *renderer, KernelType type, const Place *place
 }
 
 // Clears the flags of a band, which kernels only set.
-static void doubts_clear(Renderer *renderer, cl_mem doubts, const Place *place)
+static void flags_clear(Renderer *renderer, cl_mem flags, const Place *place)
 {
-    if (!renderer->repeat || renderer->pass != PASS_ALL) return;
+    if (!renderer->next_pass || renderer->pass != PASS_ALL) return;
     const size_t word_count = words_of_items(place->items, place->item);
     uint32_t *words = memory_allocate_zeroed(word_count, sizeof *words);
-    buffer_write(renderer->compute, doubts, word_count * sizeof *words, words);
+    buffer_write(renderer->compute, flags, word_count * sizeof *words, words);
     free(words);
 }
 
@@ -254,16 +254,16 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof last, &last);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 5, buffers->ray_counts);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 7, buffers->doubts);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 7, buffers->flags);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 8, buffers->band_film);
     if (first == renderer->settings.first_sample) {
-        doubts_clear(renderer, buffers->doubts, place);
+        flags_clear(renderer, buffers->flags, place);
         if (first > 0) sums_clear(renderer, buffers, place);
     }
     if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
-    const bool go_on = place_launch(renderer, KERNEL_RENDER, place, last - first);
+    const bool continues = place_launch(renderer, KERNEL_RENDER, place, last - first);
     if (renderer->settings.counting) ray_counts_add(renderer, buffers);
-    return go_on;
+    return continues;
 }
 
 bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, unsigned aovs,
@@ -280,13 +280,13 @@ bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, 
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof offsets, &offsets);
     const bool is_list = renderer->pass != PASS_ALL;
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3,
-                  is_list ? buffers->doubts : buffers->center_doubts);
+                  is_list ? buffers->flags : buffers->center_flags);
     const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
     if (type == KERNEL_AOV)
         kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
     if (type == KERNEL_COVERAGE)
         kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, renderer->sample_offsets);
-    doubts_clear(renderer, buffers->center_doubts, place);
+    flags_clear(renderer, buffers->center_flags, place);
     pace_begin_band(renderer_pace(renderer, type));
     return place_launch(renderer, type, place, type == KERNEL_COVERAGE ? renderer->settings.sample_count : 1);
 }

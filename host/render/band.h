@@ -12,10 +12,10 @@ typedef struct {
     cl_mem ray_counts;
     // At `certified`, a bit for each pixel, tile by tile, set where its color is uncertain. In a list, first
     // each pixel's x, y and index in the band, then each pixel's number of uncertain samples.
-    cl_mem doubts;
-    cl_mem center_doubts; // the same bits for the AOVs' rays
-    cl_mem band_film;     // in a list, where its colors are to go, or NULL
-    RepeatCounts repeats; // since the band's last delivery
+    cl_mem flags;
+    cl_mem center_flags;      // the same bits for the AOVs' rays
+    cl_mem band_film;         // in a list, where its colors are to go, or NULL
+    RerenderCounts rerenders; // since the band's last delivery
 } BandBuffers;
 
 // Returns the size of the buffer for a film's color and the layers that the kernels of these AOVs fill.
@@ -49,8 +49,8 @@ Place band_place(const Renderer *renderer, BandRows rows);
 // the first step. Returns false after the last part.
 bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
 uint64_t place_pixels(const Place *place);
-// Returns the number of words of a band's doubts.
-size_t film_doubt_words(const Renderer *renderer, const Film *film);
+// Returns the number of words of a band's flags.
+size_t film_flag_words(const Renderer *renderer, const Film *film);
 // Returns the place of a list's first `count` pixels.
 Place list_place(const Renderer *renderer, uint32_t count);
 

@@ -4,7 +4,7 @@
 #include "host/base/clock.h"
 #include "host/base/memory.h"
 #include "host/render/pace.h"
-#include "host/render/repeat.h"
+#include "host/render/rerender.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -51,8 +51,8 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
                          const Delivery *delivery)
 {
     Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
-    band.repeats = buffers->repeats;
-    buffers->repeats = (RepeatCounts){0};
+    band.rerenders = buffers->rerenders;
+    buffers->rerenders = (RerenderCounts){0};
     void *mapped[LAYER_COUNT] = {NULL};
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         size_t size = film_layer_size(&band, layer);
@@ -61,12 +61,12 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
             band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
     }
-    bool go_on = compute_ok(renderer->compute) && deliver(delivery, &band);
+    bool continues = compute_ok(renderer->compute) && deliver(delivery, &band);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
         renderer_unmap(renderer, buffers->film, mapped[layer]);
     }
-    return go_on;
+    return continues;
 }
 
 // Returns the number of rows that keeps the device busy.
@@ -101,7 +101,7 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     const size_t step = group_shape(renderer).height;
     rows = rows < step ? step : rows - rows % step;
     // the film fits one buffer, even where all of its pixels are re-rendered in double precision
-    for (const Renderer *pass = renderer; pass; pass = pass->repeat) {
+    for (const Renderer *pass = renderer; pass; pass = pass->next_pass) {
         const uint64_t largest = pass->compute->device->largest_buffer_bytes,
                        fitting = largest / (2 * band_film_size(&row, aovs, NULL));
         if (largest > 0 && rows > fitting)
@@ -122,17 +122,17 @@ static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows,
 {
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
     const Place place = band_place(renderer, rows);
-    bool go_on = true;
+    bool continues = true;
     pace_begin_band(pace);
-    if (first == renderer->settings.first_sample) band_clear_doubts(renderer, buffers, rows);
-    while (go_on && first < end) {
+    if (first == renderer->settings.first_sample) band_clear_flags(renderer, buffers, rows);
+    while (continues && first < end) {
         const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
-        go_on = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(delivery);
+        continues = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(delivery);
         first += samples;
     }
-    if (go_on && renderer->repeat && end == samples_end(&renderer->settings))
-        go_on = band_repeat(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
-    return go_on && compute_ok(renderer->compute);
+    if (continues && renderer->next_pass && end == samples_end(&renderer->settings))
+        continues = band_rerender(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
+    return continues && compute_ok(renderer->compute);
 }
 
 // Traces rays for the AOVs. Returns false if the device failed or the render is stopped.
@@ -146,7 +146,8 @@ static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned ao
     for (size_t i = 0; i < COUNT_OF(fills); i++) {
         if (!(aovs & fills[i].layers)) continue;
         if (!band_fill(renderer, fills[i].type, buffers, aovs, &place)) return false;
-        if (renderer->repeat && !band_repeat(renderer, fills[i].type, fills[i].layers, buffers, aovs, rows))
+        if (renderer->next_pass &&
+            !band_rerender(renderer, fills[i].type, fills[i].layers, buffers, aovs, rows))
             return false;
     }
     return true;
@@ -164,19 +165,19 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
     pace_begin_band(pace); // the last render's band may belong to another scene or size
-    bool go_on = compute_ok(compute);
-    while (go_on) {
+    bool continues = compute_ok(compute);
+    while (continues) {
         uint32_t wanted = band_rows(renderer, pace, end - settings->first_sample, buffers.rows);
         BandRows rows = queue->take(queue->context, wanted, step);
         if (rows.row_count == 0) break;
         const double start = clock_seconds();
-        go_on = band_sample(renderer, &buffers, rows, settings->first_sample, end, &delivery) &&
-                band_fill_aovs(renderer, &buffers, aovs, rows) &&
-                band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
+        continues = band_sample(renderer, &buffers, rows, settings->first_sample, end, &delivery) &&
+                    band_fill_aovs(renderer, &buffers, aovs, rows) &&
+                    band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
         array_push(renderer->report.bands, ((HostSpan){"band", start, clock_seconds()}));
     }
     band_buffers_close(&buffers, renderer);
-    return go_on && compute_ok(compute);
+    return continues && compute_ok(compute);
 }
 
 typedef struct {
@@ -196,29 +197,29 @@ static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Deli
     pace_begin_band(pace);
     const uint32_t height = renderer->settings.region_height;
     const uint32_t most = rows_max(renderer, aovs);
-    bool go_on = compute_ok(renderer->compute);
+    bool continues = compute_ok(renderer->compute);
     delivery->samples = 1;
-    for (uint32_t row = 0; go_on && row < height;) {
+    for (uint32_t row = 0; continues && row < height;) {
         uint32_t left = height - row;
         PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
         band_buffers_open(&band.buffers, renderer, aovs, film_of_rows(renderer, 0, band.rows.row_count));
         array_push(*bands, band);
-        go_on = band_sample(renderer, &band.buffers, band.rows, 0, 1, delivery) &&
-                band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);
+        continues = band_sample(renderer, &band.buffers, band.rows, 0, 1, delivery) &&
+                    band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);
         row += band.rows.row_count;
     }
-    return go_on;
+    return continues;
 }
 
 static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, const Delivery *delivery)
 {
-    bool go_on = true;
-    for (size_t i = 0; go_on && i < bands->count; i++) {
+    bool continues = true;
+    for (size_t i = 0; continues && i < bands->count; i++) {
         PassBand *band = &bands->items[i];
-        go_on = band_fill_aovs(renderer, &band->buffers, aovs, band->rows) &&
-                band_deliver(renderer, &band->buffers, aovs, band->rows, delivery);
+        continues = band_fill_aovs(renderer, &band->buffers, aovs, band->rows) &&
+                    band_deliver(renderer, &band->buffers, aovs, band->rows, delivery);
     }
-    return go_on;
+    return continues;
 }
 
 bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void *context)
@@ -227,24 +228,25 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
     Delivery delivery = {.pass_sink = sink, .context = context};
     PassBands bands = {0};
     double start = clock_seconds(), seconds_of_sample;
-    bool go_on = first_pass(renderer, &bands, aovs, &delivery);
+    bool continues = first_pass(renderer, &bands, aovs, &delivery);
     seconds_of_sample = clock_seconds() - start;
-    if (go_on && aovs) go_on = aov_pass(renderer, &bands, aovs, &delivery);
-    while (go_on && delivery.samples < count) {
+    if (continues && aovs) continues = aov_pass(renderer, &bands, aovs, &delivery);
+    while (continues && delivery.samples < count) {
         uint32_t first = delivery.samples;
         delivery.samples += (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
         start = clock_seconds();
-        for (size_t i = 0; go_on && i < bands.count; i++) {
+        for (size_t i = 0; continues && i < bands.count; i++) {
             PassBand *band = &bands.items[i];
-            go_on = band_sample(renderer, &band->buffers, band->rows, first, delivery.samples, &delivery) &&
-                    band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);
+            continues =
+                band_sample(renderer, &band->buffers, band->rows, first, delivery.samples, &delivery) &&
+                band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);
         }
         seconds_of_sample = (clock_seconds() - start) / (delivery.samples - first);
     }
     for (size_t i = 0; i < bands.count; i++)
         band_buffers_close(&bands.items[i].buffers, renderer);
     free(bands.items);
-    return go_on && compute_ok(renderer->compute);
+    return continues && compute_ok(renderer->compute);
 }
 
 static bool film_take_band(void *film, const Film *band, double fraction_done)

@@ -41,7 +41,7 @@ FilmHeader film_header(const Film *film)
                          .light_count = film->light_count,
                          .real_size = (uint32_t)film->real_size,
                          .is_double = film->is_double,
-                         .repeats = film->repeats};
+                         .rerenders = film->rerenders};
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (film->layers[layer]) header.layers |= UINT64_C(1) << layer;
     return header;
@@ -55,7 +55,7 @@ static Film film_without_layers(const FilmHeader *header)
                   .first_row = header->first_row,
                   .is_double = header->is_double,
                   .real_size = header->real_size,
-                  .repeats = header->repeats};
+                  .rerenders = header->rerenders};
 }
 
 bool film_header_fits(const FilmHeader *band, const FilmHeader *image)
@@ -63,7 +63,7 @@ bool film_header_fits(const FilmHeader *band, const FilmHeader *image)
     FilmHeader expected = *image;
     expected.first_row = band->first_row;
     expected.row_count = band->row_count;
-    expected.repeats = band->repeats;
+    expected.rerenders = band->rerenders;
     return memcmp(band, &expected, sizeof expected) == 0 && band->row_count > 0 &&
            band->row_count <= image->row_count && band->first_row <= image->row_count - band->row_count;
 }
@@ -115,7 +115,7 @@ void film_free(Film *film)
 
 void film_copy_band(Film *film, const Film *band)
 {
-    film->repeats = repeat_counts_add(film->repeats, band->repeats);
+    film->rerenders = rerender_counts_add(film->rerenders, band->rerenders);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (!film->layers[layer] || !band->layers[layer]) continue;
         size_t row_size = film_layer_size(film, layer) / film->height;

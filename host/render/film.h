@@ -34,17 +34,17 @@ extern const LayerType layer_types[LAYER_COUNT];
 // At `certified`, the number of samples and of AOVs' rays whose pixels were re-rendered in double precision,
 // and the number of these that remained uncertified.
 typedef struct {
-    uint64_t repeated, undecided;
-} RepeatCounts;
+    uint64_t rerendered, uncertified;
+} RerenderCounts;
 
-static inline RepeatCounts repeat_counts_add(RepeatCounts a, RepeatCounts b)
+static inline RerenderCounts rerender_counts_add(RerenderCounts a, RerenderCounts b)
 {
-    return (RepeatCounts){a.repeated + b.repeated, a.undecided + b.undecided};
+    return (RerenderCounts){a.rerendered + b.rerendered, a.uncertified + b.uncertified};
 }
 
 // Values of the AOV `doubt`: the pixel was flagged and re-rendered in double precision; it remained
 // uncertified.
-enum { DOUBT_REPEATED = 1, DOUBT_UNDECIDED };
+enum { FLAG_RERENDERED = 1, FLAG_UNCERTIFIED };
 
 // Every pixel of an image's region, or of a band of the region's rows, row by row from the top left. Layers
 // that were not requested are NULL.
@@ -59,7 +59,7 @@ typedef struct {
     uint32_t first_row; // of the band, counted in the region
     bool is_double;     // whether it was computed in double
     size_t real_size;   // sizeof(float) in a band that was computed in float, else sizeof(double)
-    RepeatCounts repeats;
+    RerenderCounts rerenders;
     union {
         void *layers[LAYER_COUNT];
         struct {
@@ -77,7 +77,7 @@ typedef struct {
 typedef struct {
     uint32_t width, first_row, row_count, light_count, real_size, is_double;
     uint64_t layers; // the set of the film's layers
-    RepeatCounts repeats;
+    RerenderCounts rerenders;
 } FilmHeader;
 
 static inline size_t film_pixel_count(const Film *film)

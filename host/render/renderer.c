@@ -242,8 +242,8 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
         arithmetic_passport(compute, renderer->settings.precision, report->lanes, settings->no_cache);
     if (earlier) renderer_kernels_take(renderer, earlier);
     if (renderer_certifies(renderer))
-        renderer->repeat =
-            prepare(compute_in_double(compute), settings, pass + 1, earlier ? earlier->repeat : NULL);
+        renderer->next_pass =
+            prepare(compute_in_double(compute), settings, pass + 1, earlier ? earlier->next_pass : NULL);
     return renderer;
 }
 
@@ -263,7 +263,7 @@ Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, 
 static Renderer *of_pass(Renderer *renderer, PixelPass pass)
 {
     while (renderer && renderer->pass != pass)
-        renderer = renderer->repeat;
+        renderer = renderer->next_pass;
     return renderer;
 }
 
@@ -417,21 +417,21 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
     arrays_upload(&renderer, 1, &renderer->compiled);
     scene_changed(renderer); // another eye may need another feature, or a deeper stack
     return compute_ok(renderer->compute) &&
-           (!renderer->repeat || renderer_move(renderer->repeat, scene, settings, messages)) &&
+           (!renderer->next_pass || renderer_move(renderer->next_pass, scene, settings, messages)) &&
            compute_check_reference(renderer->compute);
 }
 
 uint64_t renderer_scene_hash(const Renderer *renderer)
 {
     uint64_t hash = HASH_START;
-    for (; renderer; renderer = renderer->repeat)
+    for (; renderer; renderer = renderer->next_pass)
         hash = hash_bytes(hash, &renderer->report.scene_hash, sizeof renderer->report.scene_hash);
     return hash;
 }
 
 void renderer_release_scene(Renderer *renderer)
 {
-    for (; renderer; renderer = renderer->repeat) {
+    for (; renderer; renderer = renderer->next_pass) {
         for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
             buffer_release(renderer->buffers[i]);
             renderer->buffers[i] = NULL;
@@ -448,7 +448,7 @@ void renderer_close(Renderer *renderer)
 {
     if (!renderer) return;
     renderer_release_scene(renderer);
-    renderer_close(renderer->repeat);
+    renderer_close(renderer->next_pass);
     renderer_kernels_close(renderer);
     free(renderer->report.launches.items);
     free(renderer->report.reads.items);

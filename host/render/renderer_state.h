@@ -61,7 +61,7 @@ struct Renderer {
     // The variant in use and the one before it. Near a shape a moving camera alternates between two variants.
     KernelVariant variant, other_variant;
     Pace paces[KERNEL_COUNT]; // for the variant in use
-    Renderer *repeat;         // renders the next pass; NULL in the last
+    Renderer *next_pass;      // NULL in the last
 };
 
 // Returns the index behind the last sample that is rendered.

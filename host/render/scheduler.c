@@ -217,11 +217,11 @@ static void band_pass(Scheduler *scheduler, const Film *band)
     const uint32_t end = band->first_row + band->height;
     scheduler->is_delivering = true;
     pthread_mutex_unlock(&scheduler->mutex);
-    bool go_on = scheduler->settings.sink(scheduler->settings.context, band,
-                                          (double)end / scheduler->settings.row_count);
+    bool continues = scheduler->settings.sink(scheduler->settings.context, band,
+                                              (double)end / scheduler->settings.row_count);
     pthread_mutex_lock(&scheduler->mutex);
     scheduler->is_delivering = false;
-    if (go_on)
+    if (continues)
         scheduler->delivered_rows = end;
     else
         scheduler->has_ended = true;
@@ -326,10 +326,10 @@ bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band)
         band_keep(scheduler, band);
     scheduler->workers[worker].rows = (BandRows){0};
     waiting_pass(scheduler);
-    bool go_on = !scheduler->has_ended;
+    bool continues = !scheduler->has_ended;
     pthread_cond_broadcast(&scheduler->changed);
     pthread_mutex_unlock(&scheduler->mutex);
-    return go_on;
+    return continues;
 }
 
 void scheduler_drop(Scheduler *scheduler, size_t worker)

@@ -78,7 +78,7 @@ static void hits_read(void *context, size_t begin, size_t end)
         vector_at(scalars, index + RESULT_POSITION, is_double, hit->position);
         for (size_t axis = 0; axis < 3; axis++)
             hit->position[axis] *= unit;
-        const bool is_certain = certifies && scalar_at(scalars, index + RESULT_DOUBT, is_double) == 0;
+        const bool is_certain = certifies && scalar_at(scalars, index + RESULT_UNCERTAIN, is_double) == 0;
         hit->certainty = is_certain ? certainty : TRACE_UNCERTAIN;
         if (batch->type == KERNEL_TRACE) bounces_read(hit, scalars, index, is_double, unit);
     }
@@ -176,7 +176,7 @@ static bool rays_trace(Renderer *renderer, KernelType type, const TraceRay *rays
                        TraceHit *hits);
 
 // Re-traces the rays whose hits are uncertain.
-static bool uncertain_trace(Renderer *repeat, KernelType type, const TraceRay *rays, size_t ray_count,
+static bool uncertain_trace(Renderer *next_pass, KernelType type, const TraceRay *rays, size_t ray_count,
                             TraceHit *hits)
 {
     size_t count = 0;
@@ -187,7 +187,7 @@ static bool uncertain_trace(Renderer *repeat, KernelType type, const TraceRay *r
     TraceHit *found = memory_allocate(count, sizeof *found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) chosen[k++] = rays[i];
-    const bool is_done = rays_trace(repeat, type, chosen, count, found);
+    const bool is_done = rays_trace(next_pass, type, chosen, count, found);
     for (size_t i = 0, k = 0; i < ray_count; i++)
         if (hits[i].certainty == TRACE_UNCERTAIN) hits[i] = found[k++];
     free(chosen);
@@ -212,9 +212,9 @@ static bool rays_trace(Renderer *renderer, KernelType type, const TraceRay *rays
                        TraceHit *hits)
 {
     if (!pass_trace(renderer, type, rays, ray_count, hits)) return false;
-    if (!renderer->repeat) return true;
+    if (!renderer->next_pass) return true;
     ends_apply(rays, ray_count, hits);
-    return uncertain_trace(renderer->repeat, type, rays, ray_count, hits) &&
+    return uncertain_trace(renderer->next_pass, type, rays, ray_count, hits) &&
            compute_check_reference(renderer->compute);
 }
 

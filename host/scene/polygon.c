@@ -173,7 +173,7 @@ static bool corner_is_spike(const Ring *ring, uint32_t corner)
     return (before[axis] < point[axis]) == (after[axis] < point[axis]);
 }
 
-static void ring_judge(Ring *ring)
+static void ring_classify(Ring *ring)
 {
     uint32_t corner = ring->at;
     do {
@@ -274,14 +274,14 @@ static PolygonStatus ring_cut(Ring *ring, PolygonTriangles *triangles)
 {
     PolygonStatus status = POLYGON_CUT;
     ring_remove_spikes(ring);
-    ring_judge(ring);
+    ring_classify(ring);
     while (ring->count > 3) {
         uint32_t corner;
         if (ring_find_ear(ring, &corner)) {
             ring_clip(ring, corner, triangles);
         } else if (!ring->touching) {
             ring->touching = true;
-            ring_judge(ring);
+            ring_classify(ring);
         } else if (ring_find_spike(ring, &corner)) {
             ring_remove(ring, corner);
         } else {

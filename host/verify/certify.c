@@ -130,9 +130,9 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         const uint32_t *place = sample->places[i];
         const size_t pixel = (size_t)place[1] * film->width + place[0];
         const Fault fault = fault_of(sample, i, film, pixel);
-        const bool claimed = film->doubt[pixel] != DOUBT_UNDECIDED;
+        const bool claimed = film->doubt[pixel] != FLAG_UNCERTIFIED;
         if (fault && claimed) wrong_decided_add(&errors, place, expected->margin);
-        if (reference_is_undecided(expected)) {
+        if (reference_is_uncertain(expected)) {
             errors.unconfirmed += claimed;
             errors.contradicted += claimed && fault;
             continue;
@@ -150,7 +150,7 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
 
 enum { TRIES = 16 };
 
-typedef enum { LOOSE, CLOSE, WITNESSED } Doubt;
+typedef enum { LOOSE, CLOSE, WITNESSED } Uncertainty;
 
 typedef struct {
     const ReferenceScene *scene;
@@ -158,7 +158,7 @@ typedef struct {
     const size_t *pixels;
     ReferencePath path;
     bool (*stop)(void);
-    Doubt *doubts;
+    Uncertainty *uncertainties;
 } Examination;
 
 // Whether two answers differ in more than rounding.
@@ -168,7 +168,7 @@ static bool is_other(const ReferencePixel *a, const ReferencePixel *b)
     return a->object != b->object || a->path != b->path || color_error(color, &b->color) > 1e-6;
 }
 
-static void doubts_examine(void *context, size_t begin, size_t end)
+static void pixels_examine(void *context, size_t begin, size_t end)
 {
     const Examination *examination = context;
     const Scene *scene = &examination->scene->scene;
@@ -183,39 +183,39 @@ static void doubts_examine(void *context, size_t begin, size_t end)
                                  (unsigned)(pixel / film->width));
         ReferencePath path = examination->path;
         const ReferencePixel exact = reference_pixel(examination->scene, &ray, &path, shadows);
-        examination->doubts[i] = exact.margin < 0x1p-49 ? CLOSE : LOOSE;
+        examination->uncertainties[i] = exact.margin < 0x1p-49 ? CLOSE : LOOSE;
         path.blur = 0x1p-50;
-        for (path.seed = 0; path.seed < TRIES && examination->doubts[i] != WITNESSED; path.seed++) {
+        for (path.seed = 0; path.seed < TRIES && examination->uncertainties[i] != WITNESSED; path.seed++) {
             const ReferencePixel other = reference_pixel(examination->scene, &ray, &path, shadows + lights);
             if (is_other(&exact, &other) ||
                 (exact.object != UINT32_MAX && memcmp(shadows, shadows + lights, lights) != 0))
-                examination->doubts[i] = WITNESSED;
+                examination->uncertainties[i] = WITNESSED;
         }
     }
     free(shadows);
 }
 
-CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, ReferencePath path,
-                             bool (*stop)(void))
+CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, size_t most, ReferencePath path,
+                                       bool (*stop)(void))
 {
-    CertifyDoubts found = {0};
+    CertifyUncertified found = {0};
     for (size_t i = 0; i < film_pixel_count(film); i++)
-        found.count += film->doubt[i] == DOUBT_UNDECIDED;
+        found.count += film->doubt[i] == FLAG_UNCERTIFIED;
     const size_t step = found.count / most + 1;
     size_t *pixels = memory_allocate(found.count / step + 1, sizeof *pixels), chosen = 0;
     for (size_t i = 0, seen = 0; i < film_pixel_count(film); i++)
-        if (film->doubt[i] == DOUBT_UNDECIDED && seen++ % step == 0) pixels[chosen++] = i;
-    Doubt *doubts = memory_allocate(chosen + 1, sizeof *doubts);
+        if (film->doubt[i] == FLAG_UNCERTIFIED && seen++ % step == 0) pixels[chosen++] = i;
+    Uncertainty *uncertainties = memory_allocate(chosen + 1, sizeof *uncertainties);
     ReferenceScene reference = reference_scene_open(scene);
-    Examination examination = {&reference, film, pixels, path, stop, doubts};
-    parallel_run(chosen, 1, doubts_examine, &examination);
+    Examination examination = {&reference, film, pixels, path, stop, uncertainties};
+    parallel_run(chosen, 1, pixels_examine, &examination);
     reference_scene_close(&reference);
     found.examined = stop && stop() ? 0 : chosen;
     for (size_t i = 0; i < found.examined; i++) {
-        found.witnessed += doubts[i] == WITNESSED;
-        found.close += doubts[i] == CLOSE;
+        found.witnessed += uncertainties[i] == WITNESSED;
+        found.close += uncertainties[i] == CLOSE;
     }
-    free(doubts);
+    free(uncertainties);
     free(pixels);
     return found;
 }

@@ -20,7 +20,7 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
                          size_t count, ReferencePath path, bool (*stop)(void));
 void certify_sample_close(CertifySample *sample);
 
-// What `certified` claims of a pixel that AOV_DOUBT does not list as undecided: the object, which lights
+// What `certified` claims of a pixel that AOV_DOUBT does not list as uncertified: the object, which lights
 // reach it and the path are those of exact arithmetic on the scene's numbers and the camera's vectors in
 // double, and the color, unless a texture is on the path, is within CERTIFIED_COLOR_ERROR of its largest
 // channel, or of 1 if that is more. So a checker's cell or a shadow that is seen in a mirror is claimed by
@@ -38,9 +38,9 @@ typedef struct {
     // Of wrong pixels: how far the exact ray is from the curve at which its answer changes, the most, in
     // parts of the distance. What single may see wrong is at most some units of roundoff from it.
     double margin;
-    // Pixels that the reference leaves undecided, and AOV_DOUBT does not; how many of these differ from it.
+    // Pixels that the reference leaves uncertain, and AOV_DOUBT does not; how many of these differ from it.
     size_t unconfirmed, contradicted;
-    // Pixels that contradict the claim: wrong or contradicted, and not undecided; and which of them has the
+    // Pixels that contradict the claim: wrong or contradicted, and not uncertified; and which of them has the
     // largest margin.
     size_t wrong_decided;
     uint32_t wrong_decided_place[2];
@@ -50,15 +50,15 @@ typedef struct {
 // `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color.
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film);
 
-// Pixels that an image at `certified` leaves undecided, and why those examined are. Witnessed: rays whose
+// Pixels that an image at `certified` leaves uncertified, and why those examined are. Witnessed: rays whose
 // starts and directions err by up to 2^-50, as double's may, give another answer in one of 16 tries. Close:
 // else a quantity that decides may be below 2^-49, in parts of the distance, as where surfaces coincide. The
 // others may be open for loose bounds alone.
 typedef struct {
     size_t count, examined, witnessed, close;
-} CertifyDoubts;
+} CertifyUncertified;
 
 // Examines at most about `most`, evenly over the image, on all processors. Nothing is examined if `stop`
 // returned true.
-CertifyDoubts certify_doubts(const Scene *scene, const Film *film, size_t most, ReferencePath path,
-                             bool (*stop)(void));
+CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, size_t most, ReferencePath path,
+                                       bool (*stop)(void));

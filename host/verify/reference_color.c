@@ -481,7 +481,7 @@ static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Col
     if (refracts) add_path(tree, &refracted, hit.object, refracted_weight, behind, bounces_left - 1);
 }
 
-bool reference_is_undecided(const ReferencePixel *pixel)
+bool reference_is_uncertain(const ReferencePixel *pixel)
 {
     return pixel->margin < 0x1p-80;
 }

@@ -41,7 +41,7 @@ typedef struct {
 } ReferencePixel;
 
 // A decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
-bool reference_is_undecided(const ReferencePixel *pixel);
+bool reference_is_uncertain(const ReferencePixel *pixel);
 
 // `shadows`: of each light, true where it does not reach the surface; undefined without one. Or NULL.
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,

@@ -61,7 +61,7 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
 static void film_fit(FrameLoop *loop, unsigned aovs)
 {
     Film *film = &loop->film;
-    film->repeats = (RepeatCounts){0}; // bands add theirs
+    film->rerenders = (RerenderCounts){0}; // bands add theirs
     const uint32_t light_count = (uint32_t)loop->scene.lights.count;
     bool fits = film->width == loop->settings.width && film->height == loop->settings.height &&
                 film->light_count == light_count;

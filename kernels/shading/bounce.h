@@ -203,12 +203,12 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
         bounce_set_chord(reflected, &chord, !surface->entering);
     }
     mask reflects = incidence->found & bounce_is_active(reflected);
-    mask doubt = reflects & !(reflected->direction_error <= BOUNCE_ERROR_MAX);
-    if (!HAS_TRIANGLES) return doubt;
+    mask uncertain = reflects & !(reflected->direction_error <= BOUNCE_ERROR_MAX);
+    if (!HAS_TRIANGLES) return uncertain;
     // the shading normal's reflection may run through the surface
     Vector by_shading = vector_reflect(ray->direction, surface->shading_normal);
     real outward = fabs(vector_dot(by_shading, surface->normal));
-    return doubt | (reflects & (outward <= error + normal_error));
+    return uncertain | (reflects & (outward <= error + normal_error));
 }
 
 // The terms of vector_refract: n d + N (s - sqrt(s^2 - k)) with s = n cos. On entering, n counts as 1 and k
@@ -218,7 +218,7 @@ typedef struct {
     real s, s_error;
     real root, least_root; // the square root, 0 in total reflection; not more than the exact one, or 1
     real squares;          // bounds s^2 and k
-    mask doubt;            // whether it is total reflection
+    mask uncertain;        // about total reflection
 } Snell;
 
 static inline Snell surface_snell(const Surface *surface, const Incidence *incidence, real angle_error)
@@ -236,7 +236,7 @@ static inline Snell surface_snell(const Surface *surface, const Incidence *incid
     real squared = real_fma(snell.s, snell.s, -k), least_squared = squared - error;
     snell.root = real_sqrt(real_max(squared, zero));
     snell.least_root = real_sqrt(lanes_select(least_squared > zero, least_squared, one));
-    snell.doubt = !(fabs(squared) > error);
+    snell.uncertain = !(fabs(squared) > error);
     return snell;
 }
 
@@ -284,16 +284,16 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
         snell.scale * incidence->turn + fabs(snell.s - snell.root) * normal_error + change * snell.s_error;
     refracted->direction_error = real_fma(error, inverse_length, computed);
     if (HAS_CHORDS) refracted_set_chord(surface, &snell, angle_error, computed, refracted);
-    mask doubt = transparent & snell.doubt;
-    doubt = doubt | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
-    if (!HAS_TRIANGLES) return doubt;
+    mask uncertain = transparent & snell.uncertain;
+    uncertain = uncertain | (refracts & !(refracted->direction_error <= BOUNCE_ERROR_MAX));
+    if (!HAS_TRIANGLES) return uncertain;
     real inward = fabs(vector_dot(refracted->direction, surface->normal));
-    return doubt | (refracts & (inward <= refracted->direction_error + normal_error));
+    return uncertain | (refracts & (inward <= refracted->direction_error + normal_error));
 }
 
 // Sets the bounds of a surface's reflected and refracted ray. Uncertain lanes are not traced further.
 static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
-                                      Bounce *refracted, mask *doubt)
+                                      Bounce *refracted, mask *uncertain)
 {
     const Color3 none = {(real)(0), (real)(0), (real)(0)};
     const Incidence incidence = surface_incidence(surface, ray);
@@ -305,10 +305,11 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     reflected->leaves_outward = surface->entering;
     refracted->leaves_outward = !surface->entering;
     refracted->direction_error = (real)(0);
-    *doubt = *doubt | reflected_set_error(surface, ray, &incidence, reflected);
-    if (HAS_TRANSMISSION) *doubt = *doubt | refracted_set_error(surface, &incidence, total, refracted);
-    reflected->weight = vector_select(*doubt, none, reflected->weight);
-    refracted->weight = vector_select(*doubt, none, refracted->weight);
+    *uncertain = *uncertain | reflected_set_error(surface, ray, &incidence, reflected);
+    if (HAS_TRANSMISSION)
+        *uncertain = *uncertain | refracted_set_error(surface, &incidence, total, refracted);
+    reflected->weight = vector_select(*uncertain, none, reflected->weight);
+    refracted->weight = vector_select(*uncertain, none, refracted->weight);
 }
 
 // Returns a part of a weight's channel, which no product rounds to 0, since paths must end only where nothing
@@ -348,12 +349,13 @@ static inline real weight_largest(Color3 weight)
 
 // Returns the weight, or none if all its channels are below `least`, and so is their part of the pixel. At
 // `certified` adds the lanes where rounding may decide.
-static inline Color3 weight_cut(Color3 weight, real least, mask *doubt)
+static inline Color3 weight_cut(Color3 weight, real least, mask *uncertain)
 {
     const Color3 none = {(real)(0), (real)(0), (real)(0)};
     real largest = weight_largest(weight);
     if (IS_CERTIFIED)
-        *doubt = *doubt | ((largest > (real)(0)) & (fabs(largest - least) <= WEIGHT_ROUNDING * least));
+        *uncertain =
+            *uncertain | ((largest > (real)(0)) & (fabs(largest - least) <= WEIGHT_ROUNDING * least));
     return vector_select(largest < least, none, weight);
 }
 

@@ -11,8 +11,8 @@ typedef struct {
     Surface surface; // if no lane hit any, only surface.object
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
     real t;          // with HAS_ABSORPTION
-    // at `certified`: lanes in doubt about any of this; a bound on the error of any channel
-    mask doubt;
+    // at `certified`: lanes uncertain about any of this; a bound on the error of any channel
+    mask uncertain;
     real color_error;
 } ShadedHit;
 
@@ -20,12 +20,12 @@ typedef struct {
 // hit one.
 static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
-    if (IS_CERTIFIED) traversal_judge(traversal);
+    if (IS_CERTIFIED) traversal_classify(traversal);
     hit->surface.object = traversal->hit.object;
     hit->color = background_color(scene, ray->direction, RAY_ACTIVE(ray) & !surface_found(&hit->surface));
     if (HAS_ABSORPTION) hit->t = traversal->hit.t;
     if (IS_CERTIFIED) {
-        hit->doubt = traversal->hit.doubt;
+        hit->uncertain = traversal->hit.uncertain;
         hit->color_error = (real)(0);
         if (HAS_SKY) {
             real error =
@@ -36,7 +36,7 @@ static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
     mask found = surface_found(&hit->surface);
     if (!lanes_any(found)) return false;
     hit->surface = visible_surface(scene, ray, &traversal->hit);
-    if (IS_CERTIFIED) hit->doubt = hit->doubt | (found & hit->surface.doubt);
+    if (IS_CERTIFIED) hit->uncertain = hit->uncertain | (found & hit->surface.uncertain);
     hit->color = vector_select(found, hit->surface.ambient, hit->color);
     return true;
 }
@@ -46,18 +46,18 @@ static inline void hit_add_light(const Scene *scene, uint index, LightVisibility
                                  ShadedHit *hit)
 {
     if (IS_CERTIFIED) {
-        traversal_judge(traversal);
+        traversal_classify(traversal);
         mask glossy = hit->surface.specular > (real)(0);
-        light_add_doubt(light, &traversal->hit);
-        mask matters = glossy | !light->facing_doubt;
-        hit->doubt = hit->doubt | (light->doubt & matters) | (light->facing_doubt & glossy);
+        light_add_uncertainty(light, &traversal->hit);
+        mask matters = glossy | !light->facing_uncertain;
+        hit->uncertain = hit->uncertain | (light->uncertain & matters) | (light->facing_uncertain & glossy);
     }
     Color3 fractions;
     if (HAS_FILTERS) fractions = vector_scale(traversal_filter(traversal), light->fraction);
     light_occlude(light, traversal_transmittance(traversal));
     if (IS_CERTIFIED)
-        hit->color_error =
-            hit->color_error + lanes_select(light->lit | light->facing_doubt, light->color_error, (real)(0));
+        hit->color_error = hit->color_error +
+                           lanes_select(light->lit | light->facing_uncertain, light->color_error, (real)(0));
     const Color3 black = {(real)(0), (real)(0), (real)(0)};
     Color3 arriving = vector_of(scene->lights[index].color);
     arriving = HAS_FILTERS ? color_multiply(arriving, fractions) : vector_scale(arriving, light->fraction);
@@ -109,7 +109,7 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
 
 // The lanes whose color may be off by more than CERTIFIED_COLOR_ERROR. The 16th left out is for the roundings
 // of the sum.
-static inline mask color_is_doubtful(Color3 color, real error)
+static inline mask color_is_uncertain(Color3 color, real error)
 {
     real largest = real_max(real_max(color.x, color.y), real_max(color.z, (real)(1)));
     return !(error <= (real)((1 - 0x1p-4f) * CERTIFIED_COLOR_ERROR) * largest);
@@ -118,12 +118,12 @@ static inline mask color_is_doubtful(Color3 color, real error)
 // Traces a ray tree depth first, reflected before refracted. *shaded, an element of an array, holds the hit
 // of the ray that is followed; with `is_shaded` at first the camera ray's, which rays_shade has traced with
 // other packets. If COMPUTE_SIGNATURE, *path is the tree's signature (types.h), which in each lane is
-// independent of the other lanes, and the color is undefined. At `certified` *doubt are the lanes with any
-// decision in doubt.
+// independent of the other lanes, and the color is undefined. At `certified` *uncertain are the lanes with
+// any uncertain decision.
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
-                                    unsigned_integer *path, mask *doubt)
+                                    unsigned_integer *path, mask *uncertain)
 {
-    *doubt = mask_none();
+    *uncertain = mask_none();
     *path = (unsigned_integer)(PATH_START);
     real color_error = (real)(0);
     const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
@@ -134,7 +134,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
     uint pending_count = 0, depth = 0;
     for (;;) {
         if (depth > 0 || !is_shaded) rays_shade(scene, rays, 1, shaded);
-        if (IS_CERTIFIED) *doubt = *doubt | (rays[0].active & shaded->doubt);
+        if (IS_CERTIFIED) *uncertain = *uncertain | (rays[0].active & shaded->uncertain);
         if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, surface_found(&shaded->surface));
         // without secondary rays the color is that of the camera ray: no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
@@ -142,7 +142,8 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
                 *path = path_signature_add(*path, rays, shaded->surface.object, mask_none(), mask_none(),
                                            mask_none());
             if (IS_CERTIFIED & !COMPUTE_SIGNATURE)
-                *doubt = *doubt | (rays[0].active & color_is_doubtful(shaded->color, shaded->color_error));
+                *uncertain =
+                    *uncertain | (rays[0].active & color_is_uncertain(shaded->color, shaded->color_error));
             return shaded->color;
         }
         mask found = surface_found(&shaded->surface);
@@ -163,11 +164,11 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
                                    &reflected, &refracted);
             if (scene->header->sample.w > 0) {
                 const real least = (real)(scene->header->sample.w);
-                reflected.weight = weight_cut(reflected.weight, least, doubt);
-                refracted.weight = weight_cut(refracted.weight, least, doubt);
+                reflected.weight = weight_cut(reflected.weight, least, uncertain);
+                refracted.weight = weight_cut(refracted.weight, least, uncertain);
             }
             if (IS_CERTIFIED)
-                bounces_set_errors(&shaded->surface, rays, total, &reflected, &refracted, doubt);
+                bounces_set_errors(&shaded->surface, rays, total, &reflected, &refracted, uncertain);
             if (HAS_ABSORPTION) {
                 reflected.medium = medium;
                 refracted.medium = medium_behind(medium, &shaded->surface);
@@ -192,7 +193,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         if (HAS_ABSORPTION) medium = next.medium;
         depth = next.depth;
     }
-    if (IS_CERTIFIED & !COMPUTE_SIGNATURE) *doubt = *doubt | color_is_doubtful(color, color_error);
+    if (IS_CERTIFIED & !COMPUTE_SIGNATURE) *uncertain = *uncertain | color_is_uncertain(color, color_error);
     return color;
 }
 

@@ -156,16 +156,16 @@ typedef struct {
     mask lit;         // lanes that it reaches: they face it and are not occluded
     Color3 reflected; // what the surface reflects of it, as a factor
     real fraction;    // of the light's color that arrives
-    // At `certified`: lanes where the shadow is in doubt, and others that may or may not face the light,
+    // At `certified`: lanes where the shadow is uncertain, and others that may or may not face the light,
     // which matters to highlights and masks of shadows alone: the rest fades to 0.
-    mask doubt, facing_doubt;
+    mask uncertain, facing_uncertain;
     real color_error; // at `certified`: of what the light adds, a bound for every channel
 } LightVisibility;
 
 // The largest error of a shadow ray's origin, in u of its length, that cull spheres allow: rays with a larger
-// one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is in doubt.
+// one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is uncertain.
 enum { SHADOW_ERROR_MAX = 1 << 9 };
-#define SHADOW_DOUBT_MAX ((real)(0x1p-6f))
+#define SHADOW_UNCERTAIN_MAX ((real)(0x1p-6f))
 // Where the facing is open by no more than this, in parts of full light, what the light adds is too faint to
 // matter.
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
@@ -221,7 +221,7 @@ static inline real light_color_error(real brightest, const Surface *surface, con
     return real_fma(real_fma(brightest, largest, shiny), strength_error + COLOR_ROUNDING, error);
 }
 
-// Sets the shadow ray's bounds, and what is in doubt before it is traced. Returns the lanes whose
+// Sets the shadow ray's bounds, and what is uncertain before it is traced. Returns the lanes whose
 // errors are too large for cull spheres.
 static inline mask light_set_errors(const Light *light, const Surface *surface, LightRay *to_light,
                                     LightVisibility *visibility)
@@ -250,12 +250,12 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
             nearest = real_max(nearest, inverse);
         }
         real relative = lanes_select(in_range, place_error * nearest, NEVER);
-        far_off = !(relative <= SHADOW_DOUBT_MAX);
+        far_off = !(relative <= SHADOW_UNCERTAIN_MAX);
         skips_culling =
             (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
         angle_error = angle_error + relative + relative;
-        // the distance d is off by at most the part r of it, 2^-6 unless that is in doubt, and 1 / (a + b d +
-        // c d^2) by less than 1 / (1 - r)^2 - 1 < 2.06 r
+        // the distance d is off by at most the part r of it, 2^-6 unless that is uncertain, and 1 / (a + b d
+        // + c d^2) by less than 1 / (1 - r)^2 - 1 < 2.06 r
         if (HAS_FADING_LIGHTS) {
             strength_error = real_fma((real)(2.06f), relative, (real)(32 * UNIT_ROUNDOFF));
             brightest = (real)(1.04f) * brightest * to_light->fading;
@@ -281,13 +281,14 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real reflected = brightest * real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
     real brightness = real_max(reflected, (real)(1));
     mask faint = facing_error * brightness <= FACING_ERROR_MAX;
-    visibility->facing_doubt = open & faint;
+    visibility->facing_uncertain = open & faint;
     // a light in front of the shading normal but behind the surface is occluded by the surface itself
     mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
     if (HAS_SMOOTH_NORMALS) behind = behind & !shadow_ray->sinks; // unless the ray is lifted beyond its rim
-    mask self_doubt = HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
-    self_doubt = self_doubt | (open & !faint);
-    if (HAS_TRANSMISSION) self_doubt = self_doubt | (behind & (surface->transmission > zero));
+    mask self_uncertain =
+        HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
+    self_uncertain = self_uncertain | (open & !faint);
+    if (HAS_TRANSMISSION) self_uncertain = self_uncertain | (behind & (surface->transmission > zero));
     if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT) {
         Vector difference = vector_subtract(vector_negate(to_light->direction), vector_of(light->direction));
         real s = (real)(0.5f) * vector_dot(difference, difference), edge = (real)(light->cone.x);
@@ -299,22 +300,22 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
             fades = mask_none();
         else // the smooth step's slope is at most 1.5
             strength_error = strength_error + real_min((real)(1.5f * light->cone.z) * s_error, (real)(1));
-        self_doubt = self_doubt | (at_edge & !fades);
-        visibility->facing_doubt = visibility->facing_doubt | (at_edge & fades);
+        self_uncertain = self_uncertain | (at_edge & !fades);
+        visibility->facing_uncertain = visibility->facing_uncertain | (at_edge & fades);
     }
     real color_error =
         light_color_error(brightest, surface, to_light, angle_error, facing_error, strength_error);
     visibility->color_error = lanes_select(turned, (real)(0), color_error);
     visibility->lit = visibility->lit & !behind;
-    visibility->doubt = self_doubt | (visibility->lit & far_off);
-    shadow_ray->active = shadow_ray->active & !visibility->doubt;
+    visibility->uncertain = self_uncertain | (visibility->lit & far_off);
+    shadow_ray->active = shadow_ray->active & !visibility->uncertain;
     return skips_culling;
 }
 
-// Lanes in which what the light does is in doubt, once the shadow ray has been traced.
-static inline void light_add_doubt(LightVisibility *visibility, const Hit *occlusion)
+// Adds the lanes whose traced shadow ray leaves the light's visibility uncertain.
+static inline void light_add_uncertainty(LightVisibility *visibility, const Hit *occlusion)
 {
-    visibility->doubt = visibility->doubt | (occlusion->doubt & visibility->lit);
+    visibility->uncertain = visibility->uncertain | (occlusion->uncertain & visibility->lit);
 }
 
 // Returns what the surface reflects of a light, as a factor, in the lanes that it reaches.
@@ -367,7 +368,7 @@ static inline LightVisibility light_visibility(const Scene *scene, const Surface
     if (IS_CERTIFIED) {
         Traversal traversal;
         ray_traverse(&traversal, scene, &shadow_ray, OCCLUSION);
-        light_add_doubt(&visibility, &traversal.hit);
+        light_add_uncertainty(&visibility, &traversal.hit);
         light_occlude(&visibility, traversal_transmittance(&traversal));
         return visibility;
     }

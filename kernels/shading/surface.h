@@ -50,7 +50,7 @@ typedef struct {
     real place_error, normal_error, geometric_error, eye_error;
     real lift_error;              // with HAS_SMOOTH_NORMALS, as in a SurfacePoint
     real line_error, start_error; // a reflected ray's origin_error and -tmin
-    mask doubt;
+    mask uncertain;
     ChordEnd chord_end; // with HAS_CHORDS
 } Surface;
 
@@ -255,7 +255,7 @@ static inline real point_normal_error(const SurfacePoint *point, real place_erro
            (real)(16 * UNIT_ROUNDOFF);
 }
 
-static inline mask floor_is_doubtful(real a, real error)
+static inline mask floor_is_uncertain(real a, real error)
 {
     return !(real_floor(a - error) == real_floor(a + error));
 }
@@ -264,7 +264,7 @@ static inline mask floor_is_doubtful(real a, real error)
 // Elsewhere they are cubes in space, looked up a 1024th of a cube behind the surface, so that a face on the
 // border between cubes has one color.
 static inline mask checker_odd(const Scene *scene, uint type, uint index, const SurfacePoint *point,
-                               const Ray *ray, scalar4 grid, real place_error, mask *doubt)
+                               const Ray *ray, scalar4 grid, real place_error, mask *uncertain)
 {
     real cells;
     if (type_has_grid(type)) {
@@ -272,7 +272,7 @@ static inline mask checker_odd(const Scene *scene, uint type, uint index, const 
         cells = real_floor(square.u) + real_floor(square.v);
         if (IS_CERTIFIED) {
             real error = grid_error(scene, type, index, point->position, place_error);
-            *doubt = floor_is_doubtful(square.u, error) | floor_is_doubtful(square.v, error);
+            *uncertain = floor_is_uncertain(square.u, error) | floor_is_uncertain(square.v, error);
         }
     } else {
         mask along = vector_dot(point->normal, ray->direction) > (real)(0);
@@ -286,8 +286,8 @@ static inline mask checker_odd(const Scene *scene, uint type, uint index, const 
                          (real)(0x1p-9f) * point_normal_error(point, place_error) +
                          (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
                                                       vector_norm1(vector_of(grid)) + (real)(1));
-            *doubt = floor_is_doubtful(cell.x, error) | floor_is_doubtful(cell.y, error) |
-                     floor_is_doubtful(cell.z, error);
+            *uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |
+                         floor_is_uncertain(cell.z, error);
         }
     }
     real halved = cells * (real)(0.5f);
@@ -305,12 +305,13 @@ static inline TextureCoordinates hit_coordinates(const Scene *scene, uint4 entry
 // type_index_material.
 static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
                                   const LaneSurfacePoints *hit, const Ray *ray, real travelled,
-                                  real place_error, mask *doubt)
+                                  real place_error, mask *uncertain)
 {
-    *doubt = mask_none();
+    *uncertain = mask_none();
     Color3 color = vector_of(material->color);
     if (HAS_CHECKERS && material->grid.w != 0) {
-        mask odd = checker_odd(scene, entry.x, entry.y, &hit->point, ray, material->grid, place_error, doubt);
+        mask odd =
+            checker_odd(scene, entry.x, entry.y, &hit->point, ray, material->grid, place_error, uncertain);
         color = vector_select(odd, vector_of(material->other_color), color);
     }
     if (HAS_IMAGES && material->texture.x > 0) {
@@ -391,7 +392,7 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     real cosine = fabs(vector_dot(point->normal, ray->direction)); // times the ray's length
     real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
     is_open = is_open | !(cosine > cosine_error * ray->length);
-    surface->doubt = surface->doubt | (surface_found(surface) & is_open);
+    surface->uncertain = surface->uncertain | (surface_found(surface) & is_open);
 }
 
 // Turns both normals to the side that the ray comes from.
@@ -448,7 +449,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
 
     if (IS_CERTIFIED) {
-        surface.doubt = hit->doubt;
+        surface.uncertain = hit->uncertain;
         if (HAS_CHORDS) surface.chord_end = chord_end_none();
     }
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
@@ -484,12 +485,12 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         Material material = scene->materials[entry.z];
         if (HAS_NORMAL_MAPS) hit_tilt_normals(scene, entry, &material, &found, ray, surface.travelled);
         surface_point_replace(&point, found.lanes, &found.point);
-        mask doubt;
+        mask uncertain;
         // stored in every surface, the zeros would cost frames 2 %
         Color3 color =
             object_color(scene, entry, &material, &found, ray, HAS_IMAGES ? surface.travelled : (real)(0),
-                         IS_CERTIFIED ? surface.place_error : (real)(0), &doubt);
-        if (IS_CERTIFIED) surface.doubt = surface.doubt | (found.lanes & (doubt | at_edge));
+                         IS_CERTIFIED ? surface.place_error : (real)(0), &uncertain);
+        if (IS_CERTIFIED) surface.uncertain = surface.uncertain | (found.lanes & (uncertain | at_edge));
         surface_set_material(&surface, scene, found.lanes, &material, color);
     }
     surface_set_point(&surface, &point, ray);
@@ -538,7 +539,7 @@ static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *s
     inward.tmax = reach + reach;
     inward.origin_error = surface->place_error * (real)(1.5f);
     Hit opaque = closest_opaque_hit(scene, &inward);
-    return transparent & (hit_found(&opaque) | opaque.doubt);
+    return transparent & (hit_found(&opaque) | opaque.uncertain);
 }
 
 // Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
@@ -574,7 +575,7 @@ static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *h
         Surface surface = surface_interaction(scene, ray, hit);
         if (!HAS_TRANSMISSION) return surface;
         if (IS_CERTIFIED) {
-            surface.doubt = surface.doubt | surface_may_touch_opaque(scene, &surface);
+            surface.uncertain = surface.uncertain | surface_may_touch_opaque(scene, &surface);
             return surface;
         }
         surface.error = real_max(surface.error, transparent_error);

@@ -15,7 +15,7 @@
 // A lane's answer: a hit, in which the exact ray's t is between low and high, and about t; no hit; or
 // uncertain, in which a hit, if any, is not before low.
 typedef struct {
-    mask found, doubt;
+    mask found, uncertain;
     real t, low, high;
 } CertainHit;
 
@@ -56,7 +56,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask per
     low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers, it may be anywhere
     perhaps = perhaps & !excluded;
     hit.found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
-    hit.doubt = perhaps & !hit.found;
+    hit.uncertain = perhaps & !hit.found;
     hit.t = (real)(0.5f) * (low + high);
     hit.low = low;
     hit.high = high;
@@ -73,8 +73,9 @@ static inline CertainHit certain_at(CertainHit hit, real t)
 static inline CertainHit certain_select(mask condition, CertainHit yes, CertainHit no)
 {
     return (CertainHit){lanes_select(condition, yes.found, no.found),
-                        lanes_select(condition, yes.doubt, no.doubt), lanes_select(condition, yes.t, no.t),
-                        lanes_select(condition, yes.low, no.low), lanes_select(condition, yes.high, no.high)};
+                        lanes_select(condition, yes.uncertain, no.uncertain),
+                        lanes_select(condition, yes.t, no.t), lanes_select(condition, yes.low, no.low),
+                        lanes_select(condition, yes.high, no.high)};
 }
 
 static inline CertainHit certain_miss(void)
@@ -91,7 +92,7 @@ static inline CertainHit certain_first(const Ray *ray, CertainHit near, real nea
 static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
 {
     hit.found = hit.found & lanes;
-    hit.doubt = hit.doubt & lanes;
+    hit.uncertain = hit.uncertain & lanes;
     return hit;
 }
 

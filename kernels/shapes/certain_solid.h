@@ -114,15 +114,15 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
         round.slope = -round.slope;
         radius = -radius;
     }
-    mask one = hits[0].found | hits[0].doubt, other = hits[1].found | hits[1].doubt;
+    mask one = hits[0].found | hits[0].uncertain, other = hits[1].found | hits[1].uncertain;
     mask swaps = other & (!one | (hits[1].low < hits[0].low));
     CertainHit first = certain_select(swaps, hits[1], hits[0]),
                second = certain_select(swaps, hits[0], hits[1]);
     mask mixes = one & other & !(second.low > first.high);
     mask at_apex = lanes & left & (fabs(radius) <= error);
     first.low = lanes_select(at_apex, ray->tmin, first.low);
-    first.doubt = first.doubt | (first.found & mixes) | at_apex;
-    first.found = first.found & !first.doubt;
+    first.uncertain = first.uncertain | (first.found & mixes) | at_apex;
+    first.found = first.found & !first.uncertain;
     return first;
 }
 

@@ -115,7 +115,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     real band = place * (radius + radius + place);
     mask within = squared > band, beyond = crosses & (squared < -band);
     hit = certain_restrict(hit, !beyond);
-    hit.doubt = hit.doubt | (hit.found & !within);
+    hit.uncertain = hit.uncertain | (hit.found & !within);
     hit.found = hit.found & within;
     return hit;
 }

@@ -382,14 +382,15 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
         mask same_place = after == before; // before the start
         after_outside = lanes_select(same_place, outside, after_outside);
         after_known = lanes_select(same_place, known, after_known);
-        mask doubt = open & !(known & after_known), crosses = open & !doubt & (outside != after_outside);
+        mask uncertain = open & !(known & after_known),
+             crosses = open & !uncertain & (outside != after_outside);
         if (lanes_any(crosses)) {
             CertainHit crossing = torus_crossing(&certain, ray, (Interval){before, after}, crosses, outside);
             hit = certain_select(crosses, crossing, hit);
         }
-        CertainHit doubtful = certain_crossing(ray, mask_none(), doubt, before, to);
-        hit = certain_select(doubt, doubtful, hit);
-        open = open & !doubt & !crosses;
+        CertainHit perhaps = certain_crossing(ray, mask_none(), uncertain, before, to);
+        hit = certain_select(uncertain, perhaps, hit);
+        open = open & !uncertain & !crosses;
         if (!lanes_any(open)) break;
         before = after;
         outside = after_outside;

@@ -457,7 +457,7 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     if (!lanes_any(lanes)) return certain_miss();
     own = HAS_SMOOTH_NORMALS ? ray_left_for_good(ray, triangle->id.x, true) : mask_none();
     CertainHit hit = triangle_certain_crossing(triangle, &edges, ray, lanes, own, signs, sizes, error);
-    if (RARELY(lanes_any(hit.doubt))) hit.doubt = hit.doubt & !triangle_is_passed(&edges, error);
+    if (RARELY(lanes_any(hit.uncertain))) hit.uncertain = hit.uncertain & !triangle_is_passed(&edges, error);
     return hit;
 }
 

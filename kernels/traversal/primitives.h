@@ -22,13 +22,13 @@ static inline void object_prefetch(const Scene *scene, uint type, uint4 id)
 }
 
 #if IS_CERTIFIED
-// Takes back the doubts of rays that leave a neighbor of a triangle, and the triangle with it.
+// Clears the uncertain lanes of rays that leave a neighbor of a triangle, and the triangle with it.
 static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ray *ray, CertainHit *hit)
 {
-    if (!lanes_any(hit->doubt & (ray->left >= (integer)(0)))) return;
+    if (!lanes_any(hit->uncertain & (ray->left >= (integer)(0)))) return;
     Triangle triangle = scene->triangles[scene->objects[id].type_index_material.y];
     TriangleNeighbors neighbors = scene->triangle_neighbors[id];
-    hit->doubt = hit->doubt & !triangle_left_behind(&triangle, &neighbors, ray, hit->doubt);
+    hit->uncertain = hit->uncertain & !triangle_left_behind(&triangle, &neighbors, ray, hit->uncertain);
 }
 #endif
 
@@ -39,9 +39,9 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
                                         Type shape)                                                          \
     {                                                                                                        \
         CertainHit hit = name##_certain_hit(&shape, ray);                                                    \
-        if (TYPE_##feature == TYPE_TRIANGLES && lanes_any(hit.doubt))                                        \
+        if (TYPE_##feature == TYPE_TRIANGLES && lanes_any(hit.uncertain))                                    \
             triangle_skip_neighbors(scene, shape.id.x, ray, &hit);                                           \
-        if (!lanes_any(hit.found | hit.doubt)) return false;                                                 \
+        if (!lanes_any(hit.found | hit.uncertain)) return false;                                             \
         traversal_record_certain(traversal, scene, &hit, shape.id.x);                                        \
         return true;                                                                                         \
     }

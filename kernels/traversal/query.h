@@ -20,7 +20,7 @@ typedef struct {
     // For OCCLUSION, of the objects hit so far; green and blue with HAS_FILTERS.
     integer optical_depth, optical_depth_green, optical_depth_blue;
     // At `certified`: the exact hit is no farther than hit.high, and none but hit.object's before `rival`.
-    // For OCCLUSION hit.doubt has the lanes with a hit in doubt.
+    // For OCCLUSION hit.uncertain has the lanes with an uncertain hit.
     real rival;
 } Traversal;
 
@@ -120,24 +120,24 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
     hit->object = lanes_select(closer, object, hit->object);
 }
 
-// As traversal_record, for a hit with bounds. Of those found the nearest is kept; all others, and those in
-// doubt, are rivals. So which lanes are in doubt, and the hits of those that are not, do not depend on the
-// order in which shapes are tested.
+// Records a hit with bounds. Keeps the nearest certain hit; every other hit becomes a rival. Therefore
+// neither the uncertain lanes nor the hits of the other lanes depend on the order in which shapes are tested.
 static inline void traversal_record_certain(Traversal *traversal, const Scene *scene, const CertainHit *found,
                                             uint id)
 {
     Hit *hit = &traversal->hit;
     if (traversal->query == OCCLUSION) {
-        hit->doubt = hit->doubt | (found->doubt & traversal->active);
+        hit->uncertain = hit->uncertain | (found->uncertain & traversal->active);
         traversal_occlude(traversal, scene, found->found & traversal->active, id);
         return;
     }
     if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(traversal, scene, id))
         return;
     integer object = (integer)((scalar_integer)id);
-    mask is_new = (found->found | found->doubt) & (hit->object != object); // it may have been tested before
+    mask is_new =
+        (found->found | found->uncertain) & (hit->object != object); // it may have been tested before
     mask closer = found->found & is_new & (found->t < hit->t);
-    // what is not kept: of the two, or of the shape in doubt
+    // what is not kept: of the two, or of the uncertain shape
     real other = lanes_select(closer, hit->low, found->low);
     traversal->rival = lanes_select(is_new, real_min(traversal->rival, other), traversal->rival);
     // of the exact ray's first hit, whichever shape has it
@@ -147,13 +147,13 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
     hit->object = lanes_select(closer, object, hit->object);
 }
 
-// Sets the hit's doubt, once all shapes have been tested.
-static inline void traversal_judge(Traversal *traversal)
+// Sets the hit's uncertain lanes, once all shapes have been tested.
+static inline void traversal_classify(Traversal *traversal)
 {
     if (traversal->query == OCCLUSION)
-        traversal->hit.doubt = traversal->hit.doubt & traversal->active;
+        traversal->hit.uncertain = traversal->hit.uncertain & traversal->active;
     else
-        traversal->hit.doubt = traversal->active & !(traversal->rival > traversal->hit.high);
+        traversal->hit.uncertain = traversal->active & !(traversal->rival > traversal->hit.high);
 }
 
 // Per-lane tmax, below LARGEST, the entry distance of a child that no ray hits; -LARGEST for lanes that are

@@ -49,9 +49,9 @@ typedef struct {
     real t;
     integer object; // its id; -1: nothing hit
     // At `certified`: `low`, of this hit, is not above the exact t, `high` not below that of the exact ray's
-    // first hit, whichever shape has it; `doubt`: in lanes where any of this is in doubt.
+    // first hit, whichever shape has it; `uncertain`: in lanes where any of this is uncertain.
     real low, high;
-    mask doubt;
+    mask uncertain;
 } Hit;
 
 // Compares the mask from memory with 0 anew: LLVM then sees that a lane is all ones or all zeros, and keeps

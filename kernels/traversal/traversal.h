@@ -23,7 +23,7 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
         traversal->hit.low = (real)(LARGEST);                           // of no hit: no rival
         traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
         traversal->rival = (real)(scene->header->sample.y);
-        traversal->hit.doubt = mask_none();
+        traversal->hit.uncertain = mask_none();
     }
     if (!lanes_any(ray->active)) return false;
     intersect_all_planes(traversal, scene, ray);
@@ -35,7 +35,7 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
 }
 
 // Traverses the BVH with `packets`, as bits: those for which traversal_begin left it. Their rays all have the
-// same common origin, or none. At one lane there is one packet. At `certified` traversal_judge comes last.
+// same common origin, or none. At one lane there is one packet. At `certified` traversal_classify comes last.
 static OUT_OF_LINE void packets_traverse_bvh(Traversal *traversals, const Scene *scene, Ray *rays,
                                              uint packets)
 {
@@ -56,7 +56,7 @@ static OUT_OF_LINE void packets_traverse_bvh(Traversal *traversals, const Scene 
 static OUT_OF_LINE void ray_traverse(Traversal *traversal, const Scene *scene, Ray *ray, Query query)
 {
     if (traversal_begin(traversal, scene, ray, query, ~0u)) packets_traverse_bvh(traversal, scene, ray, 1);
-    if (IS_CERTIFIED) traversal_judge(traversal);
+    if (IS_CERTIFIED) traversal_classify(traversal);
 }
 
 static inline Hit closest_hit(const Scene *scene, Ray *ray)

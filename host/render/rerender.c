@@ -1,4 +1,4 @@
-#include "host/render/repeat.h"
+#include "host/render/rerender.h"
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
@@ -17,8 +17,8 @@ typedef struct {
 } PixelList;
 
 // Lists the flagged pixels of a band tile by tile, so that neighbors share packets.
-static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint32_t *doubts,
-                             size_t word_count)
+static PixelList flagged_list(const Renderer *renderer, BandRows rows, const uint32_t *flags,
+                              size_t word_count)
 {
     const RenderSettings *settings = &renderer->settings;
     const uint32_t lanes = renderer->report.lanes, columns = MACRO_TILE_COLUMNS_OF(lanes),
@@ -27,7 +27,7 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
     const uint32_t items_of_row = (width + columns * tile_width - 1) / (columns * tile_width);
     PixelList list = {0};
     for (uint32_t i = 0; i < word_count; i++)
-        for (uint32_t bits = doubts[i]; bits != 0; bits &= bits - 1) {
+        for (uint32_t bits = flags[i]; bits != 0; bits &= bits - 1) {
             const uint32_t number = 32 * i + (uint32_t)__builtin_ctz(bits), lane = number % lanes,
                            tile = number / lanes, which = tile % lanes, item = tile / lanes;
             const uint32_t x =
@@ -45,40 +45,40 @@ static PixelList doubts_list(const Renderer *renderer, BandRows rows, const uint
 static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_list,
                         const BandBuffers *of_band, const PixelList *list, const Film *band)
 {
-    Renderer *repeat = renderer->repeat; // perhaps on another device
+    Renderer *next_pass = renderer->next_pass; // perhaps on another device
     const size_t components = film_components(band, layer);
     const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
     void *values = band_map(renderer, of_band, layer, CL_MAP_READ | CL_MAP_WRITE);
-    void *repeated = memory_allocate(of_list->layer_sizes[layer], 1);
-    const bool is_read = renderer_read(repeat, of_list->film, of_list->layer_begins[layer],
-                                       of_list->layer_sizes[layer], repeated);
+    void *rerendered = memory_allocate(of_list->layer_sizes[layer], 1);
+    const bool is_read = renderer_read(next_pass, of_list->film, of_list->layer_begins[layer],
+                                       of_list->layer_sizes[layer], rerendered);
     for (size_t i = 0; i < list->count && values && is_read; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->items[i].index * components + k;
             if (layer_types[layer] == LAYER_TYPE_INTEGER)
-                ((uint32_t *)values)[to] = ((const uint32_t *)repeated)[from];
+                ((uint32_t *)values)[to] = ((const uint32_t *)rerendered)[from];
             else
                 ((float *)values)[to] =
-                    (float)(((const double *)repeated)[from] / (is_length ? renderer->compiled.unit : 1));
+                    (float)(((const double *)rerendered)[from] / (is_length ? renderer->compiled.unit : 1));
         }
-    free(repeated);
+    free(rerendered);
     renderer_unmap(renderer, of_band->film, values);
 }
 
-static void repeat_launches_take(RenderReport *report, RenderReport *of_repeat)
+static void launches_collect(RenderReport *report, RenderReport *of_next)
 {
-    for (size_t i = 0; i < of_repeat->launches.count; i++)
-        array_push(report->launches, ((NamedLaunch){"repeat", of_repeat->launches.items[i].time}));
-    for (size_t i = 0; i < of_repeat->reads.count; i++)
-        array_push(report->reads, of_repeat->reads.items[i]);
-    report->build_seconds += of_repeat->build_seconds;
-    report->build_from_cache &= of_repeat->build_from_cache;
-    report->is_out_of_line |= of_repeat->is_out_of_line;
-    for (size_t i = 0; i < of_repeat->builds.count; i++)
-        array_push(report->builds, of_repeat->builds.items[i]);
-    of_repeat->build_seconds = 0;
-    of_repeat->builds.count = 0;
-    of_repeat->launches.count = of_repeat->reads.count = 0;
+    for (size_t i = 0; i < of_next->launches.count; i++)
+        array_push(report->launches, ((NamedLaunch){"repeat", of_next->launches.items[i].time}));
+    for (size_t i = 0; i < of_next->reads.count; i++)
+        array_push(report->reads, of_next->reads.items[i]);
+    report->build_seconds += of_next->build_seconds;
+    report->build_from_cache &= of_next->build_from_cache;
+    report->is_out_of_line |= of_next->is_out_of_line;
+    for (size_t i = 0; i < of_next->builds.count; i++)
+        array_push(report->builds, of_next->builds.items[i]);
+    of_next->build_seconds = 0;
+    of_next->builds.count = 0;
+    of_next->launches.count = of_next->reads.count = 0;
 }
 
 // A band whose flagged pixels are re-rendered: the kernel, the layers that it fills, and their buffers.
@@ -87,9 +87,9 @@ typedef struct {
     unsigned layers, aovs;
     const BandBuffers *buffers;
     Film film;
-} RepeatedBand;
+} RerenderedBand;
 
-void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows rows)
+void band_clear_flags(Renderer *renderer, const BandBuffers *buffers, BandRows rows)
 {
     if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
     const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
@@ -99,28 +99,28 @@ void band_clear_doubts(Renderer *renderer, const BandBuffers *buffers, BandRows 
     renderer_unmap(renderer, buffers->film, values);
 }
 
-// Raises the value of the layer `doubt` of the list's pixels to at least `doubt`.
-static void doubts_raise(Renderer *renderer, const RepeatedBand *band, const PixelList *list, uint32_t doubt)
+// Raises the value of the layer `doubt` of the list's pixels to at least `flag`.
+static void flags_raise(Renderer *renderer, const RerenderedBand *band, const PixelList *list, uint32_t flag)
 {
     const BandBuffers *buffers = band->buffers;
     if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
     uint32_t *values = band_map(renderer, buffers, LAYER_DOUBT, CL_MAP_READ | CL_MAP_WRITE);
     for (size_t i = 0; values && i < list->count; i++) {
         uint32_t *value = &values[list->items[i].index];
-        if (*value < doubt) *value = doubt;
+        if (*value < flag) *value = flag;
     }
     renderer_unmap(renderer, buffers->film, values);
 }
 
 // Writes a list's pixels and behind them their counts of uncertain samples, which kernels set at sample 0
 // only.
-static void list_write(Renderer *renderer, cl_mem doubts, const PixelList *list)
+static void list_write(Renderer *renderer, cl_mem flags, const PixelList *list)
 {
     const size_t size = list->count * sizeof *list->items,
                  count_size = renderer->settings.first_sample > 0 ? list->count * sizeof(uint32_t) : 0;
     char *bytes = memory_allocate_zeroed(size + count_size, 1);
     memcpy(bytes, list->items, size);
-    buffer_write(renderer->compute, doubts, size + count_size, bytes);
+    buffer_write(renderer->compute, flags, size + count_size, bytes);
     free(bytes);
 }
 
@@ -137,77 +137,78 @@ static bool list_render(Renderer *renderer, const BandBuffers *buffers, const Pl
     return true;
 }
 
-// Renders a list of the band's pixels by `repeat` and copies them to the band's layers. Unless it is NULL,
-// `undecided` receives the number of uncertain samples that each pixel still has. Returns false if a device
+// Renders a list of the band's pixels by `next_pass` and copies them to the band's layers. Unless it is NULL,
+// `uncertified` receives the number of uncertain samples that each pixel still has. Returns false if a device
 // failed or settings.stop ended the render.
-static bool list_repeat(Renderer *renderer, Renderer *repeat, const RepeatedBand *band, const PixelList *list,
-                        uint32_t *undecided)
+static bool list_rerender(Renderer *renderer, Renderer *next_pass, const RerenderedBand *band,
+                          const PixelList *list, uint32_t *uncertified)
 {
     const Film film = {.width = (uint32_t)list->count,
                        .height = 1,
                        .light_count = band->film.light_count,
-                       .real_size = renderer_scalar_size(repeat)};
-    const Place place = list_place(repeat, (uint32_t)list->count);
-    BandBuffers repeated = {0};
-    band_buffers_open(&repeated, repeat, band->aovs, film);
-    const bool is_last = samples_end(&repeat->settings) == repeat->settings.sample_count;
-    repeated.band_film = is_last && repeat->compute == renderer->compute ? band->buffers->film : NULL;
-    list_write(repeat, repeated.doubts, list);
+                       .real_size = renderer_scalar_size(next_pass)};
+    const Place place = list_place(next_pass, (uint32_t)list->count);
+    BandBuffers rerendered = {0};
+    band_buffers_open(&rerendered, next_pass, band->aovs, film);
+    const bool is_last = samples_end(&next_pass->settings) == next_pass->settings.sample_count;
+    rerendered.band_film = is_last && next_pass->compute == renderer->compute ? band->buffers->film : NULL;
+    list_write(next_pass, rerendered.flags, list);
     const bool whole = band->type == KERNEL_RENDER
-                           ? list_render(repeat, &repeated, &place)
-                           : band_fill(repeat, band->type, &repeated, band->aovs, &place);
+                           ? list_render(next_pass, &rerendered, &place)
+                           : band_fill(next_pass, band->type, &rerendered, band->aovs, &place);
     for (Layer layer = 0; layer < LAYER_COUNT && whole; layer++)
         if (layer_in(band->layers, layer) && layer_in(band->aovs | AOV_COLOR, layer) &&
-            !(layer == LAYER_COLOR && repeated.band_film) && film_layer_size(&band->film, layer) > 0)
-            layer_merge(renderer, layer, &repeated, band->buffers, list, &band->film);
+            !(layer == LAYER_COLOR && rerendered.band_film) && film_layer_size(&band->film, layer) > 0)
+            layer_merge(renderer, layer, &rerendered, band->buffers, list, &band->film);
     const bool is_read =
-        whole && (!undecided || renderer_read(repeat, repeated.doubts, list->count * sizeof *list->items,
-                                              list->count * sizeof *undecided, undecided));
-    repeat_launches_take(&renderer->report, &repeat->report);
-    band_buffers_close(&repeated, repeat);
+        whole &&
+        (!uncertified || renderer_read(next_pass, rerendered.flags, list->count * sizeof *list->items,
+                                       list->count * sizeof *uncertified, uncertified));
+    launches_collect(&renderer->report, &next_pass->report);
+    band_buffers_close(&rerendered, next_pass);
     return compute_check_reference(renderer->compute) && is_read;
 }
 
 // Keeps the pixels of the list that are uncertified. Returns the number of their uncertified samples.
-static uint64_t list_keep_undecided(PixelList *list, const uint32_t *undecided)
+static uint64_t list_keep_uncertified(PixelList *list, const uint32_t *uncertified)
 {
     uint64_t samples = 0;
     size_t kept = 0;
     for (size_t i = 0; i < list->count; i++) {
-        samples += undecided[i];
-        if (undecided[i] > 0) list->items[kept++] = list->items[i];
+        samples += uncertified[i];
+        if (uncertified[i] > 0) list->items[kept++] = list->items[i];
     }
     list->count = kept;
     return samples;
 }
 
-bool band_repeat(Renderer *renderer, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
-                 BandRows rows)
+bool band_rerender(Renderer *renderer, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
+                   BandRows rows)
 {
-    cl_mem doubts = type == KERNEL_RENDER ? buffers->doubts : buffers->center_doubts;
-    const RepeatedBand band = {type, layers, aovs, buffers,
-                               film_of_rows(renderer, rows.first_row, rows.row_count)};
-    const size_t word_count = film_doubt_words(renderer, &band.film);
+    cl_mem flags = type == KERNEL_RENDER ? buffers->flags : buffers->center_flags;
+    const RerenderedBand band = {type, layers, aovs, buffers,
+                                 film_of_rows(renderer, rows.first_row, rows.row_count)};
+    const size_t word_count = film_flag_words(renderer, &band.film);
     uint32_t *words = memory_allocate(word_count, sizeof *words);
-    bool is_whole = renderer_read(renderer, doubts, 0, word_count * sizeof *words, words);
+    bool is_whole = renderer_read(renderer, flags, 0, word_count * sizeof *words, words);
     PixelList list = {0};
-    if (is_whole) list = doubts_list(renderer, rows, words, word_count);
+    if (is_whole) list = flagged_list(renderer, rows, words, word_count);
     free(words);
     if (list.count > 0) {
-        RepeatCounts *counts = &buffers->repeats;
+        RerenderCounts *counts = &buffers->rerenders;
         const RenderSettings *settings = &renderer->settings;
         const uint32_t samples_of_pixel = samples_end(settings) - settings->first_sample;
-        uint32_t *undecided = memory_allocate(list.count, sizeof *undecided);
-        counts->repeated +=
+        uint32_t *uncertified = memory_allocate(list.count, sizeof *uncertified);
+        counts->rerendered +=
             (uint64_t)list.count * (type == KERNEL_AOV || type == KERNEL_PATH ? 1 : samples_of_pixel);
-        doubts_raise(renderer, &band, &list, DOUBT_REPEATED);
-        is_whole = list_repeat(renderer, renderer->repeat, &band, &list, undecided);
-        if (is_whole) counts->undecided += list_keep_undecided(&list, undecided);
+        flags_raise(renderer, &band, &list, FLAG_RERENDERED);
+        is_whole = list_rerender(renderer, renderer->next_pass, &band, &list, uncertified);
+        if (is_whole) counts->uncertified += list_keep_uncertified(&list, uncertified);
         if (is_whole && list.count > 0) {
-            doubts_raise(renderer, &band, &list, DOUBT_UNDECIDED);
-            is_whole = list_repeat(renderer, renderer->repeat->repeat, &band, &list, NULL);
+            flags_raise(renderer, &band, &list, FLAG_UNCERTIFIED);
+            is_whole = list_rerender(renderer, renderer->next_pass->next_pass, &band, &list, NULL);
         }
-        free(undecided);
+        free(uncertified);
     }
     free(list.items);
     return is_whole;
