@@ -332,3 +332,12 @@ void output_abandon(OutputFile *output)
     free(output->target);
     *output = (OutputFile){0};
 }
+
+bool output_write_file(const char *target, const void *bytes, size_t size, MessageList *messages)
+{
+    OutputFile output;
+    if (!output_open(&output, target, messages)) return false;
+    if (output_write(&output, bytes, size, messages)) return output_commit(&output, messages);
+    output_abandon(&output);
+    return false;
+}

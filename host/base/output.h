@@ -32,6 +32,8 @@ bool output_finish(OutputFile *output, MessageList *messages);
 // removes the temporary.
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);
+// Writes a whole file. On failure adds a message, leaves an earlier file untouched and returns false.
+bool output_write_file(const char *target, const void *bytes, size_t size, MessageList *messages);
 
 // Returns whether `file_name` is a temporary for the target `name`.
 bool output_is_temporary(const char *file_name, const char *name);

@@ -270,9 +270,7 @@ static char *crop_write(const Film *film, const Finding *finding)
     const ImageHeader header = {
         .format = IMAGE_PNG, .width = width, .height = height, .channels = 3, .bits = 8, .npy_type = 'f'};
     MessageList messages = {0};
-    ImageWriter *writer = image_writer_open(path, &header, &messages);
-    const bool is_written = writer && image_writer_rows(writer, pixels, height, &messages) &&
-                            image_writer_commit(writer, &messages);
+    const bool is_written = image_write(path, &header, pixels, &messages);
     messages_print(&messages, NULL);
     free(pixels);
     if (is_written) return path;
@@ -397,10 +395,7 @@ static bool golden_list_write(const GoldenList *list, const char *path)
     for (size_t i = 0; i < list->count; i++)
         golden_append(&text, &list->items[i]);
     MessageList messages = {0};
-    OutputFile output;
-    const bool is_written = output_open(&output, path, &messages) &&
-                            output_write(&output, text.items, text.count, &messages) &&
-                            output_commit(&output, &messages);
+    const bool is_written = output_write_file(path, text.items, text.count, &messages);
     messages_print(&messages, NULL);
     text_free(&text);
     return is_written;

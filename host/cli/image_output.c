@@ -540,13 +540,7 @@ static bool layer_save(const Film *film, Layer layer, const char *path, MessageL
         narrow = memory_allocate(count, sizeof *narrow);
         numbers_narrow(narrow, film->layers[layer], count);
     }
-    ImageWriter *writer = image_writer_open(path, &header, messages);
-    bool saved =
-        writer && image_writer_rows(writer, narrow ? narrow : film->layers[layer], film->height, messages);
-    if (saved)
-        saved = image_writer_commit(writer, messages);
-    else
-        image_writer_abandon(writer);
+    const bool saved = image_write(path, &header, narrow ? narrow : film->layers[layer], messages);
     free(narrow);
     return saved;
 }

@@ -214,13 +214,9 @@ static bool page_overwrites(const char *page, char *const *paths, size_t count, 
 
 static bool page_write(const SideBySide *side, const char *path, MessageList *messages)
 {
-    OutputFile output;
     Text page = {0};
-    if (!output_open(&output, path, messages)) return false;
     page_append(&page, "side.html", side_by_side_json(side), NULL);
-    const bool is_written =
-        output_write(&output, page.items, page.count, messages) && output_commit(&output, messages);
-    if (!is_written) output_abandon(&output);
+    const bool is_written = output_write_file(path, page.items, page.count, messages);
     text_free(&page);
     return is_written;
 }

@@ -136,6 +136,16 @@ void image_writer_abandon(ImageWriter *writer)
     if (writer) writer_free(writer);
 }
 
+bool image_write(const char *path, const ImageHeader *header, const void *pixels, MessageList *messages)
+{
+    ImageWriter *writer = image_writer_open(path, header, messages);
+    if (!writer) return false;
+    if (image_writer_rows(writer, pixels, header->height, messages))
+        return image_writer_commit(writer, messages);
+    image_writer_abandon(writer);
+    return false;
+}
+
 bool image_refuse(const ImageFile *file, const char *format, ...)
 {
     char reason[512];

@@ -67,6 +67,8 @@ bool image_writer_finish(ImageWriter *writer, MessageList *messages);
 // Completes the file unless finished and renames it to its target. On failure returns false with an error
 // message and leaves the target unchanged. Frees the writer in either case. Missing rows are a bug.
 bool image_writer_commit(ImageWriter *writer, MessageList *messages);
+// Writes a whole image, of the header's height. On failure adds a message and returns false.
+bool image_write(const char *path, const ImageHeader *header, const void *pixels, MessageList *messages);
 void image_writer_abandon(ImageWriter *writer); // removes the file and frees the writer; NULL is accepted
 
 // Converts a linear value to a display value of 2^bits - 1 steps: clipped to 0..1, curve, rounded to nearest.

@@ -39,15 +39,7 @@ static bool file_write(Compute *compute, Json *json, const char *key, const char
     char *name = text_format("%016" PRIx64 ".%s", hash_bytes(HASH_START, bytes, size), ending),
          *path = text_format("%s/%s", compute->device->capture_folder, name);
     MessageList messages = {0};
-    OutputFile output;
-    bool is_written = access(path, F_OK) == 0;
-    if (!is_written && output_open(&output, path, &messages)) {
-        is_written = output_write(&output, bytes, size, &messages);
-        if (is_written)
-            is_written = output_commit(&output, &messages);
-        else
-            output_abandon(&output);
-    }
+    const bool is_written = access(path, F_OK) == 0 || output_write_file(path, bytes, size, &messages);
     if (!is_written && compute_ok(compute)) {
         compute_fail(compute, "capture", CL_SUCCESS, "%s", messages.items[0].text);
         compute->failure.is_of_host = true;
