@@ -143,7 +143,7 @@ TEST(least_and_largest_numbers)
         if (i % 4 == 0) // about the distance of the plane y = 0
             rays[i].tmax = -rays[i].origin[1] / direction.y * (1 + random_between(&random, -1e-15, 1e-15));
         if (!(rays[i].tmax > 0)) rays[i].tmax = INFINITY;
-        scaled[i] = trace_ray_scaled(rays[i], DBL_MAX, &exponents[i]);
+        scaled[i] = trace_ray_scaled(rays[i], PRECISION_CERTIFIED, &exponents[i]);
     }
     assert_true(probe_trace(&scene, PRECISION_CERTIFIED, 0, scaled, RAYS, hits));
     ReferenceScene reference = reference_scene_open(&scene);

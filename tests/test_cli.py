@@ -656,9 +656,9 @@ class Trace(CliTestCase):
         self.refuses("trace sphere.yaml --rays rays --precision certified", "^rays:1:1: error: .*tmin 0")
 
     def test_directions_of_any_length(self):
-        write("rays", "0 0 -4 0 0 1e20\n0 0 -4 0 0 1e-20\n0 0 -4 0 0 3e38 0 3e-38\n0 0 -4 0 0 1\n")
+        write("rays", "0 0 -4 0 0 1e20\n0 0 -4 0 0 1e-20\n0 0 -4 0 0 1e-60\n0 0 -4 0 0 3e38 0 3e-38\n0 0 -4 0 0 1\n")
         _, rows = csv_rows(self.glint("trace sphere.yaml --rays rays").stdout)
-        self.assertEqual([(row[0], row[4]) for row in rows], [(0, -1)] * 4)
+        self.assertEqual([(row[0], row[4]) for row in rows], [(0, -1)] * 5)
 
 
 class Reports(CliTestCase):

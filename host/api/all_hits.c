@@ -130,7 +130,7 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     struct_write(hits, &found, sizeof found);
     bool is_sound = rays_read(&given, rays, &list);
-    if (is_sound && tracer->precision == GLINT_CERTIFIED)
+    if (is_sound && tracer->precision == PRECISION_CERTIFIED)
         is_sound = message_error(&list, "all hits have no bounds: trace them at another precision");
     if (!is_sound) return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     pthread_mutex_lock(&tracer->device->mutex);

@@ -19,7 +19,7 @@ struct GlintScene {
 struct GlintTracer {
     GlintDevice *device;
     Renderer *renderer;
-    GlintPrecision precision;
+    Precision precision;
 };
 
 // Copies a caller's struct, which may be of another version of the interface. Returns false with a message if
@@ -70,4 +70,4 @@ bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);
 // Reads `count` rays from `first` on and scales them (host/render/trace.h). Returns false with a message if
 // one is invalid.
 bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t first, size_t count,
-                GlintPrecision precision, MessageList *messages);
+                Precision precision, MessageList *messages);

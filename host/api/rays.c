@@ -2,7 +2,6 @@
 
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -25,7 +24,7 @@ GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
         call_end(&list, &device->compute, renderer ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     if (status == GLINT_DONE) {
         *tracer = memory_allocate_zeroed(1, sizeof **tracer);
-        **tracer = (GlintTracer){device, renderer, given.precision};
+        **tracer = (GlintTracer){device, renderer, precision};
     } else {
         renderer_close(renderer);
     }
@@ -48,31 +47,19 @@ static void reals_read(double *values, size_t count, GlintReal real, const void 
         values[i] = real_at(real, reals, first + i);
 }
 
-// Reads a ray. Returns the reason why it is invalid, or NULL.
-static const char *ray_read(TraceRay *ray, const GlintRays *rays, size_t index, GlintPrecision precision,
-                            double farthest)
+static void ray_read(TraceRay *ray, const GlintRays *rays, size_t index)
 {
     *ray = (TraceRay){.tmax = INFINITY};
     reals_read(ray->origin, 3, rays->real, rays->origins, 3 * index);
     reals_read(ray->direction, 3, rays->real, rays->directions, 3 * index);
     if (rays->tmin) reals_read(&ray->tmin, 1, rays->real, rays->tmin, index);
     if (rays->tmax) reals_read(&ray->tmax, 1, rays->real, rays->tmax, index);
-    bool is_finite = isfinite(ray->tmin) && !isnan(ray->tmax), has_direction = false;
-    for (int axis = 0; axis < 3; axis++) {
-        is_finite = is_finite && fabs(ray->origin[axis]) <= farthest && isfinite(ray->direction[axis]);
-        has_direction = has_direction || ray->direction[axis] != 0;
-    }
-    if (!is_finite || !has_direction)
-        return "expected finite numbers within the precision's range and a direction other than 0";
-    return precision == GLINT_CERTIFIED && ray->tmin != 0 ? "at certified a ray starts at its origin, tmin 0"
-                                                          : NULL;
 }
 
 typedef struct {
     const GlintRays *rays;
     size_t first; // of the batch, in `rays`
-    GlintPrecision precision;
-    double farthest;
+    Precision precision;
     TraceRay *scaled;
     int *exponents;
     pthread_mutex_t mutex; // of the following
@@ -86,9 +73,10 @@ static void ray_batch_scale(void *context, size_t begin, size_t end)
     const char *reason = NULL;
     for (size_t i = begin; i < end && !reason; i++) {
         const size_t index = batch->first + i;
-        reason = ray_read(&batch->scaled[i], batch->rays, index, batch->precision, batch->farthest);
+        ray_read(&batch->scaled[i], batch->rays, index);
+        reason = trace_ray_fault(&batch->scaled[i], batch->precision);
         if (!reason) {
-            batch->scaled[i] = trace_ray_scaled(batch->scaled[i], batch->farthest, &batch->exponents[i]);
+            batch->scaled[i] = trace_ray_scaled(batch->scaled[i], batch->precision, &batch->exponents[i]);
             continue;
         }
         pthread_mutex_lock(&batch->mutex);
@@ -101,13 +89,11 @@ static void ray_batch_scale(void *context, size_t begin, size_t end)
 }
 
 bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t first, size_t count,
-                GlintPrecision precision, MessageList *messages)
+                Precision precision, MessageList *messages)
 {
-    const bool is_double = precision == GLINT_DOUBLE || precision == GLINT_CERTIFIED;
     RayBatch batch = {.rays = rays,
                       .first = first,
                       .precision = precision,
-                      .farthest = is_double ? DBL_MAX : (double)FLT_MAX,
                       .scaled = scaled,
                       .mutex = PTHREAD_MUTEX_INITIALIZER,
                       .wrong = SIZE_MAX};

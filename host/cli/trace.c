@@ -72,32 +72,6 @@ static int line_numbers(Report *report, size_t start, size_t end, double numbers
     }
 }
 
-static double farthest_of(Precision precision)
-{
-    return precision < PRECISION_DOUBLE ? (double)FLT_MAX : DBL_MAX;
-}
-
-// Returns whether the numbers of a line are a ray at the precision, and reports an error if not.
-static bool ray_check(Report *report, size_t line, const double numbers[8], int count, Precision precision)
-{
-    bool beyond = numbers[7] == -INFINITY, has_direction = false;
-    for (int i = 0; i < 7; i++)
-        beyond |= fabs(numbers[i]) > farthest_of(precision);
-    for (int i = 3; i < 6 && !beyond; i++)
-        has_direction |= precision < PRECISION_DOUBLE ? (float)numbers[i] != 0 : numbers[i] != 0;
-    if (count != 6 && count != 8)
-        return report_error(report, line, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d",
-                            count);
-    if (beyond)
-        return report_error(report, line,
-                            "a number is beyond the precision's range; only tmax may be infinite");
-    if (precision == PRECISION_CERTIFIED && numbers[6] != 0)
-        return report_error(report, line, "at certified a ray starts at its origin, tmin 0");
-    if (!has_direction)
-        return report_error(report, line, "a ray's direction cannot be 0 0 0 at its precision");
-    return true;
-}
-
 static TraceRay ray_make(const double n[8], int count)
 {
     return (TraceRay){{n[0], n[1], n[2]}, {n[3], n[4], n[5]}, n[6], count == 8 ? n[7] : (double)INFINITY};
@@ -111,8 +85,15 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
         size_t end = newline ? (size_t)(newline - source->bytes) : source->length;
         double numbers[8] = {0};
         int count = line_numbers(&report, start, end, numbers);
-        if (count > 0 && ray_check(&report, start, numbers, count, common->precision))
-            array_push(*rays, ray_make(numbers, count));
+        const TraceRay ray = ray_make(numbers, count);
+        const char *fault = trace_ray_fault(&ray, common->precision);
+        if (count > 0 && count != 6 && count != 8)
+            report_error(&report, start, "expected ox oy oz dx dy dz [tmin tmax], 6 numbers or 8, found %d",
+                         count);
+        else if (count > 0 && fault)
+            report_error(&report, start, "%s", fault);
+        else if (count > 0)
+            array_push(*rays, ray);
         start = end + 1;
     }
     return report_close(&report);
@@ -193,9 +174,8 @@ static int rays_trace(const TraceOptions *options, const Scene *scene, const Ray
     TraceRay *scaled = memory_allocate(rays->count + 1, sizeof *scaled);
     TraceHit *hits = memory_allocate(rays->count + 1, sizeof *hits);
     int *exponents = memory_allocate(rays->count + 1, sizeof *exponents);
-    double farthest = farthest_of(options->common.precision);
     for (size_t i = 0; i < rays->count; i++)
-        scaled[i] = trace_ray_scaled(rays->items[i], farthest, &exponents[i]);
+        scaled[i] = trace_ray_scaled(rays->items[i], options->common.precision, &exponents[i]);
     const bool traced = renderer_trace_closest(renderer, scaled, rays->count, hits);
     for (size_t i = 0; i < rays->count && traced; i++)
         trace_hit_unscale(&hits[i], exponents[i]);

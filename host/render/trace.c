@@ -234,7 +234,26 @@ static double scale_by_power(double value, int exponent, double power)
     return isnormal(power) ? value * power : ldexp(value, exponent);
 }
 
-TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent)
+static double farthest_of(Precision precision)
+{
+    return precision < PRECISION_DOUBLE ? (double)FLT_MAX : DBL_MAX;
+}
+
+const char *trace_ray_fault(const TraceRay *ray, Precision precision)
+{
+    bool is_within = isfinite(ray->tmin) && !isnan(ray->tmax), has_direction = false;
+    for (int axis = 0; axis < 3; axis++) {
+        is_within &= fabs(ray->origin[axis]) <= farthest_of(precision) && isfinite(ray->direction[axis]);
+        has_direction |= ray->direction[axis] != 0;
+    }
+    if (!is_within) return "a number is beyond the precision's range; only tmax may be infinite";
+    if (!has_direction) return "a ray's direction cannot be 0 0 0";
+    return precision == PRECISION_CERTIFIED && ray->tmin != 0
+               ? "at certified a ray starts at its origin, tmin 0"
+               : NULL;
+}
+
+TraceRay trace_ray_scaled(TraceRay ray, Precision precision, int *exponent)
 {
     double *d = ray.direction;
     frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
@@ -242,7 +261,7 @@ TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent)
     for (int axis = 0; axis < 3; axis++)
         d[axis] = scale_by_power(d[axis], -*exponent, inverse);
     ray.tmin = scale_by_power(ray.tmin, *exponent, power);
-    ray.tmax = fmin(scale_by_power(ray.tmax, *exponent, power), farthest);
+    ray.tmax = fmin(scale_by_power(ray.tmax, *exponent, power), farthest_of(precision));
     return ray;
 }
 

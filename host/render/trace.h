@@ -1,6 +1,7 @@
 // Explicit rays and the hits that they find.
 #pragma once
 
+#include "host/compile/settings.h"
 #include "host/opencl/device.h"
 #include <stdint.h>
 
@@ -38,8 +39,10 @@ enum { RAYS_OF_THREAD_MIN = 4096 }; // of work on the host, a few tenths of a mi
 
 // Returns the ray with its direction divided by 2^*exponent, and its tmin and tmax multiplied by that, so
 // that the direction's largest component lies in 0.5 to 1 and its squared length neither underflows nor
-// overflows. The scaling is exact, except of a tmin or tmax that underflows. `farthest` limits tmax. A t of
-// the scaled ray is ldexp(t, *exponent) for the original t.
-TraceRay trace_ray_scaled(TraceRay ray, double farthest, int *exponent);
+// overflows. The scaling is exact, except of a tmin or tmax that underflows. tmax becomes at most the largest
+// number of the precision. A t of the scaled ray is ldexp(t, *exponent) for the original t.
+TraceRay trace_ray_scaled(TraceRay ray, Precision precision, int *exponent);
+// Returns why the ray cannot be scaled and traced at the precision, or NULL.
+const char *trace_ray_fault(const TraceRay *ray, Precision precision);
 // Scales the hit's numbers back to lengths of the original direction.
 void trace_hit_unscale(TraceHit *hit, int exponent);
