@@ -71,8 +71,8 @@ window_objects := $(if $(has_window),$(patsubst %.c,$(BUILD)/%.o,$(window_source
 objects := $(filter-out $(window_objects),$(sources:%.c=$(BUILD)/%.o)) $(BUILD)/kernel_files.o $(BUILD)/page_files.o
 library := $(filter-out $(BUILD)/host/main.o,$(objects))
 
-# Each tests/test_*.c, fuzz_*.c and oracle/*.c is a program; the other files are linked with all of them.
-test_programs := $(sort $(wildcard tests/test_*.c tests/fuzz_*.c tests/oracle/*.c))
+# Each tests/test_*.c and oracle/*.c is a program; the other files are linked with all of them.
+test_programs := $(sort $(wildcard tests/test_*.c tests/oracle/*.c))
 test_helpers  := $(filter-out $(test_programs),$(sort $(wildcard tests/*.c)))
 test_objects  := $(test_helpers:%.c=$(BUILD)/%.o)
 tests         := $(test_programs:%.c=$(BUILD)/%)
@@ -163,6 +163,8 @@ failing_tests   := $(addprefix $(BUILD)/tests/,test_opencl_failure test_device_l
 $(failing_tests): private LDFLAGS += $(opencl_calls:%=-Wl,--wrap=%) -Wl,--wrap=statvfs -Wl,--wrap=statvfs64 \
                              -Wl,--wrap=pthread_create
 $(failing_tests): $(failing_objects)
+
+$(BUILD)/tests/test_readers: $(BUILD)/tests/fuzz/readers.o
 
 # The paces of its workers are exact.
 $(BUILD)/tests/test_scheduler: private LDFLAGS += -Wl,--wrap=clock_seconds

@@ -179,6 +179,15 @@ void baseline_close(Baseline *baseline)
     free(baseline);
 }
 
+bool bench_key_equal(const BenchKey *a, const BenchKey *b)
+{
+    return a->scene_hash == b->scene_hash && strcmp(a->precision, b->precision) == 0 &&
+           strcmp(a->bvh, b->bvh) == 0 &&
+           strcmp(a->variant ? a->variant : "", b->variant ? b->variant : "") == 0 && a->lanes == b->lanes &&
+           a->width == b->width && a->height == b->height && a->samples == b->samples &&
+           a->bounces == b->bounces;
+}
+
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor)
 {
     for (size_t i = 0; i < baseline->count; i++) {

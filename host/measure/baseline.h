@@ -36,6 +36,9 @@ typedef struct {
 Baseline *baseline_open(const char *path, bool needs_calibration, MessageList *messages);
 void baseline_close(Baseline *baseline);
 
+// Returns whether two keys name the same row. The scenes' paths are ignored, and "" is the same variant as
+// NULL.
+bool bench_key_equal(const BenchKey *a, const BenchKey *b);
 // Finds the wall and processor times of the row with this key. The scene's path is ignored. Returns false if
 // the baseline lacks the row.
 bool baseline_find(const Baseline *baseline, const BenchKey *key, ReportTimes *wall, ReportTimes *processor);

@@ -91,15 +91,6 @@ Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count)
     return comparison_of_ends(all, row_count, drift_tolerance);
 }
 
-bool bench_key_equal(const BenchKey *a, const BenchKey *b)
-{
-    return a->scene_hash == b->scene_hash && strcmp(a->precision, b->precision) == 0 &&
-           strcmp(a->bvh, b->bvh) == 0 &&
-           strcmp(a->variant ? a->variant : "", b->variant ? b->variant : "") == 0 && a->lanes == b->lanes &&
-           a->width == b->width && a->height == b->height && a->samples == b->samples &&
-           a->bounces == b->bounces;
-}
-
 void bench_row_free(BenchRow *row)
 {
     bench_times_free(&row->times);

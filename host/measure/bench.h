@@ -61,10 +61,6 @@ typedef struct {
     uint64_t scene_hash;
 } BenchKey;
 
-// Returns whether two keys name the same row. The scenes' paths are ignored, and "" is the same variant as
-// NULL.
-bool bench_key_equal(const BenchKey *a, const BenchKey *b);
-
 extern const char *const bench_ray_names[RAYS_COUNT];
 
 typedef struct {

@@ -1,5 +1,7 @@
 // libFuzzer's target: whatever a reader gets, it must neither crash nor leak, nor believe what is not there.
-// GLINT_FUZZ names the reader; tools/fuzz runs them. Memory that a file claims is bounded by what it has.
+// GLINT_FUZZ names the reader; tools/fuzz runs them, and tests/test_readers.c a few. Memory that a file
+// claims is bounded by what it has.
+#include "tests/fuzz/readers.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
@@ -32,6 +34,12 @@ static void image_fuzz(const char *path, const Source *source, MessageList *mess
     if (image_read(&image, path, messages)) image_free(&image);
 }
 
+// Errors and the verdict must agree.
+static void verdict_check(bool is_read, const MessageList *messages)
+{
+    if (is_read == (message_count(messages, MESSAGE_ERROR) > 0)) abort();
+}
+
 static void mesh_fuzz(const char *path, const Source *source, MessageList *messages)
 {
     (void)source;
@@ -41,8 +49,8 @@ static void mesh_fuzz(const char *path, const Source *source, MessageList *messa
         .path = path, .transform = affine_identity, .own_materials = true, .report = &report};
     Scene scene = {0};
     uint32_t index;
-    mesh_import(&scene, &import, &index);
-    report_close(&report);
+    const bool is_read = mesh_import(&scene, &import, &index), is_sound = report_close(&report);
+    verdict_check(is_read && is_sound, messages);
     scene_free(&scene);
 }
 
@@ -115,40 +123,20 @@ static void assimp_fuzz(const char *path, const Source *source, MessageList *mes
 
 static const SceneOptions scene_options = {.lenient = true};
 
-static void yaml_fuzz(const char *path, const Source *source, MessageList *messages)
-{
-    (void)path;
-    Scene scene;
-    if (scene_read_yaml(&scene, source, &scene_options, messages)) scene_free(&scene);
-}
+#define SCENE_READER(format, is_read)                                                                        \
+    static void format##_fuzz(const char *path, const Source *source, MessageList *messages)                 \
+    {                                                                                                        \
+        (void)path;                                                                                          \
+        Scene scene;                                                                                         \
+        verdict_check(is_read, messages);                                                                    \
+        scene_free(&scene);                                                                                  \
+    }
 
-static void rt_fuzz(const char *path, const Source *source, MessageList *messages)
-{
-    (void)path;
-    Scene scene;
-    if (scene_read_rt(&scene, source, &scene_options, messages)) scene_free(&scene);
-}
-
-static void cfg_fuzz(const char *path, const Source *source, MessageList *messages)
-{
-    (void)path;
-    Scene scene;
-    if (scene_read_cfg(&scene, source, messages)) scene_free(&scene);
-}
-
-static void nff_fuzz(const char *path, const Source *source, MessageList *messages)
-{
-    (void)path;
-    Scene scene;
-    if (scene_read_nff(&scene, source, messages)) scene_free(&scene);
-}
-
-static void dat_fuzz(const char *path, const Source *source, MessageList *messages)
-{
-    (void)path;
-    Scene scene;
-    if (scene_read_dat(&scene, source, messages)) scene_free(&scene);
-}
+SCENE_READER(yaml, scene_read_yaml(&scene, source, &scene_options, messages))
+SCENE_READER(rt, scene_read_rt(&scene, source, &scene_options, messages))
+SCENE_READER(cfg, scene_read_cfg(&scene, source, messages))
+SCENE_READER(nff, scene_read_nff(&scene, source, messages))
+SCENE_READER(dat, scene_read_dat(&scene, source, messages))
 
 // Each band that it has can be read, or the checkpoint fails: it never holds rows that the image has not.
 static void checkpoint_fuzz(const char *path, const Source *source, MessageList *messages)
@@ -246,7 +234,6 @@ static void scratch_remove(void)
     rmdir(folder);
 }
 
-int LLVMFuzzerInitialize(int *argument_count, char ***arguments);
 // NOLINTNEXTLINE(readability-non-const-parameter): libFuzzer's signature
 int LLVMFuzzerInitialize(int *argument_count, char ***arguments)
 {
@@ -276,7 +263,6 @@ int LLVMFuzzerInitialize(int *argument_count, char ***arguments)
     return 0;
 }
 
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
     // of its exact length, which AddressSanitizer guards; readers of text expect a NUL behind it

@@ -1,0 +1,10 @@
+// libFuzzer's entrances to the readers of tests/fuzz/readers.c.
+#pragma once
+
+#include <stddef.h>
+#include <stdint.h>
+
+// Chooses the reader that GLINT_FUZZ names.
+int LLVMFuzzerInitialize(int *argument_count, char ***arguments);
+// Lets the reader read the bytes. Ends the process if it believes what is not there.
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
