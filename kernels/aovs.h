@@ -42,8 +42,8 @@
     HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) SAMPLED_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)
 // clang-format on
 
-// Where each layer begins in a band's buffer, in units of ARENA_UNIT. The sum of each pixel's colors is
-// first, and the compensation of its rounding follows (render.cl).
+// Holds the offset of each layer in a band's buffer, in units of ARENA_UNIT. The sum of each pixel's colors
+// is first, and the compensation of its rounding follows (render.cl).
 #define LAYER_OFFSET(NAME, name, type, components, note) unsigned name;
 typedef struct {
     LAYER_LIST(LAYER_OFFSET)

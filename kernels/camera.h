@@ -1,4 +1,4 @@
-// Camera rays.
+// Generates camera rays.
 #ifndef CAMERA_H
 #define CAMERA_H
 
@@ -11,7 +11,7 @@ typedef struct {
     integer x, y; // counted in the whole image from the top left
 } Pixels;
 
-// Returns the direction of a place in the image, in half pixels from its center.
+// Returns the direction of a point of the image, given in half pixels from its center.
 static inline Vector equirectangular_direction(global const SceneHeader *header, real x, real y)
 {
     real longitude = x * (real)(header->right.w), latitude = y * (real)(header->up.w);

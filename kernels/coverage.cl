@@ -1,4 +1,4 @@
-// Computes how much of each pixel objects cover, and the light of the background in the rest of it.
+// Computes the fraction of each pixel that objects cover, and the background's light in the remainder.
 #include "aovs.h"
 #include "film.h"
 #include "shading/texture.h"

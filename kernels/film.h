@@ -6,8 +6,8 @@
 
 typedef struct {
     uint first_x, first_y, width, height; // in the whole image; in a list, 0, 0, its length and 1
-    uint cell;                            // 1, or the side of the squares that have one pixel each
-    global const int *list; // in a list, of each pixel x and y in the whole image and its index in the band
+    uint cell;                            // 1, or the side of the squares that have one rendered pixel each
+    global const int *list; // for a list, each pixel's x and y in the whole image and its index in the band
 } Band;
 
 typedef struct {
@@ -28,8 +28,8 @@ static inline uint bits_scramble(uint bits)
     return bits ^ (bits >> 16);
 }
 
-// Returns one pixel of each square of cell x cell pixels, whose corner is given, at a place that a hash
-// chooses: a stratified sample of the image (host/measure/pilot.h). `down` is hashed from all 32 bits, since
+// Returns one pixel of each square of cell x cell pixels with the given corner. A hash chooses it, which
+// gives a stratified sample of the image (host/measure/pilot.h). `down` is hashed from all 32 bits, since
 // `across` reveals the first few.
 static inline Pixels pixels_scatter(Pixels corner, uint cell)
 {
@@ -43,7 +43,7 @@ static inline Pixels pixels_scatter(Pixels corner, uint cell)
     return (Pixels){x.all, y.all};
 }
 
-// Returns the work-item's tile number `which` of a list, whose pixels, those that `certified` flagged, may be
+// Returns the work-item's tile number `which` of a list. Its pixels, which `certified` flagged, may be
 // anywhere in the image.
 static inline Tile list_tile(const Band *band, uint which)
 {
@@ -92,7 +92,7 @@ static inline integer tile_index(const Tile *tile)
     return (integer)((scalar_integer)tile->first) + LANE_Y * (integer)((scalar_integer)tile->width) + LANE_X;
 }
 
-// Stores or loads one of `stride` values per pixel.
+// Stores one of `stride` values per pixel.
 static inline void film_store(global scalar *film, const Tile *tile, uint stride, uint channel, real value)
 {
     RealLanes values = {value};
@@ -109,8 +109,8 @@ static inline void film_store_integer(global int *film, const Tile *tile, uint s
         if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = (int)values.each[lane];
 }
 
-// Shuffles each row of four lanes of two vectors: i, j, k and l are lanes of the first row, LANES being the
-// second vector's first lane.
+// Shuffles each row of four lanes of two vectors. i, j, k and l are lanes of the first row, where LANES is
+// the second vector's first lane.
 #if LANES == 16 && defined(__clang__)
 #define SHUFFLE_ROWS(a, b, i, j, k, l)                                                                       \
     __builtin_shufflevector(a, b, i, j, k, l, i + 4, j + 4, k + 4, l + 4, i + 8, j + 8, k + 8, l + 8,        \
@@ -209,8 +209,8 @@ static inline void film_merge(global float *band_film, const Band *band, const T
     }
 }
 
-// Records the uncertain lanes: as bits, all of which were 0 before; in a list, in the pixels' counts, which
-// follow its pixels. `is_first` means that a count has no value yet.
+// Records the uncertain lanes. A band sets bits, all of which were 0 before; a list adds to its pixels'
+// counts, which follow its pixels. With `is_first` the counts start from 0.
 static inline void film_flag_pixels(global int *flags, const Tile *tile, mask uncertain, bool is_first)
 {
     if (!(IS_PIXEL_LIST && is_first) && !lanes_any(uncertain)) return;

@@ -1,6 +1,6 @@
-// Tests the device's arithmetic in the vectors and by the functions that render. The host judges the results
-// (host/opencl/passport_measure.c). Operands come from memory, so that the compiler cannot know them, and as
-// bits, so that no load or store changes them.
+// Tests the device's arithmetic in the vectors and with the functions that rendering uses. The host
+// evaluates the results (host/opencl/passport_measure.c). Operands come from memory, so that the compiler
+// cannot know them, and as bits, so that no load or store changes them.
 #include "numerics/numerics.h"
 #include "probes.h"
 

@@ -1,6 +1,6 @@
-// Points of areas, such as those of lights: for each of a pixel's samples a point of a low-discrepancy
-// sequence, which is scrambled by the pixel, the area and the path. Those of the square are computed in
-// integers, so that every device and precision has the same ones.
+// Samples areas, such as those of lights. Each of a pixel's samples gets a point of a low-discrepancy
+// sequence, scrambled by the pixel, the area and the path. Points of the square are computed in integers, so
+// that every device and precision has the same ones.
 #ifndef SAMPLING_H
 #define SAMPLING_H
 
@@ -11,13 +11,13 @@ typedef LANES_TYPE(uint) word;
 
 // Identifies a ray's sample.
 typedef struct {
-    uint index; // of the sample; SAMPLE_CENTER: each area is represented by its center
-    word seed;  // of the pixel and the path
+    uint index; // the sample's index; SAMPLE_CENTER represents each area by its center
+    word seed;  // identifies the pixel and the path
 } Sample;
 
 #define SAMPLE_CENTER 0xffffffffu
 
-// What is sampled: the lens, or a light by SAMPLED_LIGHTS + its index.
+// The areas that are sampled: the lens, and each light by SAMPLED_LIGHTS + its index.
 enum { SAMPLED_LENS, SAMPLED_LIGHTS };
 
 // Coordinates from -1 to 1.
@@ -42,9 +42,9 @@ static inline word word_reverse(word a)
     return a >> 16 | a << 16;
 }
 
-// Flips each bit by a hash of the bits below it: of reversed bits, Owen's nested scrambling (Laine, Karras,
-// Stratified sampling for stochastic transparency, Computer Graphics Forum 30(4), 2011; constants of Burley,
-// Practical hash-based Owen scrambling, JCGT 9(4), 2020, listing 2).
+// Flips each bit by a hash of the bits below it. On reversed bits this is Owen's nested scrambling (Laine,
+// Karras, Stratified sampling for stochastic transparency, Computer Graphics Forum 30(4), 2011; constants of
+// Burley, Practical hash-based Owen scrambling, JCGT 9(4), 2020, listing 2).
 static inline word word_scramble(word a, word seed)
 {
     a += seed;
@@ -54,9 +54,9 @@ static inline word word_scramble(word a, word seed)
     return a ^ a * (word)(0x8d22f6e6u);
 }
 
-// Returns the reversed bits of the Sobol sequence's second coordinate: as polynomials over GF(2), of which
-// the bits are the coefficients, a(1 + x). Since (1 + x)^n = 1 + x^n if n is a power of two, the halves are
-// composed in turn.
+// Returns the reversed bits of the Sobol sequence's second coordinate. If the bits are the coefficients of a
+// polynomial a(x) over GF(2), this is a(1 + x). Since (1 + x)^n = 1 + x^n if n is a power of two, the halves
+// are composed in turn.
 static inline word sobol_second(word a)
 {
     a ^= a >> 16;
@@ -66,7 +66,7 @@ static inline word sobol_second(word a)
     return a ^ (a >> 1 & (word)(0x55555555u));
 }
 
-// Returns -1 to 1 from the 24 highest bits, exactly at every precision.
+// Returns a number from -1 to 1, made of the 24 highest bits, exactly at every precision.
 static inline real real_from_word(word a)
 {
     return real_fma(LANES_CONVERT(REAL_BASE)(a >> 8), (real)(0x1p-23f), (real)(-1));
@@ -85,9 +85,9 @@ static inline Sample sample_after_bounce(Sample sample, bool is_refracted)
     return sample;
 }
 
-// Returns the sample's point of the square of an area: of the Sobol sequence's first two coordinates, in a
-// scrambled order and with scrambled coordinates (Burley, section 5). The 2^n samples of a pixel lie one in
-// each of the 2^n equal rectangles of every shape whose sides are powers of two.
+// Returns the sample's point of an area's square. Its coordinates are the first two of the Sobol sequence,
+// scrambled and in a scrambled order (Burley, section 5). The 2^n samples of a pixel lie one in each of the
+// 2^n equal rectangles of every shape whose sides are powers of two.
 static inline SquarePoint sample_point(const Sample *sample, uint area)
 {
     if (sample->index == SAMPLE_CENTER) return (SquarePoint){(real)(0), (real)(0)};

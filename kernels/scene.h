@@ -15,7 +15,7 @@ typedef struct {
     global uint *ray_counts; // by RAYS_…; NULL unless rays are counted
 } Scene;
 
-// The first arguments of each kernel, which have the scene, and the Scene made from them.
+// The first arguments of each kernel, which carry the scene, and the Scene built from them.
 #define SCENE_ARGUMENTS                                                                                      \
     global const char *arena, ArenaOffsets offsets, global const BvhNode *nodes, global const Texel *texels
 #define SCENE_POINTER(NAME, Type, name, names)                                                               \
@@ -25,13 +25,13 @@ typedef struct {
         (global const SceneHeader *)arena, ARENA_LIST(SCENE_POINTER) nodes, texels, 0                        \
     }
 
-// Consecutive ids with consecutive entries: of an instance's triangles, or of objects between instances.
+// A range of ids with consecutive entries: an instance's triangles, or the objects between instances.
 typedef struct {
     uint first, end; // ids
     uint entry;      // the index of the first one's ObjectEntry
     bool is_instance;
-    uint instance; // its index, if it is one
-    uint material; // 1 + that of the instance, or 0
+    uint instance; // the instance's index, if it is one
+    uint material; // 1 + the instance's material, or 0
 } ObjectRange;
 
 static inline ObjectRange outside_instances(void)
@@ -70,7 +70,7 @@ static inline ObjectRange object_range(const Scene *scene, uint id)
     return instance_range(scene, ids.x, ids.y, ids.w);
 }
 
-// Returns type_index_material of an id in the range.
+// Returns the type_index_material of an id in the range.
 static inline uint4 range_entry(const Scene *scene, const ObjectRange *range, scalar_integer id)
 {
     if (!HAS_INSTANCES) return scene->objects[id].type_index_material;

@@ -1,5 +1,5 @@
-// Traces explicit rays: finds the closest hit and, if TRACES_BOUNCES, the bounces there and the transmittance
-// along each ray.
+// Traces explicit rays. Finds the closest hit and, if TRACES_BOUNCES, the bounces there and the
+// transmittance along each ray.
 #ifndef TRACE_H
 #define TRACE_H
 

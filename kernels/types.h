@@ -1,9 +1,9 @@
 // Defines the flat structs that host and kernels share, one array per shape.
 //
-// In the kernels `scalar` is float or double, the kernel's precision. The host writes double and narrows each
-// array on upload. So in every struct the scalar4 members come first and the uint4 members last: then no
-// member needs padding, and narrowing proceeds element by element (tests/test_layout.c checks each struct on
-// the device).
+// In the kernels `scalar` is float or double, the kernel's precision. The host writes double and narrows
+// each array on upload. So in every struct the scalar4 members come first and the uint4 members last. Then
+// no member needs padding, and narrowing proceeds element by element (tests/test_layout.c checks each struct
+// on the device).
 //
 // Positions are relative to the eye that the scene was compiled for. Axes and normals are those of the scene,
 // scaled by a power of two to a length in 1/2..1, so that they are exact and never overflow.
@@ -29,14 +29,14 @@ typedef struct {
     uint4 id;              // x: the object's id, y: IGNORES_FRONT_FACES | HAS_POWER
 } Sphere;
 
-// A bit of a shape's id.y: the eye's power defines the shape. For a sphere it is |center|^2 - radius^2 before
-// either is rounded, and it replaces the radius. Next to a planet, center and radius round to half a meter,
-// the power to an ulp of the distance. id.z has its bits as a float, or id.z and id.w the low and high half
-// of its bits as a double.
+// Set in a shape's id.y if the eye's power defines the shape. For a sphere the power is
+// |center|^2 - radius^2 before either is rounded, and it replaces the radius. Next to a planet, center and
+// radius round to half a meter, the power to an ulp of the distance. id.z has its bits as a float, or id.z
+// and id.w have the low and high half of its bits as a double.
 enum { HAS_POWER = 16 };
 
-// A bit of a shape's id.y: front faces are ignored, so that only rays from inside hit. Never set together
-// with REVOLUTION_CAPPED.
+// Set in a shape's id.y if front faces are ignored, so that only rays from inside hit. It is never set
+// together with REVOLUTION_CAPPED.
 enum { IGNORES_FRONT_FACES = 8 };
 
 typedef struct {
@@ -50,7 +50,7 @@ typedef struct {
     scalar4 center_radius;
     scalar4 normal; // w: 1 / its length
     scalar4 grid_u, grid_v;
-    scalar4 foot; // with HAS_POWER, its plane's point nearest to the eye
+    scalar4 foot; // with HAS_POWER, the point of its plane nearest to the eye
     uint4 id;     // y: HAS_POWER, for the sphere around it
 } Disc;
 
@@ -59,15 +59,15 @@ typedef struct {
     uint4 id;
 } Box;
 
-// Cylinder and cone: the points with |p x axis| = radius |axis| + slope (p . axis), with p measured from the
-// base, for an axis of any length.
+// A cylinder or cone: the points p, measured from the base, with |p x axis| = radius |axis| +
+// slope (p . axis), for an axis of any length.
 //
-// With HAS_POWER the base is the axis' point nearest to the eye, heights along the axis are measured from the
-// eye's height, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution.h).
+// With HAS_POWER the base is the point of the axis nearest to the eye, heights along the axis are measured
+// from the eye's height, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution.h).
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
     scalar4 axis_slope;  // xyz axis, w slope: the tangent of the half-angle, 0 for a cylinder
-    scalar4 range;       // where finite p . axis runs from w, 0 without a power, to x; y: |axis|; z: |axis|^2
+    scalar4 range;       // if finite, p . axis runs from w (0 without a power) to x; y: |axis|; z: |axis|^2
     uint4 id;            // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | IGNORES_FRONT_FACES | HAS_POWER
 } Revolution;
 
@@ -79,9 +79,9 @@ typedef Revolution Cone;
 typedef struct {
     scalar4 center_major; // w: radius of the circle
     scalar4 axis_minor;   // unit; w: radius of the tube, r
-    // With HAS_POWER, values as seen from the eye: a / r and A / r, where a leads to the eye from the
-    // circle's nearest point, and A is its part along `radial`, the unit direction away from the axis; and
-    // the eye's distance from the axis. The power is (|a|^2 - r^2) / (2 r) (kernels/shapes/torus.h).
+    // With HAS_POWER, values seen from the eye. a leads to the eye from the circle's nearest point, and A is
+    // its component along `radial`, the unit direction away from the axis. `gradient` is a / r. The power is
+    // (|a|^2 - r^2) / (2 r) (kernels/shapes/torus.h).
     scalar4 gradient; // w: A / r
     scalar4 radial;   // w: the eye's distance from the axis
     uint4 id;         // y: HAS_POWER
@@ -94,15 +94,15 @@ typedef struct {
     uint4 id;
 } Triangle;
 
-// Separate from Triangle, because every intersection test reads that, but only the closest hit reads these.
+// A triangle's vertex normals. Only the closest hit reads these, so they are separate from Triangle.
 typedef struct {
     scalar4 a, b, c; // unit; w of a: 1 if all are on one side of the triangle, else 0
 } TriangleNormals;
 
-// At `certified`, the neighbors of a triangle: the ids of the triangles across the edges opposite a, b and c,
-// and NEIGHBOR_SIDES_BITS bits for each, from the lowest on, which are set if signs of exact arithmetic on
-// the scene's vertices prove it, the last if the neighbor's normals lift its points away from the plane of
-// this triangle. The array has an element for every object, whose id is the index.
+// The neighbors of a triangle at `certified`. x, y and z are the ids of the triangles across the edges
+// opposite a, b and c. w has NEIGHBOR_SIDES_BITS bits for each, the lowest first. A bit is set if exact
+// arithmetic on the scene's vertices proves it; the last one means that the neighbor's normals lift its
+// points away from the plane of this triangle. The array is indexed by the ids of objects.
 typedef struct {
     uint4 ids_sides;
 } TriangleNeighbors;
@@ -116,31 +116,31 @@ enum {
 };
 #define NO_NEIGHBOR 0xfffffffeu
 
-// Texture coordinates.
+// The texture coordinates of a triangle's vertices.
 typedef struct {
     scalar4 a_b;       // u and v of a, u and v of b
     scalar4 c_density; // u and v of c; z: texels of the full texture per unit of length
 } TriangleUvs;
 
-// The points with |p x axis|^2 = k (p . axis), p from the apex.
+// A paraboloid: the points p, measured from the apex, with |p x axis|^2 = k (p . axis).
 typedef struct {
     scalar4 apex_k;   // w: k, 4 |axis| times the focal length
-    scalar4 axis_end; // w: p . axis runs from 0 to this where finite
-    // With HAS_POWER, the axis' point nearest to the eye, and in w that point's p . axis, which axis_end.w
-    // then lacks. The power is |m|^2 - k p . axis at the eye (kernels/shapes/paraboloid.h).
+    scalar4 axis_end; // w: if finite, p . axis runs from 0 to this
+    // With HAS_POWER, the point of the axis nearest to the eye; w is that point's p . axis, which axis_end.w
+    // then excludes. The power is |m|^2 - k p . axis at the eye (kernels/shapes/paraboloid.h).
     scalar4 foot_lift;
     uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED | HAS_POWER
 } Paraboloid;
 
-// A sphere, disc, cylinder, cone, torus or paraboloid that an affine map has made another shape, such as an
-// ellipsoid. The map leads from the space of a unit shape, around 0 and the axis z, to that of the eye.
+// A sphere, disc, cylinder, cone, torus or paraboloid under an affine map, such as an ellipsoid. The map
+// leads from the space of a unit shape, centered at 0 on the z axis, to that of the eye.
 typedef struct {
-    scalar4 rows[3];     // of the map; w: where the unit shape's 0 lies
+    scalar4 rows[3];     // rows of the map; w: the image of the unit shape's 0
     scalar4 inverses[3]; // rows of its inverse; w of the first: a bound on its norm; w of the second: below
-    scalar4 extent;      // half of the box around it, 0 if unbounded; w: its condition, as of an Instance
-    // The unit shape's numbers, x: the radius, a power of two; w: half the height where finite. y, z: of a
-    // cone the radius at the base and the slope, of a torus both radii, of a paraboloid k. Rays that start
-    // beyond twice inverses[1].w from 0 are moved to be mapped.
+    scalar4 extent;      // half of its box, 0 if unbounded; w: its condition (INSTANCE_CONDITION_MAX)
+    // Parameters of the unit shape. x: the radius, a power of two; w: half the height if finite; y, z: a
+    // cone's radius at the base and slope, a torus' radii, or a paraboloid's k. Rays that start farther from
+    // 0 than twice inverses[1].w are moved before they are mapped.
     scalar4 sizes;
     uint4 id; // y: REVOLUTION_FINITE | REVOLUTION_CAPPED, z: the unit shape's TYPE_…
 } Oval;
@@ -160,23 +160,23 @@ typedef struct {
     SHAPE(OVALS,     Oval,     oval,     ovals)
 // clang-format on
 
-// An instance of a mesh that instances share, a primitive of the scene's BVH with a BVH inside. It maps the
-// mesh's space, in which its box is around 0 and its largest coordinate is 1/2 to 1, to that of the eye.
+// An instance of a shared mesh, a primitive of the scene's BVH with a BVH inside. It maps the mesh's space,
+// where the mesh's box is around 0 and its largest coordinate is 1/2 to 1, to that of the eye.
 typedef struct {
-    scalar4 rows[3];     // of the map; w: where the mesh's 0 lies
+    scalar4 rows[3];     // rows of the map; w: the image of the mesh's 0
     scalar4 inverses[3]; // rows of its inverse; w of the first: the root of the map's |determinant|
     scalar4 extent;      // half of the box around the instance; w: its condition
-    uint4 id;            // x: its first triangle's, y: its SharedMesh, z: 1 + the material, or 0: the mesh's
+    uint4 id;            // x: first triangle's id, y: SharedMesh, z: 1 + the material, or 0: the mesh's
 } Instance;
 
-// The condition of an instance is the largest sum over a row of |map| |inverse|, by which the roundings of a
-// ray that is mapped and of the points that it hits grow. The host copies meshes instead if it is more.
+// The condition of an instance is the largest row sum of |map| |inverse|. Mapping multiplies the roundings
+// of a ray and of the points that it hits by it. Above this maximum the host copies the mesh instead.
 enum { INSTANCE_CONDITION_MAX = 32 };
-// What mapping a ray moves it by within a distance, in u of that distance times the condition
+// Mapping a ray moves it by at most this many u of a distance times the condition, within that distance
 // (docs/numerics.md).
 enum { INSTANCE_RAY_SLACK = 10 };
 
-// Every type of primitive: the shapes and the instance.
+// Lists every type of primitive: the shapes and the instance.
 // clang-format off
 #define PRIMITIVE_LIST(PRIMITIVE) \
     SHAPE_LIST(PRIMITIVE)         \
@@ -206,7 +206,7 @@ typedef struct {
 
 enum { BVH_EMPTY = 0, BVH_NODE = 0xff };
 
-// The vertices of a leaf's triangles, for kernels with several lanes, which test a lane per triangle
+// The vertices of a leaf's triangles, for kernels with several lanes, which test one triangle per lane
 // (kernels/traversal/triangle_block.h). The rows a.x, a.y, a.z, b.x ... c.z are as wide as a node. If a leaf
 // has fewer triangles, the first one is repeated.
 enum { BLOCK_ROWS = 9 };
@@ -216,10 +216,10 @@ typedef struct {
 } TriangleBlock;
 #endif
 
-// The spheres of a leaf, for kernels with several lanes (kernels/traversal/sphere_block.h): rows of the
-// centers' x, y and z and of the radii, at least FLT_MAX for spheres with HAS_POWER, then the ids, with
-// SPHERE_HAS_FLAGS if the sphere has any, and the places in the array of spheres. If a leaf has fewer
-// spheres, the first one is repeated.
+// The spheres of a leaf, for kernels with several lanes (kernels/traversal/sphere_block.h). Rows of the
+// centers' x, y and z and of the radii, which are at least FLT_MAX for spheres with HAS_POWER, precede the
+// ids, with SPHERE_HAS_FLAGS if the sphere has any, and the indices in the array of spheres. If a leaf has
+// fewer spheres, the first one is repeated.
 enum { SPHERE_ROWS = 4 };
 #define SPHERE_HAS_FLAGS 0x80000000u
 #ifdef __OPENCL_VERSION__
@@ -229,7 +229,7 @@ typedef struct {
 } SphereBlock;
 #endif
 
-// The first triangles of four blocks.
+// The indices of the first triangles of four blocks.
 typedef struct {
     uint4 triangles;
 } BlockPlaces;
@@ -262,11 +262,11 @@ typedef struct {
     uint4 place;    // x: its BVH's root, y: the ObjectEntry of its first triangle
 } SharedMesh;
 
-// The ids of an instance. There is one for each instance, in the order of ids. The ids between them are those
-// of other objects, which have an ObjectEntry each, as has every instance; behind an instance an id exceeds
-// the index of its entry by ids.z.
+// The ids of an instance. The array has an element for each instance, in the order of ids. The ids between
+// the ranges of instances belong to other objects. Each of these, and each instance, has one ObjectEntry.
+// After an instance an id exceeds the index of its entry by ids.z.
 typedef struct {
-    uint4 ids; // x: the first, y: the one behind the last, w: the instance
+    uint4 ids; // x: the first, y: one past the last, w: the index of the instance
 } InstanceIds;
 
 // The shape and the material that an object's id refers to. Ids are indices unless there are instances.
@@ -280,29 +280,31 @@ typedef struct {
     scalar4 other_color; // the checker's second color, w: shininess
     scalar4 grid;        // xyz: the eye's position in checker cells, w: cells per unit; 0: no checker
     scalar4 reflection_transmission_ior; // w: texels of the texture per unit of length, on planes and discs
-    scalar4 reflection_tint;   // factors of what is reflected, the largest 1; w: 1 with Fresnel's equations
+    scalar4 reflection_tint;   // factors of reflected light, the largest 1; w: 1 with Fresnel's equations
     scalar4 specular_tint;     // factors of highlights
-    scalar4 transmission_tint; // factors of what is refracted
+    scalar4 transmission_tint; // factors of refracted light
     scalar4 emission;          // rgb
-    scalar4 absorption; // rgb, density: within the body exp(-density d) of light is left after a length d
-    // The loss of a shadow ray here: -log2(transmission) in integer steps, whose sum does not depend on the
-    // order of the objects. x counts steps of 2^-24, for float; y and z are the low and high half of the
-    // steps of 2^-48, for double. Red's is that of all channels unless materials have filters.
-    // of a conductor with the index n + i k, rgb: n^2 - k^2, w: 1 if it is one; and (2 n k)^2
+    scalar4 absorption; // rgb: density; within the body exp(-density d) of light remains after a length d
+    // A conductor has the index n + i k. conductor_real: n^2 - k^2, w: 1 for a conductor. The other is
+    // (2 n k)^2.
     scalar4 conductor_real, conductor_imaginary_squared;
-    // The normal map's u and v are xy . (u, v) + z of each row. w: the strength; and the map's texels per
-    // unit of length over the density of the surface's texture coordinates.
+    // The normal map's u and v are xy . (u, v) + z of each row. normal_u.w is the strength, and normal_v.w
+    // the map's texels per unit of length over the density of the surface's texture coordinates.
     scalar4 normal_u, normal_v;
+    // The optical depth that a shadow ray gains here, -log2(transmission) in integer steps, whose sum does
+    // not depend on the order of the objects. x counts steps of 2^-24, for float; y and z are the low and
+    // high half of the steps of 2^-48, for double. Red's is that of all channels unless materials have
+    // filters.
     uint4 optical_depth, optical_depth_green, optical_depth_blue;
     // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_… along u and v
     uint4 texture;
     // x: 1 + the index of the first level of the texture whose alpha decides where rays pass, or 0; y: the
     // bits of the least alpha that stops them, as a float; z, w: WRAP_… along u and v
     uint4 cutout;
-    uint4 normal_map; // as `texture`
+    uint4 normal_map; // x: 1 + the index of its first level, or 0; y: number of levels; z, w: WRAP_…
 } Material;
 
-// How a texture extends beyond its edges.
+// Modes in which a texture extends beyond its edges.
 enum { WRAP_REPEATED, WRAP_CLAMPED, WRAP_MIRRORED };
 
 // One level of a texture's mipmap, each half the size of the one before, down to one texel.
@@ -314,22 +316,22 @@ typedef struct {
     uint4 color; // the bits of red, green, blue and, in first levels, alpha as floats
 } Texel;
 
-enum { OPAQUE = 0x7fffffff };     // in optical_depth.x: no light passes
+enum { OPAQUE = 0x7fffffff };     // in optical_depth.x, passes no light
 enum { PASSING_DEPTH_MAX = 125 }; // the largest -log2(transmission) whose float is normal after rounding
 
 // The largest bounce depth.
 enum { BOUNCES_MAX = 255 };
 
-// The signature of a ray tree is PATH_START, followed for each ray, depth first and reflected before
-// refracted, by the low 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is
-// that of the object hit, -1 for the background. The events are the bounces there, 0 if there are none.
-// (Fowler, Noll, Vo: FNV-1a, by words instead of bytes.)
+// The signature of a ray tree starts as PATH_START. Each ray, depth first and reflected before refracted,
+// replaces it by the low 32 bits of (signature ^ (id + 1) * PATH_EVENTS + events) * PATH_FACTOR. The id is
+// that of the object hit, or -1 for the background. The events are the bounces there, or 0. (Fowler, Noll,
+// Vo: FNV-1a, by words instead of bytes.)
 enum { PATH_REFLECTED = 1, PATH_REFRACTED = 2, PATH_TOTAL_REFLECTION = 4, PATH_EVENTS = 8 };
 #define PATH_START  0x811c9dc5u
 #define PATH_FACTOR 0x01000193u
 
-// At `certified` a sample's color is within this part of its largest channel, or of 1 if that is more, of the
-// exact one, unless a texture is on its path.
+// At `certified` a sample's color differs from the exact one by at most this fraction of its largest
+// channel, or of 1 if that is more, unless a texture is on its path.
 #define CERTIFIED_COLOR_ERROR 0x1p-8
 
 // The tile of pixels that a packet of 1, 4, 8 or 16 lanes covers.
@@ -380,7 +382,7 @@ enum {
 
 // One of SKY_ROWS x SKY_COLUMNS ranges of directions with nearly equal light, laid out as the sky's image.
 typedef struct {
-    // x: the least longitude, in turns from sky_forward; y: its range; z, w: these of the latitude's sine
+    // x: least longitude, in turns from sky_forward; y: its range; z, w: these of the latitude's sine
     scalar4 place;
 } SkyCell;
 
@@ -393,12 +395,12 @@ typedef struct {
     // For spots, x: 1 - cos(half-angle), from the axis to the edge; y: 1 - cos(half-angle - penumbra), which
     // kernels do not read; z: 1 / (x - y), or 0 for a hard edge.
     scalar4 cone;
-    // With HAS_FADING_LIGHTS: the strength is divided by x + y d + z d^2 at the distance d.
+    // With HAS_FADING_LIGHTS, the strength is divided by x + y d + z d^2 at the distance d.
     scalar4 fading;
-    // With HAS_AREA_LIGHTS: from the center of a rectangle or an ellipse to the middles of two sides,
-    // relative to the direction for directional lights; two sides of a triangle, one of whose vertices is at
-    // position - (across_u + across_v) / 4. across_u.w: a sphere's radius; of the sky, the factor by which
-    // its color and both ranges of a cell are multiplied to give a part of `color`.
+    // With HAS_AREA_LIGHTS, the vectors from the center of a rectangle or an ellipse to the middles of two
+    // sides, relative to the direction for directional lights, or two sides of a triangle with a vertex at
+    // position - (across_u + across_v) / 4. across_u.w is a sphere's radius or, for the sky, the factor that
+    // turns the product of a cell's color and both its ranges into a fraction of `color`.
     scalar4 across_u, across_v;
     uint4 type; // x: LIGHT_TYPE_…, y: LIGHT_AREA_…
 } Light;
@@ -407,40 +409,40 @@ enum { CAMERA_ORTHOGRAPHIC = 1, CAMERA_EQUIRECTANGULAR };
 
 typedef struct {
     scalar4 background, ambient;
-    // With HAS_SKY the background is that of directions across the unit vector sky_up. sky_above and
-    // sky_below are added for unit directions along and against it, and in between by the cosine.
-    // sky_up.w: the largest magnitude of their channels. With HAS_IMAGES and sky_texture.x > 0 it is an image
-    // of all directions, whose center lies along the unit vector sky_forward, and whose middle of the right
-    // half along sky_right; sky_forward.w is the factor of its colors.
+    // With HAS_SKY, `background` is the color of directions across the unit vector sky_up. sky_above is
+    // added along it and sky_below against it, in proportion to the cosine. sky_up.w is the largest
+    // magnitude of their channels. With HAS_IMAGES and sky_texture.x > 0 the sky is an image of all
+    // directions. Its center lies along the unit vector sky_forward, and the middle of its right half along
+    // sky_right; sky_forward.w is the factor of its colors.
     scalar4 sky_up, sky_above, sky_below, sky_forward, sky_right;
     // A camera ray runs from the eye along forward + x right + y up, with x and y in half pixels from the
     // image's center. The eye is the origin, except in a preview of a scene compiled for another eye.
     //
     // With HAS_LENS and lens_right.w > 0, one over the distance of the focal plane, it runs from a point of
-    // the lens to where the ray from the lens' center meets that plane; lens_right and lens_up lead from the
-    // center to the edge. With HAS_ORTHOGRAPHIC and lens_up.w = CAMERA_ORTHOGRAPHIC it runs along forward,
-    // from the eye + x right + y up. With HAS_EQUIRECTANGULAR and lens_up.w = CAMERA_EQUIRECTANGULAR its
-    // longitude is x right.w turns, from forward towards right, and its latitude y up.w turns, towards up;
-    // these three are then unit vectors.
-    // With HAS_ORTHOGRAPHIC the eye is that of the shifted frame. forward.w: at `certified`, the direction
-    // error of these rays, in u of their length.
+    // the lens to where the ray from the lens' center crosses that plane; lens_right and lens_up lead from
+    // the center to the edge. With HAS_ORTHOGRAPHIC and lens_up.w = CAMERA_ORTHOGRAPHIC it runs along
+    // forward, from the eye + x right + y up. With HAS_EQUIRECTANGULAR and lens_up.w =
+    // CAMERA_EQUIRECTANGULAR its longitude is x right.w turns, from forward towards right, and its latitude
+    // y up.w turns, towards up; these three are then unit vectors. With HAS_ORTHOGRAPHIC the eye is that of
+    // the shifted frame. At `certified` forward.w is the direction error of these rays, in u of their
+    // length.
     scalar4 eye, forward, right, up;
     scalar4 lens_right, lens_up;
-    scalar4 bounds;                  // those of the BVH; xyz: center, w: largest |x| + |y| + |z| from there
-    scalar4 bounds_low, bounds_high; // its corners; low.w: what mapping rays to instances adds to box slacks
+    scalar4 bounds;                  // of the BVH; xyz: center, w: largest |x| + |y| + |z| from the center
+    scalar4 bounds_low, bounds_high; // their corners; low.w: the box slack that mapping to instances adds
     // The corners of a box around all points where a transparent object may touch an opaque one. Low is above
     // high if there are no such points.
     scalar4 contact_low, contact_high;
-    // x: width of a sample's share of a pixel, at distance 1. y: the first rival of every hit at `certified`:
-    // the largest scalar, or its negative if no bound holds and so every hit is uncertain. z: with
-    // HAS_ORTHOGRAPHIC, that width at any distance, or 0. w: the least weight of a ray that is traced.
+    // x: width of a sample's share of a pixel, at distance 1. y: the first rival of every hit at
+    // `certified`: the largest scalar, or its negative if no bound holds, and every hit is uncertain. z:
+    // with HAS_ORTHOGRAPHIC, that width at any distance, or 0. w: the least weight of a ray that is traced.
     scalar4 sample;
     uint4 image;                     // x: width, y: height, z: samples per pixel, w: number of lights
     uint4 bounces;                   // x: largest depth
     uint4 cull_spheres;              // x: number per common origin, 0 if there are none
-    uint4 sky_texture;               // as a material's texture
+    uint4 sky_texture;               // x: 1 + the index of its first level, or 0; y: number of levels
     uint4 counts[TYPE_QUARTETS];     // primitives by TYPE_…
-    uint4 bvh_counts[TYPE_QUARTETS]; // those of them in the BVH, which come first
+    uint4 bvh_counts[TYPE_QUARTETS]; // primitives in the BVH by TYPE_…, which come first
 } SceneHeader;
 
 // The arena is one buffer with the header followed by these arrays, because devices may allow a kernel only 8
@@ -465,7 +467,7 @@ typedef struct {
     ARRAY(INSTANCE_IDS, InstanceIds, , instance_ids)
 // clang-format on
 
-// Where each array begins, in units of the largest alignment, that of a double16.
+// Holds the offset of each array in units of the largest alignment, that of a double16.
 enum { ARENA_UNIT = 128 };
 #define ARENA_OFFSET(NAME, Type, name, names) unsigned names;
 typedef struct {

@@ -1,4 +1,4 @@
-// Defines packet width and precision: a work-item traces packets of LANES rays, one per lane.
+// Defines packet width and precision. A work-item traces packets of LANES rays, one per lane.
 //
 // Above this file, code reads like the scalar algorithm, with a mask where that would branch. A mask is the
 // result of a comparison: 0/1 for one lane, 0/-1 for more. `&`, `|` and `!` work on both.
@@ -307,8 +307,7 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
-// Eight vectors, and then the smallest lane of each, which lane_minima_reduce computes from `all` into
-// `each`.
+// Holds eight vectors in `all`, which lane_minima_reduce replaces by the smallest lane of each in `each`.
 enum { MINIMA_COUNT = 8 };
 typedef union {
     real all[MINIMA_COUNT];
@@ -337,7 +336,7 @@ static inline real lanes_smallest_of_each(const real *vectors)
 #endif
 
 // Replaces eight vectors by their smallest lanes. Comparing lanes in pairs packs two vectors into one, so
-// that all eight take little longer than one. Unrolled, so that they stay in registers.
+// that all eight take little longer than one. It is unrolled, so that they stay in registers.
 static inline void lane_minima_reduce(LaneMinima *leasts)
 {
 #if LANES > 1

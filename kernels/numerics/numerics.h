@@ -1,5 +1,5 @@
-// Arithmetic with known error bounds: correctly rounded division and square root, products without
-// cancellation, pairs of reals with twice the precision, and the functions that shading needs.
+// Implements arithmetic with known error bounds: correctly rounded division and square root, products
+// without cancellation, pairs of reals with twice the precision, and the functions that shading needs.
 //
 // Nothing here may be contracted or reassociated; real_fma is explicit.
 #ifndef NUMERICS_H
@@ -7,15 +7,16 @@
 
 #include "numerics/perturb.h"
 
-// Intersections use compensated forms, in pairs.
+// Selects the compensated forms of intersections, in pairs.
 #define IS_COMPENSATED (IS_STRICT || IS_DOUBLE)
 
-// Rounds quotients and roots correctly on devices whose division and square root are inexact (REPAIRS_DIVIDE,
-// at `strict`, in floats). They are computed from the operands' mantissas alone, so that nothing overflows or
-// underflows, brought within an ulp by a Newton step, then chosen among three neighbors by exact comparisons.
-// A Newton step alone does not suffice: the root of 1 - 2^-24 lies 2^-27 ulp from the midpoint of two floats.
+// Rounds quotients and roots correctly on devices whose division and square root are inexact
+// (REPAIRS_DIVIDE, at `strict`, in floats). They are computed from the operands' mantissas alone, so that
+// nothing overflows or underflows, brought within an ulp by a Newton step, then chosen among three neighbors
+// by exact comparisons. A Newton step alone does not suffice, because the root of 1 - 2^-24 lies 2^-27 ulp
+// from the midpoint of two floats.
 //
-// Only for floats, whose bit patterns FLOAT_… and float_… know.
+// FLOAT_… and float_… assume the bit patterns of floats.
 #define FLOAT_EXPONENT_BITS ((integer)(0x7f800000))
 #define FLOAT_SIGN_BIT      ((integer)(~0x7fffffff))
 #define FLOAT_BITS_OF_ONE   ((integer)(0x3f800000))
@@ -55,7 +56,7 @@ static inline real repaired_quotient(real a, real b)
     mask rises = residual > (up - quotient) * half_b, falls = residual < (down - quotient) * half_b;
     quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
     quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & FLOAT_SIGN_BIT));
-    // in two factors: one alone may overflow where the product does not
+    // in two factors, because one alone may overflow where the product does not
     integer exponent = ((a_bits & FLOAT_EXPONENT_BITS) >> 23) - ((b_bits & FLOAT_EXPONENT_BITS) >> 23);
     integer half_exponent = exponent >> 1;
     return quotient * float_power_of_two(half_exponent) * float_power_of_two(exponent - half_exponent);
@@ -230,7 +231,7 @@ static inline real real_log_complement(real s)
     return real_fma(k, ln2_high, real_fma(k, ln2_low, log_m));
 }
 
-// Below this real_exp_negative is 0.
+// Below this argument real_exp_negative returns 0.
 #if IS_DOUBLE
 #define EXP_LOWEST (-708.0)
 #else

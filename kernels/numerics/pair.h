@@ -1,4 +1,4 @@
-// Computes sums and products without error, and real_fma: a b + c, rounded once.
+// Computes sums and products without error, and real_fma, which rounds a b + c once.
 //
 // A device that emulates fma does so with integers, in several times the operations. There real_fma adds the
 // two parts of the product to c without error and rounds the sum once, after rounding the remainder to odd
@@ -31,8 +31,8 @@ static inline Pair two_sum(real a, real b)
 
 #else
 
-// a b without error, if that is neither tiny nor huge, from parts of 12 bits, whose products are exact
-// (Dekker, A floating-point technique for extending the available precision, Numerische Mathematik 18, 1971).
+// Returns a b without error unless tiny or huge, from parts of 12 bits, whose products are exact (Dekker, A
+// floating-point technique for extending the available precision, Numerische Mathematik 18, 1971).
 static inline Pair moderate_product(real a, real b)
 {
     const integer high_bits = (integer)(~0xfff);
@@ -43,8 +43,8 @@ static inline Pair moderate_product(real a, real b)
     return (Pair){product, a_low * b_low - missing};
 }
 
-// Returns high + low rounded to odd: if low is not 0, the one of the two reals around the sum whose last bit
-// is 1.
+// Returns high + low rounded to odd. If low is not 0, this is that one of the two reals around the sum whose
+// last bit is 1.
 static inline real pair_round_to_odd(Pair sum)
 {
     integer bits = bits_from_real(sum.high);
@@ -53,7 +53,8 @@ static inline real pair_round_to_odd(Pair sum)
     return real_from_bits(lanes_select(moves, bits + step, bits));
 }
 
-// Inlined in hundreds of places, it made a cold start with Intel's compiler take 26 s instead of 5.
+// Returns a b + c, rounded once. Inlining it in hundreds of places made a cold start with Intel's compiler
+// take 26 s instead of 5.
 __attribute__((noinline)) static real real_fma(real a, real b, real c)
 {
     const real one = (real)(1), up = (real)(0x1p64f), down = (real)(0x1p-64f);
@@ -87,7 +88,7 @@ __attribute__((noinline)) static real real_fma(real a, real b, real c)
 
 #endif
 
-// a b without error.
+// Returns a b without error.
 static inline Pair two_product(real a, real b)
 {
     real product = a * b;

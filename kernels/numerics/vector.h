@@ -29,7 +29,7 @@ static inline Vector vector_scale(Vector a, real factor)
     return (Vector){a.x * factor, a.y * factor, a.z * factor};
 }
 
-// a + b factor
+// Returns a + b factor.
 static inline Vector vector_fma(Vector b, real factor, Vector a)
 {
     return (Vector){real_fma(b.x, factor, a.x), real_fma(b.y, factor, a.y), real_fma(b.z, factor, a.z)};
@@ -125,7 +125,7 @@ static inline Pair pair_vector_dot_vector(PairVector a, Vector b)
     return pair_add(pair_add(pair_scale(a.x, b.x), pair_scale(a.y, b.y)), pair_scale(a.z, b.z));
 }
 
-// a x b
+// Returns a x b.
 static inline PairVector pair_vector_cross(PairVector a, Vector b)
 {
     return (PairVector){pair_subtract(pair_scale(a.y, b.z), pair_scale(a.z, b.y)),
@@ -138,8 +138,8 @@ static inline Vector pair_vector_high(PairVector a)
     return (Vector){a.x.high, a.y.high, a.z.high};
 }
 
-// Returns a . b rounded about once, in a third of the operations of pairs: vector_dot_compensated of the high
-// parts, plus the low parts' product among the errors that it sums.
+// Returns a . b rounded about once, in a third of the operations of pairs. It computes
+// vector_dot_compensated of the high parts and adds the low parts' products to the errors that it sums.
 static inline real pair_vector_dot_once(PairVector a, Vector b)
 {
     Pair x = two_product(a.x.high, b.x), y = two_product(a.y.high, b.y), z = two_product(a.z.high, b.z);
@@ -158,7 +158,7 @@ static inline Vector pair_vector_cross_once(PairVector a, Vector b)
 }
 
 #if LANES > 1
-// Returns the vector of one lane in all lanes.
+// Broadcasts one lane's vector to all lanes.
 static inline Vector vector_of_lane(const Vector *lanes, uint lane)
 {
     return (Vector){real_of_lane(&lanes->x, lane), real_of_lane(&lanes->y, lane),

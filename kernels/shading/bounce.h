@@ -5,8 +5,8 @@
 
 #include "shading/surface.h"
 
-// What a ray travels in: the density of the body that absorbs its light, and that of the body around that
-// one; 0 in air (shading/medium.h).
+// The medium of a ray: the density of the body that absorbs its light, and that of the body around that one;
+// 0 in air (shading/medium.h).
 typedef struct {
     Color3 density, outer;
 } Medium;
@@ -19,7 +19,7 @@ typedef struct {
     real travelled; // distance from the eye along the path
     Sample sample;  // with HAS_AREA_LIGHTS
     Medium medium;  // with HAS_ABSORPTION
-    // At `certified`, the errors as in a Ray:
+    // At `certified`, copied to the Ray's fields of the same names; start_error becomes -tmin:
     real origin_error, start_error, direction_error;
     integer left;
     mask leaves_outward;
@@ -56,8 +56,8 @@ static inline Vector vector_reflect(Vector direction, Vector normal)
     return vector_renormalize(vector_fma(normal, (real)(-2) * away, direction));
 }
 
-// Returns the square under the root of vector_refract: of c^2 + k for s = c on entering a body of index n, of
-// s^2 - k for s = n c on leaving it. It is negative in total internal reflection.
+// Returns the square under the root of vector_refract, which is c^2 + k for s = c on entering a body of
+// index n, and s^2 - k for s = n c on leaving it. It is negative in total internal reflection.
 static inline real refraction_squared(real s, mask entering, real ior)
 {
     real above_one = lanes_select(entering, (real)(1) - ior, ior - (real)(1));
@@ -70,10 +70,10 @@ static inline real relative_difference(real a, real b)
     return real_divide(a - b, real_max(a + b, (real)(SMALLEST_RATIO)));
 }
 
-// Returns the part of unpolarized light that a body of index n reflects, from outside or inside, by Fresnel's
-// equations (Born, Wolf, Principles of Optics, 1999, section 1.5.2); 1 in total internal reflection. With the
-// s of refraction_squared and the root r they are (s - r) / (s + r) and (n^2 s - r) / (n^2 s + r) on
-// entering, (s - n^2 r) / (s + n^2 r) on leaving.
+// Returns the fraction of unpolarized light that a body of index n reflects, from outside or inside, by
+// Fresnel's equations (Born, Wolf, Principles of Optics, 1999, section 1.5.2); 1 in total internal
+// reflection. With the s of refraction_squared and the root r the amplitudes are (s - r) / (s + r) and
+// (n^2 s - r) / (n^2 s + r) on entering, (s - n^2 r) / (s + n^2 r) on leaving.
 static inline real fresnel_reflectance(Vector direction, Vector normal, mask entering, real ior)
 {
     const real one = (real)(1), zero = (real)(0);
@@ -87,8 +87,8 @@ static inline real fresnel_reflectance(Vector direction, Vector normal, mask ent
     return lanes_select(squared < zero, one, reflectance);
 }
 
-// Returns the part of unpolarized light that a conductor reflects, for the cosine c and the sine s of the
-// angle. With (a + i b)^2 = (n + i k)^2 - s^2 the part of light across the plane of incidence is
+// Returns the fraction of unpolarized light that a conductor reflects, for the cosine c and the sine s of
+// the angle. With (a + i b)^2 = (n + i k)^2 - s^2 the fraction of light across the plane of incidence is
 // (a^2 + b^2 - 2 a c + c^2) / (a^2 + b^2 + 2 a c + c^2), and along it that times
 // (c^2 (a^2 + b^2) - 2 a c s^2 + s^4) / (c^2 (a^2 + b^2) + 2 a c s^2 + s^4) (Born, Wolf, section 14.2). The
 // smaller of a^2 and b^2 is computed from their product, which does not cancel.
@@ -172,7 +172,7 @@ static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask ins
     bounce->direction_error = lanes_select(inside, error, bounce->direction_error);
 }
 
-// How a ray hits a surface.
+// The incidence of a ray on a surface.
 typedef struct {
     mask found;
     real turn;                // the error of its direction
@@ -216,9 +216,9 @@ static inline mask reflected_set_error(const Surface *surface, const Ray *ray, c
 typedef struct {
     real scale; // n
     real s, s_error;
-    real root, least_root; // the square root, 0 in total reflection; not more than the exact one, or 1
+    real root, least_root; // the square root, 0 in total reflection; a lower bound of the exact one, or 1
     real squares;          // bounds s^2 and k
-    mask uncertain;        // about total reflection
+    mask uncertain;        // where total reflection is uncertain
 } Snell;
 
 static inline Snell surface_snell(const Surface *surface, const Incidence *incidence, real angle_error)
@@ -250,7 +250,7 @@ static inline void refracted_set_chord(const Surface *surface, const Snell *snel
     Chord chord = chord_start(end, surface->place_error, snell->root * inverse_ior, NEVER,
                               real_fma(angle_error, inverse_ior, computed + end->normal));
     bounce_set_chord(refracted, &chord, surface->entering & (surface->ior >= (real)(1)));
-    // in the plane of incidence; across it n, which is more where n < 1
+    // the steepness in the plane of incidence; across it this is n, which is more where n < 1
     real steepest = real_max(real_divide(snell->s + snell->s_error, snell->least_root), snell->scale);
     real turned = real_fma(steepest, end->turn + end->normal, end->normal);
     real leaving = computed + (divide_or(end->place, end->radius, NEVER) + turned);
@@ -312,8 +312,8 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     refracted->weight = vector_select(*uncertain, none, refracted->weight);
 }
 
-// Returns a part of a weight's channel, which no product rounds to 0, since paths must end only where nothing
-// reflects or transmits.
+// Returns a fraction of a weight's channel. The product never rounds to 0, since paths must end only where
+// nothing reflects or transmits.
 static inline real channel_part(real channel, real part)
 {
     const real zero = (real)(0);
@@ -321,7 +321,7 @@ static inline real channel_part(real channel, real part)
     return real_max(channel * part, least);
 }
 
-// Returns a part of a weight. Without tints its channels are equal.
+// Returns a fraction of a weight. Without tints its channels are equal.
 static inline Color3 weight_part(Color3 weight, real part)
 {
     if (HAS_TINTS)
@@ -331,7 +331,7 @@ static inline Color3 weight_part(Color3 weight, real part)
     return (Color3){scaled, scaled, scaled};
 }
 
-// Returns the product with a color, whose channels no product rounds to 0.
+// Returns the product of a weight and a color, no channel of which rounds to 0.
 static inline Color3 weight_tinted(Color3 weight, Color3 parts)
 {
     return (Color3){channel_part(weight.x, parts.x), channel_part(weight.y, parts.y),
@@ -347,8 +347,8 @@ static inline real weight_largest(Color3 weight)
 // The relative rounding error of a weight, each of up to 255 bounces having 4 roundings.
 #define WEIGHT_ROUNDING ((real)(1024 * UNIT_ROUNDOFF))
 
-// Returns the weight, or none if all its channels are below `least`, and so is their part of the pixel. At
-// `certified` adds the lanes where rounding may decide.
+// Returns the weight, or 0 if all its channels, and so their share of the pixel, are below `least`. At
+// `certified` adds the lanes where rounding may decide to *uncertain.
 static inline Color3 weight_cut(Color3 weight, real least, mask *uncertain)
 {
     const Color3 none = {(real)(0), (real)(0), (real)(0)};
@@ -360,9 +360,9 @@ static inline Color3 weight_cut(Color3 weight, real least, mask *uncertain)
 }
 
 // Computes the reflected and the refracted ray of a surface, for a unit `direction`. Returns the lanes of
-// total internal reflection, whose reflected ray carries the transmission in addition, as it carries a part
-// of it by Fresnel's equations, in both cases without its tint. Unless `all`, a ray that no lane carries is
-// not set.
+// total internal reflection, whose reflected ray also carries the transmission. By Fresnel's equations a
+// reflected ray carries a fraction of it. Neither share is tinted. Unless `all`, a ray that no lane carries
+// is not set.
 static inline mask surface_bounce(const Surface *surface, Vector direction, Color3 weight, bool all,
                                   Bounce *reflected, Bounce *refracted)
 {

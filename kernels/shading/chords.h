@@ -4,8 +4,8 @@
 // derivation.
 //
 // Rotate the computed path about the center so that it starts at the exact path's point. That moves no point
-// by more than `place`. The remainder is an angle between the first chords, at most `turn`, by which the
-// points at their ends move at most twice the radius times.
+// by more than `place`. The remainder is an angle of at most `turn` between the first chords. It moves the
+// points at their ends by at most twice the radius times the angle.
 #ifndef CHORDS_H
 #define CHORDS_H
 
@@ -14,12 +14,12 @@
 // The bounds at a point of a sphere.
 typedef struct {
     real radius;      // 0 if there is no sphere, or the ray is too near to its tangent
-    real off;         // over the cosine of incidence, the largest distance to the sphere along the ray
+    real off;         // divided by the cosine of incidence, the largest distance to the sphere along the ray
     real normal;      // error of the normal, for the place where the computed ray hits the sphere
     real place, turn; // bounds of the chord that ends there; NEVER if none does
 } ChordEnd;
 
-// The bounds of the chord that a ray starts; NEVER if it starts none.
+// The bounds of the chord that a ray starts, or NEVER if it does not start one.
 typedef struct {
     real turn, end_place; // end_place bounds the point where it ends, except for errors computed there
     real direction_error;
@@ -73,8 +73,9 @@ static inline ChordEnd chord_end_select(mask condition, ChordEnd yes, ChordEnd n
         lanes_select(condition, yes.turn, no.turn)};
 }
 
-// Returns the chord that starts there, at the inner angle of incidence with this cosine. Its direction is
-// off, seen from the normal, by the end's turn and by `turned`, or by `turned_first` if no chord ended there.
+// Returns the chord that starts at `end`, for the cosine of the inner angle of incidence. Its direction is
+// off, seen from the normal, by the end's turn and by `turned`, or by `turned_first` if no chord ended
+// there.
 static inline Chord chord_start(const ChordEnd *end, real place_error, real cosine, real turned,
                                 real turned_first)
 {

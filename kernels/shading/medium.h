@@ -1,12 +1,12 @@
-// Absorption along a ray's way through transparent bodies, by the law of Bouguer, Lambert and Beer: over the
-// length d the part exp(-density d) of the light is left (Born, Wolf, Principles of Optics, 1999, section
-// 14.1).
+// Absorbs light along a ray's way through transparent bodies, by the law of Bouguer, Lambert and Beer. Over
+// the length d a fraction exp(-density d) of the light remains (Born, Wolf, Principles of Optics, 1999,
+// section 14.1).
 #ifndef MEDIUM_H
 #define MEDIUM_H
 
 #include "shading/bounce.h"
 
-// Returns the medium up to a hit. A surface that is hit from within tells it, whichever surface the ray
+// Returns the medium up to a hit. A surface that is hit from inside determines it, whichever surface the ray
 // entered before.
 static inline Medium medium_before(Medium medium, const Surface *surface)
 {
@@ -15,8 +15,8 @@ static inline Medium medium_before(Medium medium, const Surface *surface)
     return medium;
 }
 
-// Returns the medium of a refracted ray. Behind a body that lies in another one the ray is in the outer one
-// again.
+// Returns the medium of a refracted ray. A ray that leaves a body inside another one returns to the outer
+// one.
 static inline Medium medium_behind(Medium medium, const Surface *surface)
 {
     const Color3 clear = {(real)(0), (real)(0), (real)(0)};
@@ -24,8 +24,8 @@ static inline Medium medium_behind(Medium medium, const Surface *surface)
                     vector_select(surface->entering, medium.density, clear)};
 }
 
-// The length that products with a density use for rays that hit nothing. They absorb everything, and none
-// overflows, by the range that the host keeps densities in (host/compile/materials.c).
+// The length over which rays that hit nothing are absorbed completely. Its products with densities do not
+// overflow, because the host keeps densities in a range (host/compile/materials.c).
 #if IS_DOUBLE
 #define ABSORBED_LENGTH_MAX ((real)(0x1p500))
 #else
@@ -37,8 +37,8 @@ static inline real part_left(real density, real length)
     return real_max(real_exp_negative(-density * length), (real)(SMALLEST_RATIO));
 }
 
-// Returns the weight that is left where a ray of this medium ends, at t, or beyond all surfaces. Absorption
-// alone ends no path, so that paths do not depend on the precision.
+// Returns the weight that remains where a ray in this medium ends, at t, or beyond all surfaces. Absorption
+// alone never ends a path, so that paths do not depend on the precision.
 static inline Color3 weight_absorbed(Color3 weight, const Medium *medium, mask found, real t)
 {
     const real zero = (real)(0);

@@ -1,12 +1,12 @@
-// Normal maps: a texture's colors from 0 to 1 are the shading normal's components from -1 to 1 along u, along
-// v and outward (Peercy, Airey, Cabral, Efficient bump mapping hardware, SIGGRAPH 1997).
+// Applies normal maps. A texture's colors from 0 to 1 are the shading normal's components from -1 to 1 along
+// u, along v and outward (Peercy, Airey, Cabral, Efficient bump mapping hardware, SIGGRAPH 1997).
 #ifndef NORMAL_MAP_H
 #define NORMAL_MAP_H
 
 #include "shading/texture.h"
 #include "shapes/triangle.h"
 
-// The directions on a surface in which its texture coordinates grow, of any length; 0 where none does.
+// The directions, of any length, in which a surface's texture coordinates grow, or 0 if they do not.
 typedef struct {
     Vector u, v;
 } Tangents;

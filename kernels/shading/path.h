@@ -1,5 +1,5 @@
-// The ray tree of a camera ray, and its color. COMPUTE_SIGNATURE, defined as 0 or 1 before this file is
-// included, asks for the tree's signature instead of the color.
+// Traces the ray tree of a camera ray and computes its color, or the tree's signature if COMPUTE_SIGNATURE,
+// which is defined as 0 or 1 before this file is included.
 #ifndef PATH_H
 #define PATH_H
 
@@ -8,15 +8,15 @@
 
 // The hits of a packet of rays, shaded.
 typedef struct {
-    Surface surface; // if no lane hit any, only surface.object
+    Surface surface; // if no lane hits one, only its object is set
     Color3 color;    // without reflection and refraction; the background's where nothing was hit
     real t;          // with HAS_ABSORPTION
-    // at `certified`: lanes uncertain about any of this; a bound on the error of any channel
+    // at `certified`: the lanes where any of this is uncertain; a bound on the error of any channel
     mask uncertain;
     real color_error;
 } ShadedHit;
 
-// Sets the surface that a packet's rays hit and what it reflects of ambient light. Returns whether any lane
+// Sets the surface that a packet's rays hit and the ambient light that it reflects. Returns whether any lane
 // hit one.
 static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
@@ -41,7 +41,7 @@ static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
     return true;
 }
 
-// Adds a light that a packet's shadow rays have been traced to.
+// Adds the contribution of a light to which a packet's shadow rays have been traced.
 static inline void hit_add_light(const Scene *scene, uint index, LightVisibility *light, Traversal *traversal,
                                  ShadedHit *hit)
 {
@@ -65,7 +65,7 @@ static inline void hit_add_light(const Scene *scene, uint index, LightVisibility
     hit->color = vector_add(hit->color, reflected);
 }
 
-// Traces `count` packets of rays and shades their hits; without lights if COMPUTE_SIGNATURE.
+// Traces `count` packets of rays and shades their hits, without lights if COMPUTE_SIGNATURE.
 static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, ShadedHit *hits)
 {
     Traversal traversals[PACKETS];
@@ -107,19 +107,19 @@ static inline unsigned_integer path_signature_add(unsigned_integer path, const R
     return lanes_select(ray->active, longer, path);
 }
 
-// The lanes whose color may be off by more than CERTIFIED_COLOR_ERROR. The 16th left out is for the roundings
-// of the sum.
+// Returns the lanes whose color may be off by more than CERTIFIED_COLOR_ERROR, of which a 16th is reserved
+// for the roundings of the sum.
 static inline mask color_is_uncertain(Color3 color, real error)
 {
     real largest = real_max(real_max(color.x, color.y), real_max(color.z, (real)(1)));
     return !(error <= (real)((1 - 0x1p-4f) * CERTIFIED_COLOR_ERROR) * largest);
 }
 
-// Traces a ray tree depth first, reflected before refracted. *shaded, an element of an array, holds the hit
-// of the ray that is followed; with `is_shaded` at first the camera ray's, which rays_shade has traced with
-// other packets. If COMPUTE_SIGNATURE, *path is the tree's signature (types.h), which in each lane is
-// independent of the other lanes, and the color is undefined. At `certified` *uncertain are the lanes with
-// any uncertain decision.
+// Traces a ray tree depth first, reflected before refracted, and returns its color. *shaded, an element of
+// an array, holds the hit of the current ray. With `is_shaded` it holds the camera ray's at first, which
+// rays_shade has traced with other packets. If COMPUTE_SIGNATURE, sets *path to the tree's signature
+// (types.h), which in each lane is independent of the other lanes, and the color is undefined. At
+// `certified` sets *uncertain to the lanes with any uncertain decision.
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
                                     unsigned_integer *path, mask *uncertain)
 {
@@ -136,7 +136,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         if (depth > 0 || !is_shaded) rays_shade(scene, rays, 1, shaded);
         if (IS_CERTIFIED) *uncertain = *uncertain | (rays[0].active & shaded->uncertain);
         if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, surface_found(&shaded->surface));
-        // without secondary rays the color is that of the camera ray: no weights
+        // without secondary rays the color is the camera ray's and needs no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE)
                 *path = path_signature_add(*path, rays, shaded->surface.object, mask_none(), mask_none(),

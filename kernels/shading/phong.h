@@ -1,4 +1,4 @@
-// Lights and Phong shading (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
+// Computes lights and Phong shading (Phong, Illumination for computer generated pictures, CACM 18(6), 1975).
 #ifndef PHONG_H
 #define PHONG_H
 
@@ -6,14 +6,14 @@
 
 typedef struct {
     Vector direction; // from the surface to the light, unit
-    real facing;      // the cosine between the shading normal and that
-    real strength;    // the part of its color that arrives unless it is occluded
-    real fading;      // with HAS_FADING_LIGHTS, that by the distance alone
-    Color3 tint;      // with HAS_SKY_LIGHT, factors of its color
+    real facing;      // the cosine between the shading normal and `direction`
+    real strength;    // the fraction of the light's color that arrives unless it is occluded
+    real fading;      // with HAS_FADING_LIGHTS, the fraction by distance alone
+    Color3 tint;      // with HAS_SKY_LIGHT, factors of the light's color
     Ray shadow_ray;   // ends at the light
 } LightRay;
 
-// 1 in a spotlight's full cone, 0 outside it, smooth between. The angle is measured as
+// Returns 1 in a spotlight's full cone, 0 outside it, and a smooth value between. The angle is measured as
 // s = 1 - cos = |l - axis|^2 / 2, which is accurate for narrow cones, where the cosine has no bits left.
 static inline real spot_strength(const Light *light, Vector from_light)
 {
@@ -26,7 +26,7 @@ static inline real spot_strength(const Light *light, Vector from_light)
     return light->cone.z == 0 ? hard : soft;
 }
 
-// Returns the strength that a light has left at a vector's length, never 0.
+// Returns the strength of a light at a vector's length, which is never 0.
 static inline real light_fading(const Light *light, Vector to_light)
 {
     real light_distance = real_sqrt(vector_dot(to_light, to_light));
@@ -48,7 +48,7 @@ static inline Vector light_area_offset(const Light *light, uint index, const Sur
         return vector_fma(vector_of(light->across_u), point.x,
                           vector_scale(vector_of(light->across_v), point.y));
     // Where the basis jumps, a pixel's samples do not complement each other. This one jumps only where a
-    // surface lies exactly along the axis, which is that of no coordinate.
+    // surface lies exactly along the axis, which is not a coordinate axis.
     const Vector axis = {(real)(0.37f), (real)(0.48f), (real)(0.79f)};
     Vector toward = vector_normalize(vector_subtract(surface->position, vector_of(light->position)));
     Vector u = vector_normalize(vector_cross(toward, axis)), v = vector_cross(toward, u);
@@ -58,8 +58,8 @@ static inline Vector light_area_offset(const Light *light, uint index, const Sur
     return vector_scale(offset, (real)(light->across_u.w));
 }
 
-// Returns the direction of the surface's sample of the sky's light, a random one where there is one sample
-// per pixel. Sets the light that comes from there, in parts of the light's color.
+// Returns the direction of the surface's sample of the sky's light, a random one if there is one sample per
+// pixel. Sets *tint to the light from there, in fractions of the light's color.
 static inline Vector sky_sample(const Scene *scene, const Light *light, uint index, const Surface *surface,
                                 Color3 *tint)
 {
@@ -85,7 +85,7 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
         *tint = sky_texel_color(scene, longitude.all, real_turns(across, sine.all), surface_found(surface));
     else
         *tint = sky_blended_color(header, sine.all);
-    // by rounding the color may be that of a brighter texel next to the cell
+    // rounding may give the color of a brighter texel next to the cell
     *tint = vector_scale(*tint, longitudes.all * sines.all * (real)(light->across_u.w));
     *tint = (Color3){real_min(tint->x, one), real_min(tint->y, one), real_min(tint->z, one)};
     Vector level =
@@ -93,8 +93,8 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
     return vector_fma(vector_of(header->sky_up), sine.all, vector_scale(level, across));
 }
 
-// The shadow ray to a point or spot light is not normalized: the light is at t = 1. It ends 32 u before, so
-// that a surface on which the light lies does not occlude it.
+// Returns the ray to a light. The shadow ray to a point or spot light is not normalized, so that the light
+// is at t = 1. It ends 32 u before that, so that a surface on which the light lies does not occlude it.
 static inline LightRay light_ray(const Scene *scene, const Light *light, uint index, const Surface *surface)
 {
     bool has_area = HAS_AREA_LIGHTS && light->type.y != LIGHT_AREA_NONE;
@@ -132,7 +132,7 @@ static inline LightRay light_ray(const Scene *scene, const Light *light, uint in
     return to_light;
 }
 
-// max(0, 1 - s)^shininess for the lanes in `wanted`; a shininess of 0 gives 1.
+// Returns max(0, 1 - s)^shininess for the lanes in `wanted`; a shininess of 0 gives 1.
 static inline real highlight_power(mask wanted, real s, real shininess)
 {
     mask nonzero = real_complement_power_is_nonzero(s, shininess);
@@ -143,39 +143,39 @@ static inline real highlight_power(mask wanted, real s, real shininess)
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 
-// max(0, cos)^shininess of the angle between two unit vectors, for the lanes in `wanted`. Near the
-// highlight's center the cosine has no bits left for a high power; its complement s = |a - b|^2 / 2 has.
+// Returns max(0, cos)^shininess of the angle between two unit vectors, for the lanes in `wanted`. Near the
+// highlight's center the cosine has no bits left for a high power, but its complement s = |a - b|^2 / 2 has.
 static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
 {
     Vector difference = vector_subtract(reflected, to_eye);
     return highlight_power(wanted, (real)(0.5f) * vector_dot(difference, difference), shininess);
 }
 
-// How a light reaches the surface.
+// The light from a source that reaches a surface.
 typedef struct {
-    mask lit;         // lanes that it reaches: they face it and are not occluded
-    Color3 reflected; // what the surface reflects of it, as a factor
-    real fraction;    // of the light's color that arrives
-    // At `certified`: lanes where the shadow is uncertain, and others that may or may not face the light,
-    // which matters to highlights and masks of shadows alone: the rest fades to 0.
+    mask lit;         // lanes that face the light and are not occluded
+    Color3 reflected; // the factor by which the surface reflects it
+    real fraction;    // the fraction of the light's color that arrives
+    // At `certified`, the lanes where the shadow is uncertain, and others that may or may not face the
+    // light, which matters only to highlights and masks of shadows, because the rest fades to 0.
     mask uncertain, facing_uncertain;
-    real color_error; // at `certified`: of what the light adds, a bound for every channel
+    real color_error; // at `certified`, bounds the error of the light's contribution in every channel
 } LightVisibility;
 
-// The largest error of a shadow ray's origin, in u of its length, that cull spheres allow: rays with a larger
-// one, as from a floor near the horizon, are not culled. With one above a 64th the shadow is uncertain.
+// The largest error of a shadow ray's origin, in u of its length, that cull spheres allow. Rays with a
+// larger error, as from a floor near the horizon, are not culled. Above a 64th the shadow is uncertain.
 enum { SHADOW_ERROR_MAX = 1 << 9 };
 #define SHADOW_UNCERTAIN_MAX ((real)(0x1p-6f))
-// Where the facing is open by no more than this, in parts of full light, what the light adds is too faint to
-// matter.
+// If the facing is uncertain by at most this fraction of full light, the light's contribution is too faint
+// to matter.
 #define FACING_ERROR_MAX ((real)(0x1p-12f))
 // The least fourth power of a light's distance for which cull_slack does not underflow.
 #define CULLED_DISTANCE_MIN ((real)(SMALLEST_RATIO * 0x1p30f))
 
-// The roundings of a light's color and of what it adds, up to those of the power, relative to them.
+// The relative roundings of a light's color and of its contribution, up to those of the power.
 #define COLOR_ROUNDING ((real)(128 * UNIT_ROUNDOFF))
 
-// The light's direction mirrored by the shading normal.
+// Returns the light's direction mirrored by the shading normal.
 static inline Vector light_reflected(const Surface *surface, const LightRay *light)
 {
     return vector_fma(surface->shading_normal, light->facing + light->facing,
@@ -185,10 +185,9 @@ static inline Vector light_reflected(const Surface *surface, const LightRay *lig
 // A highlight's error bound is tightened if it exceeds this.
 #define HIGHLIGHT_ERROR_FAINT ((real)(CERTIFIED_COLOR_ERROR * 0x1p-4f))
 
-// How far a highlight of this brightness may be off where the vectors that it compares are off by `error`. As
-// a function of their distance d it falls, and is (1 - d^2 / 2)^n: its slope for n >= 1 is at most 0.61
-// sqrt(n) + 0.81, for smaller n at most n over 1 - d^2 / 2. Nor is the error more than the highlight at d -
-// error.
+// Bounds the error of a highlight of this brightness if the vectors that it compares are off by `error`. It
+// falls with their distance d as (1 - d^2 / 2)^n. Its slope is at most 0.61 sqrt(n) + 0.81 for n >= 1, and
+// at most n over 1 - d^2 / 2 for smaller n. The error does not exceed the highlight at d - error.
 static inline real highlight_error(const Surface *surface, const LightRay *light, real brightness, real error)
 {
     const real zero = (real)(0), one = (real)(1), one_half = (real)(0.5f), n = surface->shininess;
@@ -207,8 +206,8 @@ static inline real highlight_error(const Surface *surface, const LightRay *light
     return brightness * real_min(bound, one);
 }
 
-// A bound on the error of what a light adds where it shines in full, with `brightest` in the largest channel.
-// `angle_error`: of its direction, `strength_error`: of its strength, relative to full.
+// Bounds the error of the contribution of a light that shines in full, with `brightest` in the largest
+// channel. `angle_error` is that of its direction, `strength_error` that of its strength, relative to full.
 static inline real light_color_error(real brightest, const Surface *surface, const LightRay *to_light,
                                      real angle_error, real facing_error, real strength_error)
 {
@@ -235,7 +234,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
     if (light->type.x != LIGHT_TYPE_DIRECTIONAL) {
         place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
-        // without another root: a unit vector is off by 14.5 u, a dot product by 3 u
+        // avoids another root, as a unit vector is off by 14.5 u and a dot product by 3 u
         if (!HAS_SMOOTH_NORMALS)
             shadow_ray->length =
                 vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
@@ -267,7 +266,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
     real geometric = vector_dot(surface_normal(surface), to_light->direction);
     real facing_error = surface->normal_error + angle_error;
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
-    if (HAS_SMOOTH_NORMALS) { // which the shadow ray, not parallel to the light's direction, must leave
+    if (HAS_SMOOTH_NORMALS) { // the shadow ray, not parallel to the light's direction, must leave the surface
         geometric =
             vector_dot(surface_normal(surface), shadow_ray->direction) * ray_inverse_length(shadow_ray);
         geometric_error = geometric_error + (real)(96 * UNIT_ROUNDOFF);
@@ -318,7 +317,7 @@ static inline void light_add_uncertainty(LightVisibility *visibility, const Hit 
     visibility->uncertain = visibility->uncertain | (occlusion->uncertain & visibility->lit);
 }
 
-// Returns what the surface reflects of a light, as a factor, in the lanes that it reaches.
+// Returns the factor by which the surface reflects a light, in the lanes that the light reaches.
 static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_light, mask lit)
 {
     Color3 color = vector_scale(surface->diffuse, to_light->facing);
@@ -330,8 +329,8 @@ static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_li
     return (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
 }
 
-// Returns how a light reaches the surface unless something occludes it. Sets the shadow ray, which is active
-// in the lanes that may be lit.
+// Returns the light that reaches the surface unless something occludes it. Sets the shadow ray, which is
+// active in the lanes that may be lit.
 static inline LightVisibility light_reach(const Scene *scene, const Surface *surface, uint index,
                                           Ray *shadow_ray)
 {

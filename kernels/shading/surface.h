@@ -1,4 +1,4 @@
-// Computes the surface at a hit as shading needs it: position, normals, material.
+// Computes the position, normals and material of the surface at a hit, for shading.
 #ifndef SURFACE_H
 #define SURFACE_H
 
@@ -28,9 +28,9 @@ typedef struct {
     Vector normal;         // geometric, unit, facing the ray; with HAS_SHADING_NORMALS: surface_normal
     Vector shading_normal; // unit, on the same side
     Vector to_eye;         // unit, back along the ray
-    Vector lift;           // with HAS_SMOOTH_NORMALS, as in a SurfacePoint
+    Vector lift;           // with HAS_SMOOTH_NORMALS, from the position to where rays to lights start
     real error;            // bound on the position's distance from the true surface
-    real refracted_offset; // how far behind the surface a refracted ray starts
+    real refracted_offset; // distance behind the surface at which a refracted ray starts
     Color3 ambient;        // the ambient light that it reflects, and its emission
     Color3 diffuse;        // the factor by which it reflects a light that it faces
     real specular, shininess;
@@ -44,11 +44,10 @@ typedef struct {
     Color3 absorption;        // with HAS_ABSORPTION: the density within
     mask entering;            // the ray runs into the solid, against its outward normal
     real travelled;           // distance from the eye along the path
-    // At `certified`, bounds on the distance of the position from the exact one; on that of the shading
-    // normal and, with HAS_TRIANGLES, of the geometric normal from the exact ones; on that of to_eye; and the
-    // uncertain lanes.
+    // At `certified`, bounds on the distances from the exact ones of the position, of the shading normal,
+    // with HAS_TRIANGLES of the geometric normal, and of to_eye; and the uncertain lanes.
     real place_error, normal_error, geometric_error, eye_error;
-    real lift_error;              // with HAS_SMOOTH_NORMALS, as in a SurfacePoint
+    real lift_error;              // with HAS_SMOOTH_NORMALS, bounds the error of `lift`, 0 where none lifts
     real line_error, start_error; // a reflected ray's origin_error and -tmin
     mask uncertain;
     ChordEnd chord_end; // with HAS_CHORDS
@@ -110,10 +109,10 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
     surface->chord_end = chord_end_select(found->lanes, end, surface->chord_end);
 }
 
-// Marks lanes that are done: larger than any id.
+// Marks finished lanes. It is larger than any id.
 #define NO_OBJECT ((integer)(INT_MAX))
 
-// Returns at most the cosine of the exact ray's incidence on a plane, or 0.
+// Returns a lower bound on the cosine of the exact ray's incidence on a plane, or 0.
 static inline real least_cosine(Vector normal, const Ray *ray)
 {
     const real error = ray->direction_error + (real)(128 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
@@ -121,7 +120,7 @@ static inline real least_cosine(Vector normal, const Ray *ray)
 }
 
 // Lowers the bound on the position's error where the surface is flat. The exact hit is where the exact ray,
-// line_error off, meets a plane that the position is `height` above; `cosine` is its least_cosine.
+// line_error off, crosses a plane that the position is `height` above; `cosine` is its least_cosine.
 static inline void surface_narrow_place(Surface *surface, mask lanes, real height, real cosine)
 {
     const real one = (real)(1), across = surface->line_error;
@@ -374,8 +373,8 @@ static inline void surface_set_material(Surface *surface, const Scene *scene, ma
         surface->absorption = vector_select(lanes, vector_of(material->absorption), surface->absorption);
 }
 
-// Sets the bounds at a hit, and the lanes that are uncertain: in the side that the ray comes from, or in that
-// of the shading normal.
+// Sets the bounds at a hit. Marks the lanes where the side that the ray comes from, or that of the shading
+// normal, is uncertain.
 static inline void surface_set_errors(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
     surface->normal_error = point_normal_error(point, surface->place_error);
@@ -486,7 +485,7 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
         if (HAS_NORMAL_MAPS) hit_tilt_normals(scene, entry, &material, &found, ray, surface.travelled);
         surface_point_replace(&point, found.lanes, &found.point);
         mask uncertain;
-        // stored in every surface, the zeros would cost frames 2 %
+        // storing the zeros in every surface would cost 2 % of a frame's time
         Color3 color =
             object_color(scene, entry, &material, &found, ray, HAS_IMAGES ? surface.travelled : (real)(0),
                          IS_CERTIFIED ? surface.place_error : (real)(0), &uncertain);
@@ -565,9 +564,9 @@ static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit
     return touches;
 }
 
-// Returns the visible surface: where a transparent and an opaque one coincide, the opaque one, so that glass
-// on a floor shows the floor. Secondary rays start beyond both. The second round is for the lanes whose hit
-// the opaque surface replaced. It is a loop, since compilers would inline surface_interaction twice.
+// Returns the visible surface. Where a transparent and an opaque one coincide, it is the opaque one, so that
+// glass on a floor shows the floor. Secondary rays start beyond both. A second round treats the lanes whose
+// hit was replaced. It is a loop, since compilers would inline surface_interaction twice.
 static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *hit)
 {
     real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);

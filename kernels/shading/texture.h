@@ -35,7 +35,7 @@ static inline bool type_has_grid(uint type)
     return HAS_DISCS && type == TYPE_DISCS;
 }
 
-// The axes of that grid; w is where it begins.
+// The axes of a surface's grid; w is the grid's offset.
 typedef struct {
     scalar4 u, v;
 } GridAxes;
@@ -90,7 +90,7 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ty
 
 // The functions from here on treat one lane at a time, since each lane reads different texels.
 
-// Returns the texture coordinate in 0..1 whose color a coordinate beyond that has, or 0 if it is NaN.
+// Returns the texture coordinate wrapped to 0..1, or 0 if it is NaN.
 static inline scalar wrap_unit(scalar a, uint wrap)
 {
     scalar part = a - floor(a);
@@ -99,7 +99,7 @@ static inline scalar wrap_unit(scalar a, uint wrap)
     return part >= 0 && part <= 1 ? part : 0;
 }
 
-// Returns the texel for an index from -1 to count, which lies beyond an edge at both ends.
+// Returns the texel for an index from -1 to count, both of which lie beyond an edge.
 static inline uint texel_wrapped(scalar i, uint count, uint wrap)
 {
     bool is_repeated = wrap == WRAP_REPEATED;
@@ -203,8 +203,8 @@ static inline Vector sky_texel_color(const Scene *scene, real longitude_turns, r
     return (Vector){red.all, green.all, blue.all};
 }
 
-// Returns the color of the sky's image along a unit direction, for the lanes in `wanted`. Its texels are
-// counted at the horizon or by their height, as a sphere's.
+// Returns the color of the sky's image along a unit direction, for the lanes in `wanted`. The footprint is
+// measured in texels at the horizon or of their height, whichever are denser.
 static inline Vector sky_image_color(const Scene *scene, Vector direction, mask wanted)
 {
     global const SceneHeader *header = scene->header;
@@ -221,7 +221,7 @@ static inline Vector sky_image_color(const Scene *scene, Vector direction, mask 
     return vector_scale(color, (real)(header->sky_forward.w));
 }
 
-// Returns what a ray of unit direction sees where it hits nothing, in the lanes in `wanted`.
+// Returns the color of the background along a unit direction, for the lanes in `wanted`.
 static inline Vector background_color(const Scene *scene, Vector direction, mask wanted)
 {
     global const SceneHeader *header = scene->header;

@@ -14,7 +14,7 @@ static inline Vector affine_vector(const scalar4 rows[3], Vector v)
     return (Vector){affine_row(rows[0], v), affine_row(rows[1], v), affine_row(rows[2], v)};
 }
 
-// Applies the magnitudes of a map to those of a vector, which bounds what its roundings grow with.
+// Applies the magnitudes of a map to those of a vector. The roundings of mapping are in proportion to this.
 static inline Vector affine_reach(const scalar4 rows[3], Vector v)
 {
     const Vector size = {fabs(v.x), fabs(v.y), fabs(v.z)};
@@ -43,11 +43,11 @@ static inline Vector affine_normal(const scalar4 inverses[3], Vector n)
                     real_fma(x.z, n.x, real_fma(y.z, n.y, z.z * n.z))};
 }
 
-// A bound on what mapping adds to the error of a point and of the next ray's test, in units of 16 u of the
-// map's condition times the shape's largest coordinate from where 0 lies.
+// Bounds the error that mapping adds to a point and to the next ray's test, in units of 16 u of the map's
+// condition times the shape's largest coordinate from the image of 0.
 #define MAPPED_POINT_ERROR ((real)(1.5f))
 
-// Returns where the rows map 0.
+// Returns the image of 0.
 static inline Vector affine_place(const scalar4 rows[3])
 {
     return (Vector){(real)(rows[0].w), (real)(rows[1].w), (real)(rows[2].w)};

@@ -1,4 +1,4 @@
-// An axis-aligned box, faces included.
+// Intersects axis-aligned boxes, faces included.
 #ifndef BOX_H
 #define BOX_H
 
@@ -38,8 +38,8 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
     return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
 }
 
-// Returns |t - crossing| for the nearer of a slab's crossings, and whether that is its low face: a ray
-// towards larger coordinates enters there and leaves at the high one.
+// Returns |t - crossing| for the nearer of a slab's crossings. Sets *low_face if that is the slab's low
+// face, where a ray towards larger coordinates enters.
 static inline real slab_distance(Interval slab, real direction, real t, mask *low_face)
 {
     real to_near = fabs(t - slab.near), to_far = fabs(t - slab.far);
@@ -53,8 +53,8 @@ static inline real slab_clamp(real value, real low, real high)
     return real_min(real_max(value, low), high);
 }
 
-// Returns the point on the face whose crossing is t, with x before y before z. The position lies exactly on
-// that face.
+// Returns the point on the face whose crossing is nearest to t, or the first of x, y and z if several are.
+// The position lies exactly on that face.
 static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);

@@ -1,4 +1,4 @@
-// Finds hits with proven bounds, for images at `certified`: each shape is intersected with the exact ray,
+// Finds hits with proven bounds, for images at `certified`. Each shape is intersected with the exact ray,
 // which the packet's ray only approximates, and as the exact shape, whose numbers were rounded.
 // docs/numerics.md derives every bound. Constants leave slack beyond what it needs.
 //
@@ -12,8 +12,8 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// A lane's answer: a hit, in which the exact ray's t is between low and high, and about t; no hit; or
-// uncertain, in which a hit, if any, is not before low.
+// The answer of a lane: a hit, where the exact ray's t is between low and high and near t; a miss; or
+// uncertain, where a hit, if any, is not before low.
 typedef struct {
     mask found, uncertain;
     real t, low, high;
@@ -26,7 +26,7 @@ static inline real divide_or(real a, real b, real otherwise)
     return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
 }
 
-// Returns how far the exact ray is from the packet's, up to a distance.
+// Returns a bound on the distance of the exact ray from the packet's, up to a distance along it.
 static inline real ray_place_error(const Ray *ray, real distance)
 {
     return real_fma(ray->direction_error, distance, ray->origin_error);
@@ -47,8 +47,8 @@ static inline mask ray_excludes(const Ray *ray, real low, real high)
     return (low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF)) | (high < ray->tmin);
 }
 
-// Classifies a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and in
-// no others than `perhaps`, there between low and high.
+// Classifies a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and
+// may cross only in the lanes `perhaps`, between low and high.
 static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask perhaps, real low, real high)
 {
     CertainHit hit;
@@ -101,7 +101,7 @@ static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
 typedef struct {
     Vector start; // the ray's start, seen from the center
     real radius;
-    mask certain, perhaps;       // whether the line crosses it, not behind the ray's start or beyond its end
+    mask certain, perhaps;       // the line crosses it, not behind the ray's start or beyond its end
     real middle_t, middle_error; // the closest point
     real half_chord, t_error;    // in t; t_error applies to sphere_near and sphere_far
     mask refines;                // a Newton step is taken
@@ -143,9 +143,9 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real farthest = distance - radius;
     real place = ray_place_error(ray, farthest) * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
     place = real_fma(ray->direction_error, place, place);
-    real along = (real)(16 * UNIT_ROUNDOFF) * distance; // of the closest point's place along the ray
+    real along = (real)(16 * UNIT_ROUNDOFF) * distance; // error of the closest point along the ray
     real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
-    // not if all of it is behind the start, or beyond the end
+    // excluded if all of it lies behind the start or beyond the end
     const real inverse_length = ray_inverse_length(ray);
     real reach = inverse_length * (radius + (real)(2) * (place + along));
     real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
@@ -155,7 +155,7 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     crossed.half_chord = crossed.inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
     crossed.refines = mask_none();
     if (!lanes_any(crossed.perhaps)) return crossed;
-    // In t. If it is uncertain, that of the band, between 0 and that of twice the band.
+    // In t. If it is uncertain, this is the half chord of the band, between 0 and that of twice the band.
     crossed.half_chord = real_sqrt(real_max(squared, band) * ray->inverse_squared);
     mask usable = crossed.half_chord > (real)(0);
     real inverse = real_divide((real)(1), lanes_select(usable, crossed.half_chord, (real)(1)));

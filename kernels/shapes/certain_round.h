@@ -1,7 +1,7 @@
-// Finds hits with bounds of surfaces of revolution, and of spheres with the eye's power. The side bounds a
-// convex set, so the exact ray is within it along one interval of t. Roots are computed approximately. Points
-// next to them are then evaluated, and only the conclusions that their values prove beyond all errors count.
-// The constants of steps and widths only choose the points.
+// Finds bounded hits on surfaces of revolution, and on spheres with the eye's power. The side bounds a
+// convex set, so the exact ray is within it along one interval of t. Roots are computed approximately.
+// Points next to them are then evaluated, and only the conclusions that their values prove beyond all errors
+// count. The constants of steps and widths only choose the points.
 //
 // A sphere with the eye's power is a cylinder whose axis is 0.
 #ifndef CERTAIN_ROUND_H
@@ -10,8 +10,8 @@
 #include "shapes/certain.h"
 #include "shapes/surface_point.h"
 
-// If `certain`, the exact interval of t contains `inner`; if `perhaps`, it lies within `outer`. Its ends are
-// about those of `roots`.
+// If `certain`, the exact interval of t contains `inner`. If `perhaps`, it lies within `outer`. Its ends are
+// close to those of `roots`.
 typedef struct {
     Interval outer, inner, roots;
     mask certain, perhaps;
@@ -35,7 +35,7 @@ typedef struct {
 typedef struct {
     real rounding, place; // bounds of its error: of roundings alone, and with the ray's error
     real value, band;     // outside if value > band, inside if value < -band
-    Vector across;        // from the axis
+    Vector across;        // from the axis to the point
     real rho, radius;
 } RoundPoint;
 
@@ -91,7 +91,7 @@ typedef struct {
     Vector m, q; // the ray's origin and direction across the axis
     real rise;   // the direction along it
     real a, b, c, discriminant;
-    real h; // how fast the radius grows
+    real h; // growth of the radius per t
 } RoundQuadratic;
 
 static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
@@ -178,8 +178,8 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         real room = lanes_select(difference > zero, one - wanted, one + wanted);
         real tilt = divide_or(difference, room, zero);
         tilted_slope = h - quadratic->h;
-        // Not height - rho + n . x: at a planet's radius the rounding of rho exceeds the height. `along_unit`
-        // is off by 17 u rho, rho by 9 u, the sum and the quotient add up to 15 u.
+        // This is not height - rho + n . x, because at a planet's radius the rounding of rho exceeds the
+        // height. `along_unit` is off by 17 u rho, rho by 9 u, the sum and the quotient add up to 15 u.
         real tilted_rho = fabs(tilt) * point.rho * (real)(1 + 64 * UNIT_ROUNDOFF);
         tilted = height + divide_or(real_fma(tilt, along_unit, -tilted_rho), one + fabs(tilt), zero);
         slope = real_fma(part, q_length, -quadratic->h);
@@ -188,8 +188,8 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
            (tilts & height_is_positive(tilted, tilted_slope, slope_error, t1, from, to, ends));
 }
 
-// Returns where the exact ray is inside the side. Roots are searched between `from` and `to`, beyond which
-// nothing matters if `is_finite`. `perhaps` applies to t >= tmin.
+// Returns the interval where the exact ray is inside the side. Roots are searched between `from` and `to`,
+// beyond which nothing matters if `is_finite`. `perhaps` applies to t >= tmin.
 static inline CertainInterval round_interval(const Round *round, const Ray *ray, mask lanes, real from,
                                              real to, bool is_finite)
 {

@@ -1,12 +1,13 @@
-// Finds hits with bounds of solids within a round side (shapes/certain_round.h), and between ends if they
-// have any.
+// Finds bounded hits on solids within a round side (shapes/certain_round.h) and between ends, if they have
+// any.
 #ifndef CERTAIN_SOLID_H
 #define CERTAIN_SOLID_H
 
 #include "shapes/certain_round.h"
 
-// Returns the first hit of a shape between side and ends, as ends_first_hit does, with bounds. In the lanes
-// `left` the ray starts on the shape and runs into it.
+// Returns the first hit, with bounds, on a shape between side and ends. A capped solid is the intersection
+// of both; any other one is hit on its side between the ends. In the lanes `left` the ray starts on the
+// shape and runs into it.
 static inline CertainHit round_first_hit(uint flags, const Ray *ray, const CertainInterval *side,
                                          const CertainInterval *slab, mask left)
 {
@@ -85,7 +86,7 @@ static inline CertainInterval round_slab(const Round *round, const Ray *ray, rea
     return slab;
 }
 
-// Computes the part of the line in a sphere that contains a finite shape.
+// Computes the part of the line within a sphere that contains a finite shape.
 static inline mask round_bounds(Vector center, real radius, const Ray *ray, real *from, real *to)
 {
     CertainSphere bounding =
@@ -96,8 +97,8 @@ static inline mask round_bounds(Vector center, real radius, const Ray *ray, real
     return bounding.perhaps & (*to >= ray->tmin);
 }
 
-// Returns the first hit of both nappes of an unbounded cone, each a separate convex body. A ray that starts
-// on one leaves that.
+// Returns the first hit on both nappes of an unbounded cone, each of which is a convex body. A ray that
+// starts on one nappe leaves that one.
 static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ray, mask lanes, mask left,
                                           real from, real to)
 {

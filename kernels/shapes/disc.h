@@ -1,4 +1,4 @@
-// A disc: a plane within a circle.
+// Intersects discs, the parts of planes within circles.
 #ifndef DISC_H
 #define DISC_H
 
@@ -87,8 +87,8 @@ static inline SurfacePoint disc_surface_point(const Disc *disc, const Ray *ray, 
     return plane_crossing_point(disc_foot(disc), disc->normal, ray, t);
 }
 
-// Returns the hit with bounds. Most rays miss the bounding sphere. Otherwise the crossing with the plane lies
-// within the rim, or not.
+// Returns the hit with bounds. Most rays miss the bounding sphere. For the others, the crossing with the
+// plane is tested against the rim.
 static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 {
     Vector center = vector_of(disc->center_radius);

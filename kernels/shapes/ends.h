@@ -5,9 +5,9 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// Finds the first hit of a surface of revolution, inside whose side the ray is between two roots, and between
-// whose ends it is within the slab. A capped solid is the intersection of both: one comparison decides both,
-// so that no ray passes between side and cap. An open or unbounded one is hit at a root between the ends.
+// Finds the first hit on a surface of revolution. The ray is inside the side within `side` and between the
+// ends within `slab`. A capped solid is the intersection of both. One comparison decides both, so that no
+// ray passes between side and cap. An open or unbounded one is hit at a root between the ends.
 static inline mask ends_first_hit(uint flags, const Ray *ray, Interval side, Interval slab, real *t)
 {
     if (flags & REVOLUTION_CAPPED) {
@@ -22,8 +22,8 @@ static inline mask ends_first_hit(uint flags, const Ray *ray, Interval side, Int
     return (*t >= slab.near) & (*t <= slab.far);
 }
 
-// Returns whether the hit at t is on a cap: on the surface whose crossing is nearer to t, at the rim the
-// side.
+// Returns whether the hit at t is on a cap, which is so if the cap's crossing is nearer to t than the
+// side's. At the rim it is on the side.
 static inline mask ends_on_cap(Interval side, Interval slab, real t)
 {
     real to_slab = real_min(fabs(t - slab.near), fabs(t - slab.far));

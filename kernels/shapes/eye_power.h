@@ -1,6 +1,6 @@
 // Intersects shapes next to the eye. A power, which the host computes before anything is rounded, defines
 // where the surface lies. For a sphere it is |center - eye|^2 - radius^2, for other shapes the constant term
-// of a ray from the eye.
+// of the equation for a ray from the eye.
 #ifndef EYE_POWER_H
 #define EYE_POWER_H
 

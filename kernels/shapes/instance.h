@@ -1,4 +1,4 @@
-// Instances: maps between the space of a shared mesh and that of the eye. docs/numerics.md has the bounds.
+// Maps between the space of a shared mesh and that of the eye. docs/numerics.md has the bounds.
 #ifndef INSTANCE_H
 #define INSTANCE_H
 
@@ -38,7 +38,7 @@ static inline Corners instance_normals(const Instance *instance, Corners normals
                      vector_normalize(instance_normal(instance, normals.c))};
 }
 
-// Returns by how much lengths in a triangle's plane grow, as the root of what its area does.
+// Returns the factor by which lengths in a triangle's plane grow, the root of its area's.
 static inline real instance_stretch(const Instance *instance, Vector normal)
 {
     const real mapped = vector_norm(instance_normal(instance, vector_normalize(normal)));

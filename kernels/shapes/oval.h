@@ -1,5 +1,5 @@
-// An oval: a unit shape (types.h) under an affine map, as an ellipsoid is a sphere. A ray is mapped to the
-// unit shape's space, where it has the same t, and intersected there. docs/numerics.md has the bounds.
+// Intersects ovals, which are unit shapes (types.h) under an affine map; an ellipsoid is a mapped sphere. A
+// ray is mapped to the unit shape's space, where it has the same t. docs/numerics.md has the bounds.
 #ifndef OVAL_H
 #define OVAL_H
 
@@ -73,8 +73,8 @@ typedef struct {
     real shift;
 } OvalRay;
 
-// Bounds the mapped ray's distance from the mapped exact ray. Rounding the place of 0 and the map,
-// differences and products leave 6 u of what is mapped.
+// Bounds the mapped ray's distance from the mapped exact ray. The roundings of 0's image, of the map, of
+// differences and of products add up to 6 u of the mapped vector.
 static inline void oval_ray_set_errors(Ray *own, const Oval *oval, const Ray *ray, Vector from)
 {
     const real norm = (real)(oval->inverses[0].w), few = (real)(8 * UNIT_ROUNDOFF);
@@ -122,7 +122,7 @@ static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
         real unit_t = own.ray.tmax;
         OVAL_LIST(OVAL_HIT)
         *t = unit_t + own.shift;
-        // a ray that starts at a hit, whose t was rounded, meets that hit once more
+        // a ray that starts at a hit, whose t was rounded, hits the shape there once more
         mask passed = hit & !(*t > ray->tmin) & (unit_t > own.ray.tmin);
         if (!lanes_any(passed)) break;
         own.ray.tmin = lanes_select(passed, unit_t, own.ray.tmin);
@@ -163,8 +163,9 @@ static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
     return certain_miss();
 }
 
-// A normal that is off by e is, once it is mapped to the length l and normalized, off by up to x (1 + x) for
-// x = |V| e / l. The factors cover the second order, and all normals from a 16th on (docs/numerics.md).
+// Sets the errors of a point. A normal that is off by e is, mapped to length l and normalized, off by up to
+// x (1 + x) for x = |V| e / l. The factors cover the second order, and all normals from a 16th on
+// (docs/numerics.md).
 static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, real place_error,
                                    SurfacePoint *point)
 {

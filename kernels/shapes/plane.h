@@ -1,12 +1,12 @@
-// A plane.
+// Intersects planes.
 #ifndef PLANE_H
 #define PLANE_H
 
 #include "shapes/certain.h"
 #include "shapes/surface_point.h"
 
-// Sets t = height / along and returns where that is finite, tested without dividing. Equal signs mean ahead
-// of the ray.
+// Sets t = height / along. Returns the lanes where it is finite, which is tested without dividing, and
+// beyond the ray's start. Equal signs mean that the plane is ahead.
 static inline mask plane_quotient(real height, real along, const Ray *ray, real *t)
 {
     mask ahead = (height > (real)(0)) == (along > (real)(0));
@@ -92,7 +92,8 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     return crosses;
 }
 
-// Does so for a normal that is exact except for its rounding. Its w is one over its length.
+// Returns the lanes where the line crosses a plane, with *low <= t <= *high. In other lanes it may cross it
+// at or beyond *low. The normal is exact except for its rounding, and its w is one over its length.
 static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, real *low, real *high)
 {
     real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal.w));

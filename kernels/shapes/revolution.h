@@ -1,4 +1,4 @@
-// Cylinder and cone: |p x w| = R + k (p . w) for the axis w from the base, with R = |w| times the radius
+// A cylinder or cone, |p x w| = R + k (p . w) for the axis w from the base, with R = |w| times the radius
 // there and k the tangent of the half-angle.
 //
 // Along a ray p = f + t d, with q = d x w, m = f x w, g = R + k f . w and h = k d . w:
@@ -160,7 +160,7 @@ static inline mask revolution_leaves_outward(const RevolutionQuadric *quadric, c
            (ray->tmin >= (real)(0));
 }
 
-// Refines lanes that start next to the side: rejects those that leave it and compensates the others.
+// Refines lanes that start next to the side. Rejects those that leave it and compensates the others.
 static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, const Revolution *shape,
                                                   bool sloped, const Ray *ray, mask near_side)
 {

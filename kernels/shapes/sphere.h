@@ -59,14 +59,14 @@ static inline real sphere_discriminant(SphereCoefficients compensated, Vector mo
     return discriminant;
 }
 
-// Returns whether rays start outside the sphere and leave it outward. b and c are the coefficients of the
-// textbook's test.
+// Returns the lanes whose rays start outside the sphere and leave it outward. b and c are the coefficients
+// of the textbook's test.
 static inline mask sphere_is_left(real c, real squared_radius, real b, real tmin)
 {
     return (c > (real)(32 * UNIT_ROUNDOFF) * squared_radius) & (b > (real)(0)) & (tmin >= (real)(0));
 }
 
-// Returns the same for `from`, the starts seen from the centers, by the operations of sphere_hit.
+// Tests whether rays leave spheres outward, as sphere_hit does. `from` is the start seen from the center.
 static inline mask ray_leaves_sphere(Vector from, Vector direction, real tmin, real radius)
 {
     const real squared_radius = radius * radius;

@@ -16,11 +16,11 @@ typedef struct {
     Vector shading_normal; // unit; differs only with HAS_SHADING_NORMALS
     real rounding_scale;
     Vector lift; // with HAS_SMOOTH_NORMALS, from the position to where rays to lights start
-    // At `certified`, how fast the shading normal turns along the surface, and a bound on its error but for
-    // what the position's adds (shading/surface.h). For a flat surface, a bound on the position's height over
-    // the exact surface, else NEVER.
+    // At `certified`, the rate at which the shading normal turns along the surface, and a bound on its error
+    // except for that from the position's error (shading/surface.h). For a flat surface, a bound on the
+    // position's height over the exact surface, else NEVER.
     real curvature, normal_error, height;
-    real lift_error; // at `certified`, a bound on that of `lift`, 0 where nothing lifts
+    real lift_error; // at `certified`, a bound on the error of `lift`, 0 where nothing lifts
 } SurfacePoint;
 
 static inline SurfacePoint surface_point_make(Vector position, Vector normal, real rounding_scale)

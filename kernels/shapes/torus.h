@@ -62,7 +62,7 @@ static inline real torus_tube_value_at(const TorusTube *tube, const Ray *ray, re
     return value;
 }
 
-// Returns the zero along the ray in a bracket, as torus_zero does along a line. The first guess is the ray's
+// Returns the zero along the ray in a bracket at whose ends the signs differ. The first guess is the ray's
 // start if that is in the bracket, since the bracket's middle is far from it.
 static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real low, real high, mask entering)
 {
@@ -82,8 +82,8 @@ static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real l
     return t;
 }
 
-// Returns where the slope is 0 in a bracket at whose ends its signs differ, by false position and halving in
-// turn.
+// Returns the t where the slope is 0 in a bracket at whose ends its signs differ, by alternating false
+// position and halving.
 static inline real torus_tube_turning_point(const TorusTube *tube, const Ray *ray, real low, real high,
                                             real slope_low, real slope_high)
 {
@@ -227,9 +227,9 @@ static inline SurfacePoint torus_surface_point(const Torus *torus, const Ray *ra
     return point;
 }
 
-// A torus for hits with bounds. The quartic's derivative separates intervals where the distance to the tube
-// has at most one zero. The distances at their ends and around the zero, beyond all errors, decide what is
-// certain.
+// A torus prepared for hits with bounds. The quartic's derivative separates intervals where the distance to
+// the tube has at most one zero. The distances at their ends and around the zero, beyond all errors, decide
+// what is certain.
 typedef struct {
     Vector start, axis; // the ray's origin, seen from the center
     real major, minor;
@@ -280,8 +280,8 @@ static inline real torus_curvature(const CertainTorus *torus, real rho)
                         (real)(1 / SMALLEST_RATIO));
 }
 
-// Returns until when a ray that starts on the torus cannot return, or 0 if that is unknown. Within half of
-// the smaller radius the distance bends by no more than 2 over that.
+// Returns the t before which a ray that starts on the torus cannot return to it, or 0 if that is unknown.
+// Within half of the smaller radius the distance bends by no more than 2 over that.
 static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 {
     TorusPoint start = torus_point(torus, ray, (real)(0));
@@ -294,8 +294,8 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 }
 
 // Returns the crossing in a bracket at whose ends the exact ray is certainly on different sides. The bracket
-// is narrowed. Only signs beyond `place` count, and the constants only choose the points: the sign is certain
-// beyond `place` over the slope, and a quarter more allows for a rough zero and for the curvature.
+// is narrowed. Only signs beyond `place` count, and the constants only choose the points. The sign is
+// certain beyond `place` over the slope, and a quarter more allows for a rough zero and for the curvature.
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {

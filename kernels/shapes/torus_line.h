@@ -1,10 +1,10 @@
-// A torus along a line: the points at distance `minor` from a circle of radius `major`.
+// Intersects a line with a torus, the points at distance `minor` from a circle of radius `major`.
 //
 // Everything is computed around the ray's closest approach to the center, where the quartic has no cubic term
 // and no large numbers. In s, the length along the ray from there, it is
 //     s^4 + p s^2 + q s + constant,   p = 2 k - 4 R^2 (1 - n^2),   q = 8 R^2 z n,
 // for z and n the closest point's and the direction's parts along the axis and k = |closest|^2 + R^2 - r^2.
-// The quartic's derivative only separates the intervals where the quartic is monotonic: in each the distance
+// The quartic's derivative only separates the intervals where the quartic is monotonic. In each the distance
 // to the surface, whose sign is the quartic's, has at most one zero. There the distance itself,
 //     sqrt((rho - R)^2 + z^2) - r,
 // which is exact to a few u where the quartic cancels, is solved for its one zero. Everything uses + - * /
@@ -112,8 +112,8 @@ static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *clo
     return vector_scale(vector_cross(ray->direction, vector_cross(f, ray->direction)), ray->inverse_squared);
 }
 
-// Finds the ends of the line in the bounding sphere, and in between the zeros of the quartic's derivative:
-// between neighbors the distance has at most one zero. The derivative's turning points, +-sqrt(-p / 6),
+// Finds the ends of the line in the bounding sphere and, in between, the zeros of the quartic's derivative.
+// Between neighbors the distance has at most one zero. The derivative's turning points, +-sqrt(-p / 6),
 // separate its zeros.
 enum { TORUS_BREAKS = 5 };
 

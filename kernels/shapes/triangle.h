@@ -1,4 +1,4 @@
-// A watertight triangle: a ray through an edge or a vertex that triangles share hits at least one of them.
+// Intersects watertight triangles. A ray through an edge or a vertex that triangles share hits at least one.
 //
 // Vertices relative to the ray's start are rotated into a frame whose third axis is the ray, so that a shared
 // vertex gives the same numbers in every triangle. There the signs of three edge functions decide, and
@@ -108,9 +108,9 @@ static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_p
     return plane;
 }
 
-// The accurate step. At a low angle both products cancel, so they are compensated, with the normal in pairs.
-// Next to the eye the height above the plane is the eye's less n . o. `in_plane` is the t of rays in the
-// triangle's plane.
+// Returns t by the accurate step. At a low angle both products cancel, so they are compensated, with the
+// normal in pairs. Next to the eye the height above the plane is the eye's less n . o. `in_plane` is the t
+// of rays in the triangle's plane.
 static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray, real in_plane)
 {
     Vector a = vector_of(triangle->a);
@@ -154,9 +154,9 @@ static inline Vector corners_max_abs(Corners corners)
                     real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
 }
 
-// The clamped step. Edge-on the error of t is unbounded, while the edge functions, which do not depend on t,
-// still report a hit. Clamping to the vertices' t and to their box keeps that hit on the triangle and within
-// the boxes of the BVH, whose slack is four times this one.
+// Returns t by the clamped step. Edge-on the error of t is unbounded, while the edge functions, which do not
+// depend on t, still report a hit. Clamping to the vertices' t and to their box keeps that hit on the
+// triangle and within the boxes of the BVH, whose slack is four times this one.
 static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray, real accurate_t)
 {
     Vector a = edges->a, b = edges->b, c = edges->c;
@@ -177,7 +177,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
         t);
 }
 
-// The second and the third step.
+// Returns t by the accurate step and, at low angles or in double, the clamped one.
 static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdges *edges, const Ray *ray,
                                      mask hit)
 {
@@ -274,8 +274,8 @@ static inline void triangle_smooth(Corners normals, TriangleWeights weights, Sur
     point->shading_normal = vector_select(bends, vector_normalize(normal), point->normal);
 }
 
-// How far each corner's tangent plane is above the point, 0 if it is below; and how far at most a corner's
-// two edges together rise over its tangent plane or fall below it.
+// The height of each corner's tangent plane above the point, 0 if it is below, and the most by which a
+// corner's two edges together rise over its tangent plane or fall below it.
 typedef struct {
     real a, b, c, steepest;
 } TriangleHeights;
@@ -408,7 +408,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     perhaps = perhaps & (own | !ray_excludes(ray, low - vertex_error, high + vertex_error));
     if (!lanes_any(perhaps)) return certain_miss();
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
-    // also if it is uncertain: if it is hit, then where the weights place it
+    // applies to uncertain lanes, which are hit, if at all, where the weights say
     mask narrows = perhaps & (fabs(edges->determinant) > (real)(8) * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
     real t = c_t + real_fma(a_t - c_t, edges->u * inverse, (b_t - c_t) * (edges->v * inverse));
@@ -431,7 +431,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
 }
 
 // Returns the lanes whose rays pass to one side of all vertices, as seen along an axis of their frame.
-// Edge-on, where all edge functions vanish, no other test tells.
+// Edge-on, where all edge functions vanish, only this test decides.
 static inline mask triangle_is_passed(const TriangleEdges *edges, real error)
 {
     real ax = edges->ax, ay = edges->ay, bx = edges->bx, by = edges->by, cx = edges->cx, cy = edges->cy;
@@ -439,7 +439,7 @@ static inline mask triangle_is_passed(const TriangleEdges *edges, real error)
            (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
 }
 
-// Tests first by one error for all edge functions of triangles that are hit (docs/numerics.md).
+// Returns the hit with bounds. First rejects by one error for all edge functions (docs/numerics.md).
 static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ray *ray)
 {
     TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
@@ -468,8 +468,8 @@ static inline real triangle_height(Vector vertex, Vector unit, Vector position)
     return certain_plane_height(vertex, unit, 4 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR, position);
 }
 
-// Returns a bound on how much longer than high a triangle is, over its length. A vertex that moves by e turns
-// the normal by at most e times this, and a point that moves by e moves its weights by as much.
+// Returns a bound on the ratio of a triangle's length to its height, over its length. A vertex that moves by
+// e turns the normal by at most e times this, and a point that moves by e moves its weights by as much.
 static inline real triangle_slimness(Corners corners)
 {
     Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
@@ -480,9 +480,9 @@ static inline real triangle_slimness(Corners corners)
     return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
 }
 
-// Returns how far the point of the exact weights may be from that of the computed ones, in addition to the
-// error of the position: by the rounding of each vertex, and by the error across the ray of the frame's
-// vertices, over the cosine of incidence.
+// Bounds the distance between the points of the exact and of the computed weights, in addition to the error
+// of the position: by the rounding of each vertex, and by the error across the ray of the frame's vertices,
+// over the cosine of incidence.
 static inline real triangle_weights_error(Corners corners, const Ray *ray, real cosine)
 {
     const Corners from_start = {vector_subtract(corners.a, ray->origin),

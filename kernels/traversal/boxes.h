@@ -1,12 +1,12 @@
-// Rays against the axis-aligned boxes of the BVH.
+// Intersects rays with the axis-aligned boxes of the BVH.
 //
-// A hit may lie outside its primitive's box, for any shape: each test is off by a few u times the distance
+// A hit may lie outside its primitive's box, for any shape. Each test is off by a few u times the distance
 // between the ray's start and the shape, across the ray and along it. Rounding the boxes and the products
-// here adds a few u of the coordinates. Boxes are enlarged by all of that, the `slack`.
+// here adds a few u of the coordinates. Boxes are enlarged by the sum of these, the `slack`.
 //
-// Products are bounded: |1 / direction| is limited to 2^120 (2^1000) over the coordinates, at which a ray
-// moves by less than the slack along that axis while it traverses the scene. That holds while the direction's
-// largest component is well above 2^-100 (2^-950) of the coordinates.
+// To bound products, |1 / direction| is limited to 2^120 (2^1000) over the coordinates. At that limit a ray
+// moves by less than the slack along that axis while it traverses the scene, if the direction's largest
+// component is well above 2^-100 (2^-950) of the coordinates.
 #ifndef BOXES_H
 #define BOXES_H
 
@@ -14,12 +14,12 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// The slack, in u: of the distance to the farthest corner, for the hit (docs/adding-a-shape.md), and of the
-// coordinates, for the boxes and the products.
+// The parts of the slack, in u: for the hit, relative to the distance to the farthest corner
+// (docs/adding-a-shape.md), and for the boxes and the products, relative to the coordinates.
 enum { BOX_HIT_SLACK = 64, BOX_ROUNDING_SLACK = 8 };
 
-// Rays prepared for boxes: a ray is between the two planes of an enlarged box across an axis from
-// plane * inverse + to_near to plane * inverse + to_far.
+// Rays prepared for boxes. Across an axis, a ray enters an enlarged box at t = plane * inverse + to_near and
+// leaves it at t = plane * inverse + to_far, for the box's near and far plane.
 typedef struct {
     Vector inverse; // 1 / direction, bounded
     Vector to_near, to_far;
@@ -28,7 +28,7 @@ typedef struct {
     uint negative_x, negative_y, negative_z; // the lanes whose direction is negative, as bits
 } BoxRays;
 
-// Upper bounds of 1-norms: from the origin to any hit within the bounds; of the origin and of all hits.
+// Return bounds of 1-norms: from the origin to any hit within the bounds; of the origin and of all hits.
 static inline real bounds_farthest(Vector origin, scalar4 bounds)
 {
     return vector_norm1(vector_subtract(origin, vector_of(bounds))) + (real)(bounds.w);
@@ -39,8 +39,8 @@ static inline real bounds_max_norm1(Vector origin, scalar4 bounds)
     return real_fma((real)(2), vector_norm1(vector_of(bounds)), bounds_farthest(origin, bounds));
 }
 
-// How far the exact ray is from this one within the bounds: where both end at a light, in proportion to the
-// distance from there, which matters where a floor runs to the horizon.
+// Bounds the distance between the exact ray and this one within the bounds. If both end at a light, it is in
+// proportion to the distance from there, which matters where a floor runs to the horizon.
 static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
 {
     real origin_error = ray->origin_error;
@@ -55,8 +55,8 @@ static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
            (real)(1 + 16 * UNIT_ROUNDOFF);
 }
 
-// The slack for the hit, relative to the distance to the farthest corner, in the scene's BVH. Mapping a ray
-// to an instance moves its hits as well.
+// Returns the slack for hits in the scene's BVH, relative to the distance to the farthest corner. It
+// includes the error of mapping rays to instances.
 static inline scalar bvh_hit_slack(const Scene *scene)
 {
     const scalar slack = BOX_HIT_SLACK * UNIT_ROUNDOFF;
@@ -91,7 +91,7 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, scalar hit_slack)
     rays.inverse = inverse;
     rays.to_near = vector_subtract(to_plane, slack_t);
     rays.to_far = vector_add(to_plane, slack_t);
-    rays.tmin = IS_CERTIFIED ? (real)(0) : ray->tmin; // the slack covers less
+    rays.tmin = IS_CERTIFIED ? (real)(0) : ray->tmin; // the slack covers t below 0
     rays.slack = slack;
     rays.negative_x = lanes_bits(d.x < (real)(0));
     rays.negative_y = lanes_bits(d.y < (real)(0));
@@ -106,7 +106,7 @@ static inline Interval box_rays_between(scalar low, scalar high, real inverse, r
         real_max(real_fma((real)(low), inverse, to_far), real_fma((real)(high), inverse, to_far))};
 }
 
-// The rays, in any octant, that intersect a box between tmin and tmax.
+// Returns the rays, in any octant, that intersect a box between tmin and tmax.
 static inline mask box_rays_intersect(const BoxRays *rays, scalar4 low, scalar4 high, real tmax)
 {
     Vector inverse = rays->inverse, to_near = rays->to_near, to_far = rays->to_far;
@@ -117,7 +117,7 @@ static inline mask box_rays_intersect(const BoxRays *rays, scalar4 low, scalar4 
            real_min(real_min(x.far, y.far), real_min(z.far, tmax));
 }
 
-// Which of a node's planes rays of one octant enter and leave a box by.
+// The indices of the planes by which rays of one octant enter and leave a node's boxes.
 typedef struct {
     uint near_x, near_y, near_z, far_x, far_y, far_z;
 } Octant;
@@ -136,7 +136,7 @@ static inline Octant octant_of_lane(const BoxRays *rays, uint lane)
                        rays->negative_z >> lane & 1);
 }
 
-// The lanes whose directions have the signs of the first one's.
+// Returns those of the lanes, as bits, whose directions have the same signs as the first one's.
 static inline uint box_rays_same_octant(const BoxRays *rays, uint lanes)
 {
     uint x = rays->negative_x, y = rays->negative_y, z = rays->negative_z, first = lanes & -lanes;
@@ -148,8 +148,8 @@ static inline real box_plane(global const scalar *box, uint plane)
     return (real)(box[plane * BVH_WIDTH]);
 }
 
-// The rays, all of one octant, that intersect a child's box between tmin and tmax; *entry is where. `box`:
-// the child's scalar in the node's first plane.
+// Returns the rays, all of one octant, that intersect a child's box between tmin and tmax. Sets *entry to
+// where they enter it. `box` is the child's scalar in the node's first plane.
 static inline mask box_rays_intersect_child(const BoxRays *rays, Octant octant, global const scalar *box,
                                             real tmax, real *entry)
 {

@@ -20,8 +20,8 @@ static inline mask ray_meets_cull_sphere(const Ray *ray, global const CullSphere
     return RAY_ACTIVE(ray) & !(along * along < ray->squared * power);
 }
 
-// The row of cull spheres of the ray's common origin, 0 if there is none: first that of the BVH, then those
-// of the primitives outside it.
+// Returns the row of cull spheres of the ray's common origin, or 0 if it has none. The BVH's sphere is
+// first, followed by those of the primitives outside it.
 static inline global const CullSphere *ray_cull_spheres(const Scene *scene, const Ray *ray)
 {
     uint count = scene->header->cull_spheres.x;
@@ -31,11 +31,11 @@ static inline global const CullSphere *ray_cull_spheres(const Scene *scene, cons
 
 // Bounds of the unit directions in which rays are seen from their common origin.
 typedef struct {
-    scalar4 center, reach; // of each component
+    scalar4 center, reach; // per component
     scalar slack;          // the largest cull slack
 } DirectionBounds;
 
-// More than the error of inverse_root_estimate, and all roundings here and in directions_meet_cull_spheres.
+// Exceeds the error of inverse_root_estimate and all roundings here and in directions_meet_cull_spheres.
 #define DIRECTION_REACH_SLACK ((scalar)(0x1p-13f))
 
 // Bounds the active rays of `packets`, given as bits. Returns false if a length is too small to square.
@@ -46,7 +46,7 @@ static inline bool rays_bound_directions(const Ray *rays, uint packets, Directio
 #pragma unroll
     for (uint i = 0; i < MINIMA_COUNT; i++)
         minima.all[i] = (real)(LARGEST);
-// a packet that is not among them counts as the first one: branches would keep the bounds out of registers
+// other packets count as the first one, because branches would keep the bounds out of registers
 #pragma unroll
     for (uint packet = 0; packet < PACKETS; packet++) {
         const Ray *ray = packets >> packet & 1 ? &rays[packet] : first;
@@ -84,12 +84,12 @@ static inline uint directions_meet_cull_spheres(const DirectionBounds *bounds,
     }
     const Vector v = {x.all, y.all, z.all}, size = {fabs(x.all), fabs(y.all), fabs(z.all)};
     real along = vector_dot(v, vector_of(bounds->center)) + vector_dot(size, vector_of(bounds->reach));
-    along = real_max(along, (real)(0)); // behind the origin there is no ray
+    along = real_max(along, (real)(0)); // no ray runs behind the origin
     return lanes_bits(!(along * along < power.all - (real)(bounds->slack)));
 }
 
-// Without BVH and bounces several packets are culled at once. With fewer spheres each packet's own test is
-// faster, more do not fit the bits.
+// Without a BVH and bounces, several packets are culled at once. With few spheres each packet's own test is
+// faster, and more than GROUP_CULLS_MAX do not fit the bits.
 #define HAS_GROUP_CULLS (PACKETS > 1 && !HAS_BVH)
 enum { GROUP_CULLS_MIN = 4, GROUP_CULLS_MAX = 32 };
 
@@ -97,7 +97,7 @@ enum { GROUP_CULLS_MIN = 4, GROUP_CULLS_MAX = 32 };
 // the last primitive are undefined. If there are more than 32 primitives, all bits are set.
 static inline uint packets_near(const Scene *scene, const Ray *rays, uint packets)
 {
-    const uint count = scene->header->cull_spheres.x; // with the BVH's
+    const uint count = scene->header->cull_spheres.x; // including the BVH's
     DirectionBounds bounds;
     if (!HAS_GROUP_CULLS || packets == 0 || count <= GROUP_CULLS_MIN || count > 1 + GROUP_CULLS_MAX)
         return ~0u;

@@ -1,4 +1,4 @@
-// Cutouts: rays pass a surface where the alpha of its image is low, as if it were not there.
+// Implements cutouts. Rays pass through a surface where the alpha of its image is low.
 //
 // The alpha is that of the full texture, whatever the ray's footprint is, so that camera rays, bounces and
 // shadow rays see the same surface. Hits are cut away before they are recorded. So no ray starts behind a

@@ -1,4 +1,4 @@
-// Traversal of the meshes that instances share, with rays in the mesh's space. Leaves have only triangles.
+// Traverses the meshes that instances share, with rays in the mesh's space. Leaves have only triangles.
 #ifndef INSTANCE_BVH_H
 #define INSTANCE_BVH_H
 
@@ -7,7 +7,7 @@
 #include "traversal/single.h"
 
 #if LANES == 1
-// Traverses the BVH of a mesh, as traverse_bvh does that of the scene.
+// Traverses the BVH of a mesh from its root with the ray.
 static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const Ray *ray,
                                  const BoxRays *box_ray, uint lanes, uint root)
 {
@@ -30,7 +30,7 @@ static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const
     }
 }
 #else
-// Traverses it with a group, as traverse_group does that of the scene.
+// Traverses the BVH of a mesh with a group, visiting what any of its active lanes intersects.
 static inline void mesh_traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray,
                                        RayGroup *group, uint root)
 {
@@ -44,7 +44,7 @@ static inline void mesh_traverse_group(Traversal *traversal, const Scene *scene,
     }
 }
 
-// Traverses the BVH of a mesh, as traverse_bvh does that of the scene.
+// Traverses the BVH of a mesh from its root with the rays of `lanes`, given as bits, group by group.
 static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const Ray *ray,
                                  const BoxRays *box_rays, uint lanes, uint root)
 {

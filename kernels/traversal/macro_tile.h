@@ -1,8 +1,8 @@
-// A macro-tile: several packets at once, whose rays pass through a common origin.
+// Defines macro-tiles: several packets at once, whose rays pass through a common origin.
 //
-// In the frame of the common origin, one coordinate axis is w and the other two are u and v. A ray there is a
-// point (u / w, v / w), a packet a rectangle of such points, and a box seen from the origin is a rectangle as
-// well. Packets are frusta on a plane across the main axis in Wald, Ize, Kensler, Knoll, Parker, Ray tracing
+// In the frame of the common origin, one coordinate axis is w and the other two are u and v. A ray there is
+// a point (u / w, v / w), and both a packet and a box seen from the origin are rectangles of such points.
+// Packets are frusta on a plane across the main axis in Wald, Ize, Kensler, Knoll, Parker, Ray tracing
 // animated scenes using coherent grid traversal, SIGGRAPH 2006.
 #ifndef MACRO_TILE_H
 #define MACRO_TILE_H
@@ -15,23 +15,22 @@
 // Packets with a larger slope in the frame take packet traversal.
 #define SLOPE_MAX ((real)(4))
 
-// Bounds of rounding, in u, derived in docs/numerics.md. Of slopes: a box's, relative to itself, and a ray's,
-// relative to 1. Of positions: what boxes are enlarged by beyond their slack, in the coordinates.
+// Rounding bounds in u, derived in docs/numerics.md: a box's slope, relative to itself; a ray's slope,
+// relative to 1; and the enlargement of boxes beyond their slack, relative to the coordinates.
 enum { BOX_SLOPE_SLACK = 32, RAY_SLOPE_SLACK = 64, TILE_POSITION_SLACK = 64 };
-// Of a triangle's vertex across a ray: in the full test, of its distance from the ray's start, and in a
-// block, of its distance from the common origin.
+// Error bounds in u of a triangle's vertex across a ray: in the full test, relative to its distance from the
+// ray's start, and in a block, relative to its distance from the common origin.
 enum { VERTEX_TEST_ERROR = 24, VERTEX_BLOCK_ERROR = 16 };
 
-// The frame of a common origin. Rays are seen as leaving it, whichever way they run; they leave along
-// positive w.
+// The frame of a common origin. Rays count as leaving it along positive w, whichever way they run.
 typedef struct {
     uint u_axis, v_axis, w_axis;
     bool leaving;   // rays start at the origin; else they end there
-    scalar side;    // -1: w runs against its axis; else 1
-    scalar u, v, w; // of the origin
+    scalar side;    // -1 if w runs against its axis, else 1
+    scalar u, v, w; // the coordinates of the origin
 } OriginFrame;
 
-// A rectangle as seen from the common origin, from w on.
+// A rectangle seen from the common origin, at w or beyond.
 typedef struct {
     scalar u_min, u_max, v_min, v_max, w;
 } SeenRectangle;
@@ -39,8 +38,8 @@ typedef struct {
 // A child of a node.
 typedef struct {
     SeenRectangle seen;
-    uint index, type; // of BvhNode
-    uint packets;     // that may hit it, as bits
+    uint index, type; // child_index and child_type of the BvhNode
+    uint packets;     // the packets that may hit it, as bits
 } TileEntry;
 
 // Rectangles, one per lane: the boxes of a node's children, or a block's primitives.
@@ -49,22 +48,22 @@ typedef struct {
 } SeenRectangles;
 
 typedef struct {
-    Traversal *traversals; // of each packet, as the rays
+    Traversal *traversals; // one per packet, like the rays
     Ray *rays;
     OriginFrame frame;
     uint active;     // packets that still traverse, as bits
-    uint unprepared; // packets whose rays ray_prepare has yet to see, as bits
-    scalar slack;    // by which boxes are enlarged
-    // of each packet's rays: slopes, w per t, and the w up to which they are traversed, -LARGEST in lanes
-    // that are done
+    uint unprepared; // packets for which ray_prepare has not been called, as bits
+    scalar slack;    // the enlargement of boxes
+    // per packet, the slopes of its rays, w per t, and the w up to which they are traversed, -LARGEST in
+    // finished lanes
     real u[LANES], v[LANES], w_per_t[LANES], reach[LANES];
-    // bounds of these over each packet, a lane per packet; inside out for packets that are not in the tile
+    // bounds of these over each packet, one lane per packet, inverted for packets that are not in the tile
     RealLanes u_min, u_max, v_min, v_max, reach_max;
     // bounds over all packets
     scalar tile_u_min, tile_u_max, tile_v_min, tile_v_max, tile_reach_max;
-    bool has_shrunk;  // by a hit since tile_reach_max was set
+    bool has_shrunk;  // a hit has reduced a reach since tile_reach_max was set
     scalar ray_per_w; // an upper bound of the rays' length per w
-    // Upper bounds of the errors across a ray of a vertex that counts as hit: vertex_error0 + vertex_error1
+    // A vertex of a triangle that counts as hit is off across a ray by at most vertex_error0 + vertex_error1
     // times the distance from the common origin.
     scalar vertex_error0, vertex_error1;
 } MacroTile;
@@ -79,7 +78,7 @@ static inline scalar scalar4_along(scalar4 vector, uint axis)
     return axis == 0 ? vector.x : axis == 1 ? vector.y : vector.z;
 }
 
-// The frame whose w axis is the main one of the packet's first active ray.
+// Returns the frame whose w axis is the main axis of the packet's first active ray.
 static inline OriginFrame origin_frame(const Scene *scene, const Ray *ray, mask active)
 {
     OriginFrame frame;
@@ -104,7 +103,7 @@ static inline Vector frame_origin(const OriginFrame *frame)
     return (Vector){(real)(frame->u), (real)(frame->v), (real)(frame->w)};
 }
 
-// Returns points, one per lane, on the frame's axes. `rows` are those of their x, y and z.
+// Returns points, one per lane, on the frame's axes, from rows of their x, y and z.
 static inline Vector frame_load(const OriginFrame *frame, global const scalar *rows)
 {
     return (Vector){real_load(rows + frame->u_axis * LANES), real_load(rows + frame->v_axis * LANES),
@@ -120,12 +119,12 @@ static inline real tile_reach(const MacroTile *tile, uint packet)
     return lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
 }
 
-// Bounds of the packets: of each the least lane counts, of a negative where a largest is meant.
+// Bounds of the packets. The least lane of each counts, so maxima are stored as negatives.
 typedef struct {
     real u_min[LANES], u_max[LANES], v_min[LANES], v_max[LANES], reach_max[LANES];
-    // At `certified`, over all packets: how far the exact rays are from these within the bounds of the BVH,
-    // beyond what tmin allows; the error of their origins; and the error of a vertex across them, over its
-    // distance.
+    // At `certified`, maxima over all packets: of the exact rays' distance from these within the bounds of
+    // the BVH, plus the length that tmin allows before their start; of the error of their origins; and of
+    // the error of a vertex across them, over its distance.
     real place_error, origin_error, vertex_error1;
 } PacketBounds;
 
@@ -170,8 +169,8 @@ static inline void tile_bound_reach(MacroTile *tile)
     tile->has_shrunk = false;
 }
 
-// By which boxes are enlarged, from upper bounds of 1-norms: of a hit's distance from the ray's start, and of
-// its coordinates. `norm1_per_w`: of the rays.
+// Returns the enlargement of boxes, from upper bounds of the 1-norms of a hit's distance from the ray's
+// start and of its coordinates. `norm1_per_w` is the rays' largest 1-norm per w.
 static inline scalar tile_slack(const MacroTile *tile, const Scene *scene, scalar norm1_per_w)
 {
     const scalar4 bounds = scene->header->bounds;
@@ -206,7 +205,7 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     if (IS_CERTIFIED) {
         tile->slack += lanes_largest(mask_all(), bounds->place_error);
         const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
-        // six times the test's error, of 1-norms that may be 2.4 times the distance: docs/numerics.md
+        // six times the test's error, of 1-norms that may be 2.4 times the distance (docs/numerics.md)
         const scalar error1 = (scalar)(6 * 2.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
         const scalar origin_error = lanes_largest(mask_all(), bounds->origin_error);
         tile->vertex_error0 = 6 * (origin_error + (scalar)(2 * UNIT_ROUNDOFF) * origin);
@@ -243,7 +242,7 @@ static inline mask packet_sees(const MacroTile *tile, uint packet, const SeenRec
            (seen->w.all <= (real)(tile->reach_max.each[packet]));
 }
 
-// The rays of a packet, as bits, within a rectangle that they reach.
+// Returns the rays of a packet, as bits, that are within a rectangle and reach it.
 static inline uint rays_within(const MacroTile *tile, uint packet, const SeenRectangle *seen)
 {
     real u = tile->u[packet], v = tile->v[packet];
@@ -257,13 +256,13 @@ static inline void tile_prepare(MacroTile *tile, uint packet)
     tile->unprepared &= ~(1u << packet);
 }
 
-// Call after a packet's hits.
+// Updates the reach of a packet after hits.
 static inline void tile_update(MacroTile *tile, uint packet)
 {
     const Traversal *traversal = &tile->traversals[packet];
     tile->reach[packet] = tile_reach(tile, packet);
     if (!lanes_any(traversal->active)) tile->active &= ~(1u << packet);
-    if (!tile->frame.leaving) return; // a light's rays end with a hit: the reach of the others stays
+    if (!tile->frame.leaving) return; // rays to a light end at a hit, and the others keep their reach
     tile->reach_max.each[packet] = lanes_largest(traversal->active, tile->reach[packet]);
     tile->has_shrunk = true;
 }

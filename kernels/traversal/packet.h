@@ -1,11 +1,11 @@
-// Packet traversal of the BVH, for kernels with several lanes.
+// Traverses the BVH with packets, in kernels with several lanes.
 //
 // The rays of a packet are traversed in coherent groups, each in one octant. The child boxes of a node are
-// first tested all at once, a lane per box, against interval bounds of the group (Boulos, Wald, Shirley,
-// Geometric and arithmetic culling methods for entire ray packets, University of Utah, UUCS-06-010, 2006;
-// there box by box); those that pass are tested one by one, a lane per ray. A few rays skip the bounds: each
-// is tested against all boxes, a lane per box. Rays that share their octant with few others are divergent,
-// and traversed last as one group, without bounds.
+// first tested all at once, one box per lane, against interval bounds of the group (Boulos, Wald, Shirley,
+// Geometric and arithmetic culling methods for entire ray packets, University of Utah, UUCS-06-010, 2006,
+// who test box by box). Those that pass are tested one by one, with one ray per lane. Groups of few rays
+// skip the bounds and test each ray against all boxes, one box per lane. Rays that share their octant with
+// few others are divergent. They are traversed last, as one group without bounds.
 #ifndef PACKET_H
 #define PACKET_H
 
@@ -15,16 +15,16 @@
 
 #if LANES > 1
 
-// Up to this many active lanes skip the bounds; up to twice as many in an octant are divergent. A quarter was
-// measured (docs/performance-notes.md).
+// Groups of up to this many active lanes skip the bounds, and octants with up to twice as many are
+// divergent. A quarter was chosen by measurement (docs/performance-notes.md).
 #define FEW_LANES (LANES >> 2)
 
 // Interval bounds for one axis, for rays from origins o in direction sign s, and a plane at p:
 //     entry >= p * min_inverse + to_near = (s p - max(s o + slack)) min |1 / direction|
 //     exit  <= p * max_inverse + to_far  = (s p - min(s o - slack)) max |1 / direction|
-// That is plain for planes ahead of all origins. Behind one the extremes of |1 / direction| would swap; but
-// bound and distance are both negative there, up to the slack, and no hit lies before tmin >= 0. If a tmin is
-// negative, both bounds are opened completely.
+// These hold for planes ahead of all origins. Behind one the extremes of |1 / direction| would swap, but
+// bound and distance are both negative there, up to the slack, and no hit lies before tmin >= 0. If a tmin
+// is negative, both bounds are opened completely.
 typedef struct {
     scalar min_inverse, max_inverse; // s times the extremes of |1 / direction|
     scalar to_near, to_far;
@@ -36,8 +36,8 @@ typedef struct {
     scalar tmin, tmax; // the smallest tmin and the largest tmax of the rays
 } GroupBounds;
 
-// The lane minima that bounds are made of: of |1 / direction|, its negative, tmin and the negative tmax; and,
-// less the slack, of the origins' negatives and the origins along the direction.
+// The lane minima that bounds are made of: those of |1 / direction|, its negative, tmin and the negative
+// tmax, and, less the slack, those of the origins' negatives and the origins along the direction.
 enum { BOUNDS_MIN_INVERSE, BOUNDS_MAX_INVERSE = 3, BOUNDS_TMIN = 6, BOUNDS_TMAX };
 enum { BOUNDS_ENTRY_ORIGIN, BOUNDS_EXIT_ORIGIN = 3, BOUNDS_UNUSED = 6 };
 typedef struct {
@@ -67,7 +67,7 @@ static inline AxisBounds axis_bounds(const BoundsMinima *minima, uint axis, bool
                         open - exit_origin * max_inverse};
 }
 
-// Of lanes in one octant.
+// Returns the bounds of `lanes`, given as bits, which are in one octant.
 static inline GroupBounds group_bounds(const BoxRays *rays, const Ray *ray, uint lanes, real tmax)
 {
     const real none = (real)(LARGEST);
@@ -110,7 +110,7 @@ static inline real axis_bounds_leave(const AxisBounds *bounds, global const scal
     return real_fma(children_plane(boxes, far_plane), (real)(bounds->max_inverse), (real)(bounds->to_far));
 }
 
-// The children whose boxes a ray of the group may intersect, a lane per child; *entry is a lower bound.
+// Returns the children, one per lane, whose boxes a ray of the group may hit. Sets *entry to lower bounds.
 static inline mask bounds_intersect_children(const GroupBounds *bounds, global const scalar *boxes,
                                              real *entry)
 {
@@ -124,14 +124,14 @@ static inline mask bounds_intersect_children(const GroupBounds *bounds, global c
     return *entry <= far;
 }
 
-// Spilled copy of the packet, indexable by lane: indexing the rays themselves would keep them out of
-// registers.
+// A spilled copy of the packet that can be indexed by lane. Indexing the rays themselves would keep them out
+// of registers.
 typedef struct {
     BoxRays rays;
     bool is_set;
 } SpilledRays;
 
-// The children whose boxes one ray intersects, a lane per child.
+// Returns the children, one per lane, whose boxes one ray intersects.
 static inline mask ray_intersects_children(const BoxRays *rays, uint lane, global const scalar *boxes,
                                            scalar tmax, real *entry)
 {
@@ -162,10 +162,10 @@ typedef struct {
     bool coherent;
     GroupBounds bounds; // if coherent
     uint active;        // lanes that still traverse, as bits
-    real tmax;          // of each lane; -LARGEST for those that are done
+    real tmax;          // per lane, -LARGEST in finished lanes
 } RayGroup;
 
-// For each child the lanes whose rays intersect its box, as bits, and the first entry distance.
+// Returns for each child the lanes whose rays hit its box, as bits. Sets the first entry distances.
 static inline integer rays_intersect_children(const RayGroup *group, uint lanes, global const scalar *boxes,
                                               real *entry)
 {
@@ -183,7 +183,7 @@ static inline integer rays_intersect_children(const RayGroup *group, uint lanes,
     return hit_by;
 }
 
-// After a leaf with hits.
+// Updates the group after a leaf with hits.
 static inline void group_shrink(RayGroup *group, const Traversal *traversal)
 {
     group->active = lanes_bits(traversal->active);
@@ -194,13 +194,13 @@ static inline void group_shrink(RayGroup *group, const Traversal *traversal)
 // The children of a node that lanes of a group may intersect.
 typedef struct {
     uint children;       // as bits
-    RealLanes entry;     // of each child the first entry distance
-    bool by_ray;         // each ray was tested; else the group's bounds
-    IntegerLanes hit_by; // if by_ray, for each child the lanes, as bits
+    RealLanes entry;     // each child's first entry distance
+    bool by_ray;         // each ray was tested, instead of the group's bounds
+    IntegerLanes hit_by; // if by_ray, the lanes that hit each child, as bits
 } MetChildren;
 
-// By ray or by child: the loop costs a test per ray or per child that passes the bounds; the shorter one
-// runs.
+// Returns the children that the lanes may hit. Runs the shorter of two loops, which cost one test per ray or
+// per child that passes the bounds.
 static inline MetChildren group_meets_children(const RayGroup *group, uint lanes, global const scalar *boxes)
 {
     MetChildren met;
@@ -217,7 +217,7 @@ static inline MetChildren group_meets_children(const RayGroup *group, uint lanes
     return met;
 }
 
-// The lanes that intersect the box of one of them before their tmax, as bits.
+// Returns the lanes, as bits, that intersect one child's box before their tmax.
 static inline uint child_lanes(const RayGroup *group, const MetChildren *met, uint child,
                                global const scalar *boxes)
 {
@@ -227,15 +227,15 @@ static inline uint child_lanes(const RayGroup *group, const MetChildren *met, ui
         box_rays_intersect_child(group->rays, group->bounds.octant, boxes + child, group->tmax, &entry));
 }
 
-// The children that are leaves, as bits.
+// Returns the children that are leaves, as bits.
 static inline uint node_leaves(global const BvhNode *node)
 {
     integer types = LANES_CONVERT(INTEGER_BASE)(JOIN(vload, LANES)(0, (global const uint *)node->child_type));
     return lanes_bits(types != (integer)(BVH_NODE));
 }
 
-// Intersects what is in the leaves among a node's children that any of the lanes intersects, and pushes the
-// other children. A leaf on the stack costs more than the tests that its order spares.
+// Intersects the leaves among the children of a node that any of the lanes hits, and pushes the others. A
+// leaf on the stack costs more than the tests that visiting it in order saves.
 static inline void visit_node(Traversal *traversal, TraversalStack *stack, const Scene *scene, const Ray *ray,
                               global const BvhNode *node, RayGroup *group, uint lanes)
 {
@@ -264,7 +264,7 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
     }
 }
 
-// The next group: the remaining lanes of one octant, or, once none remain, the divergent ones.
+// Returns the next group: the remaining lanes of one octant or, once none remain, the divergent ones.
 static inline RayGroup next_group(const BoxRays *rays, SpilledRays *spilled, const Ray *ray, real tmax,
                                   uint *remaining, uint *divergent)
 {
@@ -285,7 +285,7 @@ static inline RayGroup next_group(const BoxRays *rays, SpilledRays *spilled, con
     return group;
 }
 
-// Traverses the BVH with a group; visits what any of its active lanes intersects.
+// Traverses the BVH with a group, visiting what any of its active lanes intersects.
 static inline void traverse_group(Traversal *traversal, const Scene *scene, const Ray *ray, RayGroup *group)
 {
     StackEntry entries[STACK_CAPACITY], next = {0, group->active, -LARGEST};
@@ -315,7 +315,7 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
     spilled.is_set = false;
     while ((remaining | divergent) != 0) {
         RayGroup group = next_group(&rays, &spilled, ray, traversal_tmax(traversal), &remaining, &divergent);
-        // Lanes of other groups are inactive meanwhile: optical depths add up, so that a primitive that
+        // Lanes of other groups are inactive meanwhile, because optical depths add up and a primitive that
         // several groups test may count only once per lane.
         mask members = mask_of_bits(group.active), others = traversal->active & !members;
         traversal->active = traversal->active & members;

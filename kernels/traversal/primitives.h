@@ -1,4 +1,4 @@
-// Intersects packets with primitives: the leaves of the BVH, and what is not in it.
+// Intersects packets with primitives, in the leaves of the BVH and outside it.
 #ifndef PRIMITIVES_H
 #define PRIMITIVES_H
 
@@ -22,7 +22,7 @@ static inline void object_prefetch(const Scene *scene, uint type, uint4 id)
 }
 
 #if IS_CERTIFIED
-// Clears the uncertain lanes of rays that leave a neighbor of a triangle, and the triangle with it.
+// Clears the uncertain lanes of rays that leave a neighbor of a triangle and so cannot hit the triangle.
 static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ray *ray, CertainHit *hit)
 {
     if (!lanes_any(hit->uncertain & (ray->left >= (integer)(0)))) return;
@@ -32,7 +32,7 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
 }
 #endif
 
-// Tests one primitive and records its hit. Returns whether any lane hits it, or may.
+// Tests one primitive and records its hit. Returns whether any lane hits or may hit it.
 #if IS_CERTIFIED
 #define INTERSECT_SHAPE(feature, Type, name, names)                                                          \
     static inline bool intersect_##name(Traversal *traversal, const Scene *scene, const Ray *ray,            \
@@ -79,8 +79,8 @@ SHAPE_LIST(INTERSECT_SHAPE)
 static bool instance_traverse(Traversal *traversal, const Scene *scene, const Ray *ray, uint index,
                               uint lanes);
 
-// Intersects primitives first .. last - 1 of one type. One function per type: if one function tested all
-// types, Mesa, which inlines before it knows the type asked for, would compile them all at each call.
+// Intersects primitives first .. last - 1 of one type. Each type has a function, because Mesa, which inlines
+// before it knows the type asked for, would compile the tests of all types at each call of a common one.
 #define INTERSECT_SHAPES(feature, Type, name, names)                                                         \
     static inline bool intersect_##names(Traversal *traversal, const Scene *scene, const Ray *ray,           \
                                          uint first, uint last)                                              \
@@ -105,7 +105,7 @@ static inline bool intersect_instances(Traversal *traversal, const Scene *scene,
 }
 
 // Intersects those of `count` primitives of one type whose bits are set in `near` and whose cull spheres, if
-// these are not 0, a ray may hit. More than 32 primitives have no bits: all count as near.
+// these are not 0, a ray may hit. Primitives after the 32nd have no bits and count as near.
 #define INTERSECT_NEAR_SHAPES(feature, Type, name, names)                                                    \
     static inline void intersect_near_##names(Traversal *traversal, const Scene *scene, const Ray *ray,      \
                                               uint first, uint count, uint near,                             \
@@ -123,7 +123,7 @@ static inline bool intersect_instances(Traversal *traversal, const Scene *scene,
     }
 PRIMITIVE_LIST(INTERSECT_NEAR_SHAPES)
 
-// The first triangle of a block.
+// Returns the index of a block's first triangle.
 static inline uint block_first(const Scene *scene, uint block)
 {
     return ((global const uint *)scene->block_places)[block];
@@ -156,8 +156,8 @@ static inline Sphere block_sphere(const Scene *scene, global const SphereBlock *
     return (Sphere){center_radius, (uint4)(id, 0, 0, 0)};
 }
 
-// Returns the spheres, as bits of the first `count` of a block, that one ray may hit. Rejects by what begins
-// the full test, at `certified` with radii enlarged by all that it counts as uncertain.
+// Returns those of the first `count` spheres of a block, as bits, that one ray may hit. Rejects by the first
+// step of the full test, at `certified` with radii enlarged by all that it counts as uncertain.
 static inline uint block_spheres_near(global const SphereBlock *block, uint count, const Ray *ray, uint lane)
 {
     const Vector origin = vector_of_lane(&ray->origin, lane),
@@ -202,8 +202,8 @@ static inline bool intersect_sphere_block(Traversal *traversal, const Scene *sce
     return intersect_block_spheres(traversal, scene, ray, block, near);
 }
 
-// Returns the triangles among the first `count` of a block, as bits, that one ray may hit. Runs the first
-// step of the full test, a lane per triangle; at `certified` with error bounds at least as large as its.
+// Returns those of the first `count` triangles of a block, as bits, that one ray may hit. Runs the first
+// step of the full test, one triangle per lane, at `certified` with error bounds at least as large as its.
 static inline uint block_triangles_near(global const TriangleBlock *block, uint count, const Ray *ray,
                                         uint lane)
 {
@@ -247,14 +247,14 @@ static OUT_OF_LINE bool intersect_triangle_block(Traversal *traversal, const Sce
 }
 #endif
 
-// Whether the leaves of a type are blocks.
+// Returns whether the leaves of a type are blocks.
 static inline bool type_has_blocks(uint type)
 {
     return LANES > 1 && (type == TYPE_SPHERES || type == TYPE_TRIANGLES);
 }
 
-// Intersects a leaf, count << 8 | type (BvhNode.child_type) and its first primitive. Blocks and instances are
-// left out.
+// Intersects a leaf, given as count << 8 | type (BvhNode.child_type) and its first primitive. Blocks and
+// instances are skipped.
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint first)
 {
@@ -267,7 +267,7 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
 }
 
 #if LANES > 1
-// Intersects a block or another leaf with the rays of some lanes, given as bits. Instances are left out.
+// Intersects a block or another leaf with the rays of some lanes, given as bits. Instances are skipped.
 static inline bool intersect_leaf_or_block(Traversal *traversal, const Scene *scene, const Ray *ray,
                                            uint leaf, uint index, uint lanes)
 {

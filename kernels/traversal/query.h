@@ -1,4 +1,4 @@
-// What a traversal asks for, and its hit so far.
+// Defines the queries of a traversal and its hit so far.
 #ifndef QUERY_H
 #define QUERY_H
 
@@ -14,13 +14,13 @@ typedef enum {
 
 typedef struct {
     Query query;
-    ObjectRange within; // with HAS_INSTANCES: of the instance that is being traversed, if it is in one
+    ObjectRange within; // with HAS_INSTANCES, the ids of the instance being traversed, if any
     mask active;        // lanes that still traverse
     Hit hit;
-    // For OCCLUSION, of the objects hit so far; green and blue with HAS_FILTERS.
+    // For OCCLUSION, the depths of the objects hit so far; green and blue with HAS_FILTERS.
     integer optical_depth, optical_depth_green, optical_depth_blue;
-    // At `certified`: the exact hit is no farther than hit.high, and none but hit.object's before `rival`.
-    // For OCCLUSION hit.uncertain has the lanes with an uncertain hit.
+    // At `certified`, the exact hit is not beyond hit.high, and only hit.object may be hit before `rival`.
+    // For OCCLUSION, hit.uncertain marks the lanes with an uncertain hit.
     real rival;
 } Traversal;
 
@@ -38,7 +38,7 @@ typedef struct {
 #define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
 
-// Returns an object's type_index_material. In an instance ids are those of its mesh, from 0 on.
+// Returns an object's type_index_material. Within an instance, ids are those of its mesh, from 0.
 static inline uint4 object_entry(const Traversal *traversal, const Scene *scene, uint id)
 {
     if (!HAS_INSTANCES) return scene->objects[id].type_index_material;
@@ -75,7 +75,7 @@ static inline bool object_is_opaque(const Traversal *traversal, const Scene *sce
     return scene->materials[object_material(traversal, scene, id)].reflection_transmission_ior.y == 0;
 }
 
-// Reduces the light of the lanes that hit an object; those without light are done.
+// Reduces the light of the lanes that hit an object, and deactivates those that have none left.
 static inline void traversal_occlude(Traversal *traversal, const Scene *scene, mask found, uint id)
 {
     if (!HAS_TRANSMISSION) {
@@ -100,9 +100,9 @@ static inline void traversal_occlude(Traversal *traversal, const Scene *scene, m
     traversal->active = traversal->active & (least < (integer)(OPTICAL_DEPTH_MAX));
 }
 
-// Records crossings in the lanes `found`. Of equally near ones the lowest id counts, so that the image does
-// not depend on the order of objects. Occlusion counts for active lanes alone. A closest hit is recorded for
-// any lane that carries a ray: outside the group it is still a hit, and recording it twice changes nothing.
+// Records crossings in the lanes `found`. Among equally near ones the lowest id counts, so that the image
+// does not depend on the order of objects. Occlusion counts only for active lanes. A closest hit counts for
+// any lane that carries a ray, because it holds outside the group and may be recorded twice.
 static inline void traversal_record(Traversal *traversal, const Scene *scene, mask found, real t, uint id)
 {
     Hit *hit = &traversal->hit;
@@ -137,10 +137,10 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
     mask is_new =
         (found->found | found->uncertain) & (hit->object != object); // it may have been tested before
     mask closer = found->found & is_new & (found->t < hit->t);
-    // what is not kept: of the two, or of the uncertain shape
+    // the bound of the hit that is not kept, the farther or the uncertain one
     real other = lanes_select(closer, hit->low, found->low);
     traversal->rival = lanes_select(is_new, real_min(traversal->rival, other), traversal->rival);
-    // of the exact ray's first hit, whichever shape has it
+    // bounds the exact ray's first hit, whichever shape has it
     hit->high = lanes_select(found->found, real_min(hit->high, found->high), hit->high);
     hit->t = lanes_select(closer, found->t, hit->t);
     hit->low = lanes_select(closer, found->low, hit->low);
@@ -156,8 +156,8 @@ static inline void traversal_classify(Traversal *traversal)
         traversal->hit.uncertain = traversal->active & !(traversal->rival > traversal->hit.high);
 }
 
-// Per-lane tmax, below LARGEST, the entry distance of a child that no ray hits; -LARGEST for lanes that are
-// done.
+// Returns the tmax of each lane, -LARGEST in finished lanes. It is below LARGEST, the entry distance of a
+// child that no ray hits.
 static inline real traversal_tmax(const Traversal *traversal)
 {
     real t = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;

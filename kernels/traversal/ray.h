@@ -1,4 +1,4 @@
-// Rays and hits.
+// Defines rays and hits.
 #ifndef RAY_H
 #define RAY_H
 
@@ -7,10 +7,10 @@
 #include "sampling.h"
 #include "types.h"
 
-// A t beyond every hit: bounds where nothing bounds. Sums of eight such are in range.
+// A t beyond every hit, for bounds where nothing is known. Sums of eight of them do not overflow.
 #define NEVER ((real)(LARGEST / 8))
 
-// Rays whose errors are bounded may run inside a sphere (shading/chords.h).
+// 1 if rays with bounded errors may run inside a sphere (shading/chords.h).
 #define HAS_CHORDS (IS_CERTIFIED && HAS_SPHERES && (HAS_REFLECTION || HAS_TRANSMISSION))
 
 typedef struct {
@@ -24,38 +24,38 @@ typedef struct {
     // COMMON_ORIGIN_…: the lines of all lanes pass through it, within u |direction|
     uint common_origin;
     real cull_slack; // at `certified`: ray_cull_slack
-    // At `certified`: bounds on the distance of the origin from the exact ray's line, and of the direction,
-    // relative to its length; the object that the ray leaves, -1: none; whether it leaves it outward for
-    // certain; whether the exact rays end at one point, a light, where their origins' errors have vanished.
-    // The exact ray starts between t = tmin <= 0 and -tmin.
+    // At `certified`, bounds on the distance of the origin from the exact ray's line and on the direction's
+    // error, relative to its length; the id of the object that the ray leaves, or -1; whether it certainly
+    // leaves it outward; and whether the exact rays end at one point, a light, where the errors of their
+    // origins have vanished. The exact ray starts between t = tmin <= 0 and -tmin.
     real origin_error, direction_error;
     integer left;
     mask leaves_outward;
     bool ends_at_light;
     // With HAS_SMOOTH_NORMALS, whether the ray starts in front of the triangle that it leaves instead of on
-    // it (shapes/triangle.h), and whether it runs back to its plane for certain.
+    // it (shapes/triangle.h), and whether it certainly runs back to the triangle's plane.
     mask is_lifted, sinks;
-    // of a ray along a chord of the sphere that it leaves, NEVER of others: as of a Chord (shading/chords.h)
+    // the Chord's (shading/chords.h) if the ray runs along one of the sphere that it leaves, else NEVER
     real chord_turn, chord_end_place;
-    real length;        // of the direction, not below the exact one, within 48 u
-    real across_length; // by ray_prepare: a bound on the length of across_u and across_v
-    Vector inverse;     // by ray_prepare, for boxes: 1 / direction
-    // for triangles: two vectors across the direction, of length O(1) since they are computed from a
-    // direction scaled by a power of two
+    real length;        // the direction's length, not below the exact one, within 48 u
+    real across_length; // set by ray_prepare: a bound on the length of across_u and across_v
+    Vector inverse;     // set by ray_prepare for boxes: 1 / direction
+    // set by ray_prepare for triangles: two vectors across the direction, of length O(1) since they are
+    // computed from a direction scaled by a power of two
     Vector across_u, across_v;
 } Ray;
 
 typedef struct {
     real t;
-    integer object; // its id; -1: nothing hit
-    // At `certified`: `low`, of this hit, is not above the exact t, `high` not below that of the exact ray's
-    // first hit, whichever shape has it; `uncertain`: in lanes where any of this is uncertain.
+    integer object; // its id, or -1 if nothing is hit
+    // At `certified`, `low` is not above this hit's exact t, and `high` is not below that of the exact ray's
+    // first hit, whichever shape has it. `uncertain` marks the lanes where any of this is uncertain.
     real low, high;
     mask uncertain;
 } Hit;
 
-// Compares the mask from memory with 0 anew: LLVM then sees that a lane is all ones or all zeros, and keeps
-// what derives from it in mask registers. It does not see this through a function call; hence a macro.
+// Re-tests the stored mask. LLVM then sees that a lane is all ones or all zeros, and keeps what derives from
+// it in mask registers. It does not see this through a function call, hence a macro.
 #define RAY_ACTIVE(ray) ((ray)->active != (mask)(0))
 
 static inline mask hit_found(const Hit *hit)
@@ -69,9 +69,9 @@ static inline real real_inverse_or_zero(real a)
     return lanes_select(zero, (real)(0), real_divide((real)(1), lanes_select(zero, (real)(1), a)));
 }
 
-// 1 / a, huge for 0, so that its product with a distance keeps the sign. A Newton step makes inexact device
-// division nearly exact, and exact for powers of two: rays along an axis hit a box exactly at its face. BVH
-// boxes, which have slack, do without.
+// Returns 1 / a, or a huge number for 0, so that its product with a distance keeps the sign. A Newton step
+// makes inexact device division nearly exact, and exact for powers of two, so that rays along an axis hit a
+// box exactly at its face. BVH boxes, which have slack, do without.
 static inline real real_inverse_or_huge(real a)
 {
     mask zero = a == (real)(0), steps = fabs(a) > (real)(SMALLEST_RATIO);
@@ -81,9 +81,9 @@ static inline real real_inverse_or_huge(real a)
     return lanes_select(zero, (real)(1 / SMALLEST_RATIO), inverse);
 }
 
-// Two vectors perpendicular to d and to each other, of equal length, without a branch (Duff et al., Building
-// an orthonormal basis, revisited, JCGT 6(1), 2017, listing 3; here times |d| (|d| + |z|), which spares the
-// divisions).
+// Sets two vectors perpendicular to d and to each other, of equal length, without a branch (Duff et al.,
+// Building an orthonormal basis, revisited, JCGT 6(1), 2017, listing 3; here times |d| (|d| + |z|), which
+// saves the divisions).
 static inline void frame_across(Vector d, Vector *u, Vector *v)
 {
     real side = lanes_select(d.z >= (real)(0), (real)(1), (real)(-1));
@@ -94,8 +94,8 @@ static inline void frame_across(Vector d, Vector *u, Vector *v)
     *v = (Vector){-d.x * d.y, real_fma(-d.y, d.y, side * norm_w), -d.y * w};
 }
 
-// Two vectors exactly perpendicular to d, so that products with points far along it do not cancel badly: a
-// shear along the largest component, as in Woop, Benthin, Wald (shapes/triangle.h).
+// Sets two vectors exactly perpendicular to d, so that products with points far along it do not cancel
+// badly, by a shear along the largest component, as in Woop, Benthin, Wald (shapes/triangle.h).
 static inline void shear_across(Vector d, Vector *u, Vector *v)
 {
     const real zero = (real)(0);
@@ -127,20 +127,20 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
         if (HAS_CHORDS) ray.chord_turn = ray.chord_end_place = NEVER;
     }
     ray.active = active & (ray.squared > (real)(0));
-    // 0 in inactive lanes: only a sphere around the origin still examines them
+    // 0 in inactive lanes, which only a sphere around the origin still examines
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
     if (IS_CERTIFIED) ray.length = real_sqrt(ray.squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
     return ray;
 }
 
-// One over the direction's length, not below the exact one, within 80 u.
+// Returns one over the direction's length, not below the exact value, within 80 u.
 static inline real ray_inverse_length(const Ray *ray)
 {
     return ray->inverse_squared * ray->length * (real)(1 + 16 * UNIT_ROUNDOFF);
 }
 
-// 1 / direction, huge where a component is 0.
+// Returns 1 / direction, huge where a component is 0.
 static inline Vector ray_inverse(const Ray *ray)
 {
     Vector d = ray->direction;
@@ -151,8 +151,8 @@ static inline Vector ray_inverse(const Ray *ray)
 // difference and of two products.
 enum { TRIANGLE_ERROR = 5 };
 
-// Computes what boxes and triangles need. Lazy and idempotent: called before leaves of the BVH, and boxes and
-// triangles outside it, are tested.
+// Computes what boxes and triangles need. It is idempotent and called only before leaves of the BVH, and
+// boxes and triangles outside it, are tested.
 static inline void ray_prepare(Ray *ray)
 {
     Vector d = ray->direction;
@@ -172,8 +172,8 @@ static inline void ray_prepare(Ray *ray)
     }
 }
 
-// A ray without far end whose direction is unit, or 0. Its square is 1 + e with e of a few u; the reciprocal
-// is 1 - e within e^2.
+// Returns a ray without a far end whose direction is a unit vector or 0. Its square is 1 + e with e of a few
+// u; the reciprocal is 1 - e within e^2.
 static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 {
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
@@ -183,7 +183,7 @@ static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
     return ray;
 }
 
-// `skips_culling`: lanes that are too far off to be culled.
+// Sets the common origin. `skips_culling` marks the lanes whose errors are too large for culling.
 static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask skips_culling)
 {
     ray->common_origin = common_origin;
@@ -193,8 +193,8 @@ static inline void ray_set_common_origin(Ray *ray, uint common_origin, mask skip
     ray->cull_slack = lanes_select(skips_culling, (real)(LARGEST), slack);
 }
 
-// Returns by how much the powers of cull spheres are lowered because rays to a light miss it by the rounding
-// of their direction.
+// Returns the amount by which the powers of cull spheres are lowered because rays to a light miss it by the
+// rounding of their direction.
 static inline real ray_cull_slack(const Ray *ray)
 {
     if (IS_CERTIFIED) return ray->cull_slack;
@@ -202,13 +202,13 @@ static inline real ray_cull_slack(const Ray *ray)
     return (real)(CULL_DIRECTION_SLACK * UNIT_ROUNDOFF) * ray->squared;
 }
 
-// The nearer of two crossings, near_t <= far_t, beyond the ray's start: far_t if near_t lies before it.
+// Returns near_t, or far_t if near_t is not beyond the ray's start, for crossings near_t <= far_t.
 static inline real ray_first(const Ray *ray, real near_t, real far_t)
 {
     return lanes_select(near_t > ray->tmin, near_t, far_t);
 }
 
-// Its product with a point seen from the origin is the point's t.
+// Returns the vector whose dot product with a point seen from the origin is the point's t.
 static inline Vector ray_along(const Ray *ray)
 {
     return vector_scale(ray->direction, ray->inverse_squared);
@@ -219,14 +219,14 @@ static inline Vector ray_point(const Ray *ray, real t)
     return vector_fma(ray->direction, t, ray->origin);
 }
 
-// start + direction t, rounded about once.
+// Returns start + direction t, rounded about once.
 static inline real ray_coordinate(Pair start, real direction, real t)
 {
     Pair offset = two_product(direction, t), sum = two_sum(start.high, offset.high);
     return sum.high + (sum.low + (start.low + offset.low));
 }
 
-// ray_point minus `from`; compensated, as exact as t is, at any distance.
+// Returns the ray's point at t minus `from`. The compensated form is as exact as t at any distance.
 static inline Vector ray_point_from(const Ray *ray, Vector from, real t)
 {
     if (!IS_COMPENSATED) return vector_fma(ray->direction, t, vector_subtract(ray->origin, from));

@@ -1,4 +1,4 @@
-// Single-ray traversal of the BVH, for kernels with one lane.
+// Traverses the BVH with single rays, in kernels with one lane.
 #ifndef SINGLE_H
 #define SINGLE_H
 

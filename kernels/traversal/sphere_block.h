@@ -1,4 +1,4 @@
-// Blocks of spheres against the packets of a macro-tile, before the full test (shapes/sphere.h).
+// Tests blocks of spheres against the packets of a macro-tile, before the full test (shapes/sphere.h).
 //
 // A block's spheres are set up in the frame of the common origin, one per lane. Then each packet runs the
 // shorter of two loops: over its rays, with one sphere per lane, or over the spheres, with one ray per lane.
@@ -22,10 +22,10 @@ typedef struct {
     Vector center; // in the scene's coordinates
     real radius;
     RealLanes u, v; // slopes of the center
-    RealLanes size; // of the enlarged radius over the center's w, squared
+    RealLanes size; // the enlarged radius over the center's w, squared
 } SphereView;
 
-// Sets the view. Returns the spheres, as bits of the first `count`, that the macro-tile may hit.
+// Sets the view. Returns those of the first `count` spheres, as bits, that the macro-tile may hit.
 static inline uint spheres_see(SphereView *view, const MacroTile *tile, global const SphereBlock *block,
                                uint count)
 {

@@ -1,10 +1,10 @@
-// Traversal of the BVH by macro-tiles.
+// Traverses the BVH by macro-tiles.
 //
-// The children of a node are culled all at once, a lane per child, against the macro-tile's rectangle; the
-// packets of each child that is left all at once, a lane per packet; and the rays of each packet that is not
-// wholly inside the child's rectangle all at once, a lane per ray. Groups of rays are culled by bounds at
-// several levels in Reshetov, Soupikov, Hurley, Multi-level ray tracing algorithm, SIGGRAPH 2005, without
-// lanes of three types.
+// The children of a node are culled against the macro-tile's rectangle, one child per lane. Then the packets
+// are culled against each remaining child, one packet per lane, and finally the rays of each packet that is
+// not wholly inside the child's rectangle, one ray per lane. Groups of rays are culled by bounds at several
+// levels in Reshetov, Soupikov, Hurley, Multi-level ray tracing algorithm, SIGGRAPH 2005, without lanes of
+// three types.
 #ifndef TILE_TRAVERSAL_H
 #define TILE_TRAVERSAL_H
 
@@ -36,7 +36,7 @@ static inline uint boxes_view(SeenRectangles *seen, const MacroTile *tile, globa
          u_high = real_load(high + frame->u_axis * BVH_WIDTH) - (real)(frame->u) + slack;
     real v_low = real_load(low + frame->v_axis * BVH_WIDTH) - (real)(frame->v) - slack,
          v_high = real_load(high + frame->v_axis * BVH_WIDTH) - (real)(frame->v) + slack;
-    // of a box that reaches back to the origin the near side has any slope
+    // the near side of a box that reaches back to the origin has any slope
     const real steep = (real)(1 / SMALLEST_RATIO);
     real near_inverse = lanes_select(w_min <= slack, steep, reciprocal_estimate(real_max(w_min, slack))),
          far_inverse = reciprocal_estimate(real_max(w_max, slack));
@@ -48,7 +48,7 @@ static inline uint boxes_view(SeenRectangles *seen, const MacroTile *tile, globa
     return tile_sees(tile, seen, w_max);
 }
 
-// The packets, of those given as bits, whose rectangle overlaps that of a box, a lane per packet.
+// Returns those of the packets, as bits, whose rectangle overlaps that of a box. Tests one packet per lane.
 static inline uint packets_overlap(const MacroTile *tile, uint packets, const SeenRectangle *seen)
 {
     return packets &
@@ -57,7 +57,7 @@ static inline uint packets_overlap(const MacroTile *tile, uint packets, const Se
                       ((real)(seen->w) <= tile->reach_max.all));
 }
 
-// The same of all children, a lane per child: for each the packets, as bits.
+// Returns for each child, one per lane, the packets whose rectangles overlap the child's, as bits.
 static inline integer packets_overlap_each(const MacroTile *tile, uint packets, const SeenRectangles *seen)
 {
     integer overlapping = (integer)(0);
@@ -69,8 +69,8 @@ static inline integer packets_overlap_each(const MacroTile *tile, uint packets, 
     return overlapping;
 }
 
-// Those of the packets of which a ray is within the rectangle. The rays of one that is all inside are not
-// tested.
+// Returns those of the packets, as bits, that have a ray within the rectangle. The rays of a packet that is
+// wholly inside are not tested.
 static inline uint packets_within(const MacroTile *tile, uint packets, const SeenRectangle *seen)
 {
     const uint inside =
@@ -113,9 +113,9 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
     }
 }
 
-// Returns whether a child is visited only after all that are nearer to the common origin: nodes, blocks and
-// instances.
-// Shadow rays do not end at the nearest hit, and gain nothing from that order between blocks of spheres.
+// Returns whether a child is visited only after all that are nearer to the common origin, which is so for
+// nodes, blocks and instances. Shadow rays do not end at the nearest hit and gain nothing from that order
+// between blocks of spheres.
 static inline bool child_waits(uint type, bool is_shadow)
 {
     if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES) return true;
@@ -191,7 +191,7 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
     }
 }
 
-// Two functions, so that the blocks of camera rays keep nothing for shadows in registers.
+// Camera and shadow rays are separate, so that blocks keep nothing for shadows in registers for the former.
 static OUT_OF_LINE void tile_traverse_camera(MacroTile *tile, const Scene *scene)
 {
     tile_traverse(tile, scene, false);
@@ -202,8 +202,8 @@ static OUT_OF_LINE void tile_traverse_shadows(MacroTile *tile, const Scene *scen
     tile_traverse(tile, scene, true);
 }
 
-// Traverses the BVH with those of the packets, given as bits, that the common origin's frame suits. All have
-// active rays. Returns the others.
+// Traverses the BVH with those of the packets, given as bits, whose slopes fit the common origin's frame,
+// and returns the others. All must have active rays.
 static inline uint traverse_bvh_by_tile(Traversal *traversals, const Scene *scene, Ray *rays, uint packets)
 {
     MacroTile tile;

@@ -1,5 +1,5 @@
-// Closest hits and shadows. All queries share one traversal, and with it each shape's test, so that they can
-// never disagree.
+// Finds closest hits and shadows. All queries share one traversal, and with it each shape's test, so that
+// they can never disagree.
 #ifndef TRAVERSAL_H
 #define TRAVERSAL_H
 
@@ -9,7 +9,7 @@
 #include "traversal/tile_traversal.h"
 
 // Starts a packet's traversal with what is outside the BVH. `near` has the bits that packets_near returns.
-// Returns whether the BVH is left to traverse.
+// Returns whether the BVH remains to be traversed.
 static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray *ray, Query query, uint near)
 {
     traversal->query = query;
@@ -20,22 +20,22 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     if (HAS_FILTERS) traversal->optical_depth_green = traversal->optical_depth_blue = (integer)(0);
     if (HAS_INSTANCES) traversal->within = outside_instances();
     if (IS_CERTIFIED) {
-        traversal->hit.low = (real)(LARGEST);                           // of no hit: no rival
-        traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // before the first rival
+        traversal->hit.low = (real)(LARGEST);                           // of a miss, which is not a rival
+        traversal->hit.high = real_min(ray->tmax, (real)(LARGEST / 2)); // below the initial rival
         traversal->rival = (real)(scene->header->sample.y);
         traversal->hit.uncertain = mask_none();
     }
     if (!lanes_any(ray->active)) return false;
     intersect_all_planes(traversal, scene, ray);
-    // without cull spheres, or if there are others than the BVH's
+    // without cull spheres, or if the BVH's is not the only one
     if (near != 0 && scene->header->cull_spheres.x != 1) intersect_outside_bvh(traversal, scene, ray, near);
     if (!HAS_BVH || !lanes_any(traversal->active)) return false;
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
     return !cull_spheres || lanes_any(ray_meets_cull_sphere(ray, cull_spheres));
 }
 
-// Traverses the BVH with `packets`, as bits: those for which traversal_begin left it. Their rays all have the
-// same common origin, or none. At one lane there is one packet. At `certified` traversal_classify comes last.
+// Traverses the BVH with `packets`, as bits, for which traversal_begin returned true. Their rays have the
+// same common origin, or none. One lane means one packet. At `certified` traversal_classify must follow.
 static OUT_OF_LINE void packets_traverse_bvh(Traversal *traversals, const Scene *scene, Ray *rays,
                                              uint packets)
 {
@@ -73,7 +73,7 @@ static inline Hit closest_opaque_hit(const Scene *scene, Ray *ray)
     return traversal.hit;
 }
 
-// The part of light that an optical depth leaves.
+// Returns the fraction of light that passes an optical depth.
 static inline real depth_transmittance(integer optical_depth)
 {
     const real ln2_of_step = (real)(-LN_2 / OPTICAL_DEPTH_STEPS);
@@ -83,7 +83,7 @@ static inline real depth_transmittance(integer optical_depth)
     return lanes_select(optical_depth < (integer)(OPTICAL_DEPTH_MAX), passed, (real)(0));
 }
 
-// The fraction of each channel's light that passes, after a traversal for OCCLUSION.
+// Returns the fraction of each channel's light that passes, after a traversal for OCCLUSION.
 static inline Vector traversal_filter(const Traversal *traversal)
 {
     const Vector none = {(real)(0), (real)(0), (real)(0)};
@@ -93,9 +93,9 @@ static inline Vector traversal_filter(const Traversal *traversal)
     return vector_select(traversal->active, passed, none);
 }
 
-// The fraction of light that passes, the largest channel's, after a traversal for OCCLUSION: 1 if nothing
-// occludes it, 0 behind an opaque object. Each transparent object transmits its fraction, without bending the
-// ray.
+// Returns the fraction of light that passes in the largest channel, after a traversal for OCCLUSION. It is 1
+// if nothing occludes the light and 0 behind an opaque object. Each transparent object transmits its
+// fraction, without bending the ray.
 static inline real traversal_transmittance(const Traversal *traversal)
 {
     const real none = (real)(0), all = (real)(1);
@@ -107,7 +107,7 @@ static inline real traversal_transmittance(const Traversal *traversal)
     return lanes_select(traversal->active, depth_transmittance(traversal->optical_depth), none);
 }
 
-// Of each active ray, between tmin and tmax.
+// Returns the fraction of light that passes along each active ray between tmin and tmax.
 static inline real transmittance(const Scene *scene, Ray *ray)
 {
     Traversal traversal;

@@ -1,11 +1,11 @@
-// Blocks of triangles against the packets of a macro-tile, before the full test (shapes/triangle.h).
+// Tests blocks of triangles against the packets of a macro-tile, before the full test (shapes/triangle.h).
 //
-// In the frame of the common origin an edge from a to b and the origin make a plane of normal a x b. A ray of
-// slopes u and v has the edge value (u, v, 1) . (a x b): its distance from the edge times the lengths of the
-// edge and of (u, v, 1). A block's triangles are set up a lane each. Then each packet takes the shorter of
-// two loops: over its rays, a lane per triangle, or over the triangles, a lane per ray. A ray misses a
-// triangle where an edge value is below minus its error, which docs/numerics.md derives; only what is left
-// takes the full test. A shadow ray is occluded without it where all three values exceed the error.
+// In the frame of the common origin an edge from a to b and the origin span a plane of normal a x b. A ray
+// of slopes u and v has the edge value (u, v, 1) . (a x b), its distance from the edge times the lengths of
+// the edge and of (u, v, 1). A block's triangles are set up one per lane. Then each packet runs the shorter
+// of two loops: over its rays, with one triangle per lane, or over the triangles, with one ray per lane. A
+// ray misses a triangle if an edge value is below minus its error (docs/numerics.md). Only the rest take the
+// full test. A shadow ray is occluded without it if all three values exceed the error.
 #ifndef TRIANGLE_BLOCK_H
 #define TRIANGLE_BLOCK_H
 
@@ -14,24 +14,24 @@
 
 #if LANES > 1
 
-// The triangles of a block as seen from the common origin, a lane each, in its frame.
+// The triangles of a block as seen from the common origin, in its frame, one per lane.
 typedef struct {
     SeenRectangles seen;
-    Vector edges[3]; // a x b, b x c and c x a, of the sign with which values inside are positive
-    RealLanes error; // of the edge values
-    // For shadow rays: an upper bound on the triangle's w, LARGEST where it may reach the light; a vertex on
-    // the frame's axes, but not from its origin; the normal, to either side.
+    Vector edges[3]; // a x b, b x c and c x a, signed so that values inside are positive
+    RealLanes error; // the error of the edge values
+    // For shadow rays, an upper bound on the triangle's w, LARGEST if it may reach the light; a vertex on
+    // the frame's axes, but not from its origin; and the normal, to either side.
     RealLanes w_far;
     Vector vertex, normal;
     real normal_squared, longest;
 } BlockView;
 
-// Whether shadow rays that certainly miss a triangle's plane, and those that certainly hit it, need no full
-// test.
+// Set if shadow rays that certainly miss a triangle's plane, and those that certainly hit the triangle, skip
+// the full test.
 #define BLOCKS_TEST_SIDES (!IS_CERTIFIED)
 #define BLOCKS_OCCLUDE    (BLOCKS_TEST_SIDES && !HAS_TRANSMISSION && !HAS_CUTOUTS)
 
-// Each component within 2 u of the product of the lengths.
+// Returns a x b, each component within 2 u of the product of the lengths.
 static inline Vector block_cross(Vector a, Vector b)
 {
     return (Vector){real_fma(a.y, b.z, -(a.z * b.y)), real_fma(a.z, b.x, -(a.x * b.z)),
@@ -62,9 +62,9 @@ static inline real real_max_of_3(real a, real b, real c)
 typedef struct {
     Vector vertex; // a, on the frame's axes but not from its origin
     Vector a, b, c, ab, bc, ca;
-    real low, high, longest; // w of the vertices; the longest edge
-    real to_vertices;        // from the common origin to those of a triangle that is hit
-    real distance;           // the same, or to the rays' starts, where they are farther
+    real low, high, longest; // least and largest w of the vertices; the longest edge
+    real to_vertices;        // distance from the common origin to the vertices of a triangle that is hit
+    real distance;           // that distance, or the one to the rays' starts if it is larger
     mask is_near;            // too close to the common origin for its slopes to be bounded
 } BlockVertices;
 
@@ -76,7 +76,7 @@ static inline BlockVertices block_load(const MacroTile *tile, global const Trian
     BlockVertices at;
     const Vector b = frame_load(frame, rows + 3 * LANES), c = frame_load(frame, rows + 6 * LANES);
     at.vertex = frame_load(frame, rows);
-    // not from the differences below: from a far origin these are rounded by more than the edges are long
+    // not from the differences below, whose rounding at a far origin exceeds the lengths of the edges
     at.ab = vector_subtract(b, at.vertex);
     at.bc = vector_subtract(c, b);
     at.ca = vector_subtract(at.vertex, c);
@@ -98,7 +98,7 @@ static inline BlockVertices block_load(const MacroTile *tile, global const Trian
     return at;
 }
 
-// Sets the rectangles. Returns the triangles, as bits of the first `count`, that the macro-tile may hit.
+// Sets the rectangles. Returns those of the first `count` triangles, as bits, that the macro-tile may hit.
 static inline uint block_see(BlockView *view, const MacroTile *tile, const BlockVertices *at, uint count)
 {
     Vector a = at->a, b = at->b, c = at->c;
@@ -115,7 +115,7 @@ static inline uint block_see(BlockView *view, const MacroTile *tile, const Block
     return tile_sees(tile, &view->seen, at->high + slack) & ((1u << count) - 1);
 }
 
-// The error of a vertex across a ray.
+// Returns the error of a vertex across a ray.
 static inline real block_vertex_error(const MacroTile *tile, const BlockVertices *at)
 {
     real distance = at->distance;
@@ -139,7 +139,7 @@ static inline void block_set_edges(BlockView *view, const MacroTile *tile, const
     real vertex_error = block_vertex_error(tile, at), width = at->longest;
     if (IS_CERTIFIED) width = real_fma((real)(4), vertex_error, width);
     real error = real_fma(vertex_error * (real)(tile->ray_per_w), width, (real)(SMALLEST_RATIO));
-    // edge-on the sign is that of rounding, and values inside are small: docs/numerics.md
+    // edge-on, rounding decides the sign, and values inside are small (docs/numerics.md)
     real volume_error = (real)(12 * UNIT_ROUNDOFF) * at->longest * at->to_vertices * at->to_vertices;
     mask in_range = (volume_error > (real)(SMALLEST_RATIO)) & (fabs(volume) < (real)(LARGEST));
     mask has_sign = in_range & (fabs(volume) > volume_error);
@@ -160,8 +160,8 @@ static inline real edge_value(Vector edge, real u, real v)
     return real_fma(u, edge.x, real_fma(v, edge.y, edge.z));
 }
 
-// Returns the lanes whose shadow rays certainly start on the light's side of a triangle's plane, which they
-// miss. `to_plane`: from the start to a vertex.
+// Returns the lanes whose shadow rays certainly start on the light's side of a triangle's plane and so miss
+// it. `to_plane` leads from the start to a vertex.
 static inline mask starts_before(Vector normal, real normal_squared, real longest, real u, real v,
                                  Vector to_plane)
 {
@@ -278,7 +278,7 @@ static inline ALWAYS_INLINE void tile_visit_triangles(MacroTile *tile, const Sce
     if (triangles == 0) return;
     block_set_edges(&view, tile, &vertices, is_shadow);
     const uint first = block_first(scene, leaf->index);
-    uint prefetched = is_shadow ? 0 : triangles; // many of a shadow ray's are missed
+    uint prefetched = is_shadow ? 0 : triangles; // shadow rays miss many of them
     triangles_prefetch(scene, first, prefetched);
     ushort remaining[LANES];
     uint tested = 0;
