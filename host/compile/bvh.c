@@ -54,7 +54,7 @@ static void range_sort_by_type(const Builder *builder, const PrimitiveRange *ran
     }
 }
 
-// The first primitive of another type than the first; `end` where there is but one type.
+// Returns the first primitive of another type than the first, or `end` if all are of one type.
 static size_t range_type_boundary(const Builder *builder, const PrimitiveRange *range)
 {
     const PrimitiveReference *references = builder->references;
@@ -65,7 +65,7 @@ static size_t range_type_boundary(const Builder *builder, const PrimitiveRange *
     return boundary;
 }
 
-// Sets both sides. False where the range is to be a leaf.
+// Sets both sides of a range. Returns false if the range is to be a leaf.
 static bool range_divide(const Builder *builder, const PrimitiveRange *range, unsigned depth,
                          PrimitiveRange sides[2])
 {
@@ -105,7 +105,7 @@ static void *range_task_run(void *context)
     return NULL;
 }
 
-// Builds both sides of a node, in two threads where one is idle and the range is worth it.
+// Builds both sides of a node, in two threads if one is idle and the range is large enough.
 static void sides_build(Builder *builder, const PrimitiveRange sides[2], unsigned depth, BvhBinaryNode *node)
 {
     const bool large = sides[1].end - sides[0].begin >= THREAD_RANGE_MIN;
@@ -139,7 +139,7 @@ static BvhChild leaf_make(const Builder *builder, const PrimitiveRange *range)
     return leaf;
 }
 
-// Prefetches the boxes of a range whose leaves come soon: they may be anywhere.
+// Prefetches the boxes, which may be anywhere in memory, of a range that becomes leaves soon.
 static void boxes_prefetch(const Builder *builder, const PrimitiveRange *range)
 {
     const unsigned size_max = builder->leaves.size_max, block_size = builder->leaves.block_size;
@@ -148,7 +148,7 @@ static void boxes_prefetch(const Builder *builder, const PrimitiveRange *range)
         __builtin_prefetch(&builder->boxes[reference_index(&builder->references[i])]);
 }
 
-// Boxes from the primitives up, in double.
+// Builds the tree of a range. Boxes are joined from the primitives up, in double.
 static BvhChild range_build(Builder *builder, const PrimitiveRange *range, unsigned depth)
 {
     boxes_prefetch(builder, range);
@@ -182,7 +182,7 @@ static void references_make(void *context, size_t begin, size_t end)
     pthread_mutex_unlock(&builder->lock);
 }
 
-// The root is node 0; a single leaf is its only child.
+// Builds the tree with its root as node 0. A single leaf becomes the root's only child.
 static void root_build(Builder *builder)
 {
     const PrimitiveRange all = {0, builder->count, builder->bounds};

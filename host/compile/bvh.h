@@ -1,7 +1,6 @@
-// The bounding volume hierarchy over a scene's bounded primitives: a binary tree by the surface area
-// heuristic (bvh_split.h), both sides of a large split built by two threads, every leaf of one type of shape,
-// those of instances of one each.
-// The tree is the same whatever the number of threads; only the order of its nodes is not.
+// Builds the bounding volume hierarchy of a scene's bounded primitives, a binary tree by the surface area
+// heuristic (bvh_split.h). Two threads build the sides of a large split. A leaf has primitives of one type,
+// and only one if it is an instance. The number of threads changes the order of the nodes, but not the tree.
 #pragma once
 
 #include "host/base/stage.h"
@@ -39,7 +38,7 @@ static inline unsigned leaf_size_max(BvhLeaves leaves, unsigned type)
     return type_is_in_blocks(leaves, type) ? leaves.block_size : leaves.size_max;
 }
 
-// An empty child adds nothing.
+// Returns the box around both children. An empty child adds nothing.
 static inline Bounds bvh_node_bounds(const BvhBinaryNode *node)
 {
     return bounds_join(node->children[0].box, node->children[1].box);
@@ -49,7 +48,7 @@ typedef struct {
     BvhBinaryNode *nodes; // the root first; a tree of one leaf has a second child with an empty box
     size_t node_count;
     uint32_t *order; // the primitives, leaf by leaf
-    uint8_t *types;  // theirs, in this order
+    uint8_t *types;  // types of the primitives, in this order
     size_t primitive_count;
     unsigned depth; // inner nodes on the longest path
     BvhLeaves leaves;
@@ -57,9 +56,9 @@ typedef struct {
 
 enum { BVH_DEPTH_MAX = 80 };
 
-// `types[i]`: the type of primitive i; primitives of one leaf are of one type. Boxes are finite, at most 2^28
-// of them. Whatever they are, the tree is at most BVH_DEPTH_MAX deep.
-// The stage, which may be NULL, is set to the primitives whose leaves are built.
+// Builds the tree of at most 2^28 finite boxes, at most BVH_DEPTH_MAX deep whatever the boxes are.
+// `types[i]` is the type of primitive i; primitives of one leaf are of one type. `stage`, unless NULL,
+// counts the primitives of finished leaves.
 void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count, BvhLeaves leaves,
                Stage *stage);
 void bvh_free(Bvh *bvh);

@@ -9,15 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-// From this many bounded primitives on a BVH is faster than testing each.
+// From this many bounded primitives on, a BVH is faster than a test of each.
 enum { BVH_WORTHWHILE = 24 };
 
-// A primitive this many times as large as all others together, by their boxes' longest edges, stays outside
-// the BVH, such as a planet below a town: most rays meet it anyway, and the slack of boxes, which grows with
-// their common bounds, would be as large as the town. Two of one size both stay in.
+// A primitive this many times as large as all others together, by the longest edges of their boxes, stays
+// outside the BVH, such as a planet below a town. Most rays hit it anyway, and the slack of boxes, which
+// grows with their common bounds, would be as large as the town. Two of the same size both stay in.
 enum { HUGE_RATIO = 16 };
 
-// The bounded primitives that the BVH is built of.
+// The bounded primitives that the BVH is built from.
 typedef struct {
     Bounds *boxes;
     uint8_t *types;
@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     const FlatArray *array;
     size_t type;
-    Bounds *boxes; // of the array's primitives; empty where unbounded
+    Bounds *boxes; // of the array's primitives; empty if unbounded
 } Boxing;
 
 static void range_box(void *context, size_t begin, size_t end)
@@ -90,7 +90,7 @@ static void huge_remove(Bounded *bounded)
         for (size_t i = 0; i < bounded->count; i++) {
             if (i == largest) continue;
             others = bounds_join(others, bounded->boxes[i]);
-            if (!(size > HUGE_RATIO * box_size(&others))) return; // also where all are one point
+            if (!(size > HUGE_RATIO * box_size(&others))) return; // also if all are one point
         }
         bounded_remove(bounded, largest);
     }
@@ -103,7 +103,7 @@ static void bounded_free(Bounded *bounded)
     free(bounded->places);
 }
 
-// Where each primitive of the tree's order stands in its shape's new array.
+// Returns each primitive's index in its shape's new array, in the tree's order.
 static uint32_t *order_in_types(const Bvh *bvh)
 {
     uint32_t *order = memory_allocate(bvh->primitive_count + 1, sizeof *order);
@@ -113,8 +113,8 @@ static uint32_t *order_in_types(const Bvh *bvh)
     return order;
 }
 
-// Brings what stands at from[i] to i, cycle by cycle in place, which spares a second array; `from` is used
-// up.
+// Moves the struct at from[i] to i for every i, cycle by cycle in place, which saves a second array.
+// Destroys `from`.
 static void array_permute(FlatArray *array, uint32_t *from)
 {
     enum { CACHE_LINE = 64 };
@@ -177,8 +177,8 @@ static void array_reorder(CompiledScene *compiled, size_t type, const Bvh *bvh, 
     parallel_run(array->count, FLAT_RANGE_MIN, range_enter, &entering);
 }
 
-// Inside out, and beyond all boxes. A ray that is so far away that it meets this all the same finds no
-// primitives there: the rest of an empty place is 0.
+// Returns an inverted box outside the scene for unused child slots. A distant ray may still enter it through
+// rounding; the slot then has no primitives.
 static Bounds empty_place(const Bounds *bounds)
 {
     Vector3 extent = vector_subtract(bounds->max, bounds->min);
@@ -233,7 +233,7 @@ static void nodes_write(CompiledScene *compiled, const Bvh *bvh, unsigned width)
     bvh_widen(&wide, bvh, width);
     flat_wide_array_renew(compiled, FLAT_NODES, wide.node_count, width, false);
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
-    // a visit replaces a node by at most `width` children: a ray from far away also enters the empty slots
+    // a visit replaces a node by at most `width` children, because a distant ray may enter the empty slots
     compiled->pending_children_max = (width - 1) * wide.depth + 1;
     uint32_t *order = order_in_types(bvh);
     const Bounds bounds = bvh_node_bounds(&bvh->nodes[0]), empty = empty_place(&bounds);
@@ -275,7 +275,7 @@ static uint32_t *block_place(const CompiledScene *compiled, unsigned type, size_
     return (uint32_t *)compiled->arrays[FLAT_BLOCK_PLACES].items + block;
 }
 
-// Makes a block of each leaf of triangles or spheres, still without these.
+// Makes a block for each leaf of triangles or spheres, but does not fill it.
 static void blocks_place(CompiledScene *compiled, unsigned width, bool is_double)
 {
     const FlatArray *nodes = &compiled->arrays[FLAT_NODES];
@@ -309,7 +309,7 @@ static void triangle_block_fill(const CompiledScene *compiled, size_t block, uns
 {
     const FlatArray *blocks = &compiled->arrays[FLAT_TRIANGLE_BLOCKS],
                     *triangles = &compiled->arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES];
-    // floats are narrowed here: a million triangles' blocks take 130 MB as doubles
+    // floats are narrowed here because the blocks of a million triangles take 130 MB as doubles
     const bool is_double = blocks->layout.scalar4_count > 0;
     const size_t width = 4 * (blocks->layout.scalar4_count + blocks->layout.uint4_count) / BLOCK_ROWS;
     const size_t first = *block_place(compiled, TYPE_TRIANGLES, block);
@@ -368,7 +368,7 @@ static void blocks_fill(CompiledScene *compiled)
     parallel_run(compiled->arrays[FLAT_NODES].count, FLAT_RANGE_MIN / 16, nodes_fill_blocks, compiled);
 }
 
-// Leaves as large as measurement found best. A block costs the same whatever its size. Splits that count
+// Returns the leaf sizes that measured best. A block costs the same whatever its size. Splits that count
 // blocks save 6 % of a frame of a million triangles, but cost 6 % where half of the primitives are cylinders
 // among spheres, 1 % where a tenth are, and nothing where a thirtieth are.
 static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
@@ -380,7 +380,7 @@ static BvhLeaves leaves_for(const Bounded *bounded, unsigned lanes)
     return (BvhLeaves){LEAF_SIZE_MAX, lanes, 16 * others < bounded->count};
 }
 
-// Builds the BVH of what is bounded, and orders it.
+// Builds the BVH of the bounded primitives and puts them in its order.
 static void tree_flatten(CompiledScene *compiled, const CompileSettings *settings, Bounded *bounded)
 {
     Bvh bvh;
@@ -404,7 +404,7 @@ static void tree_flatten(CompiledScene *compiled, const CompileSettings *setting
 
 static void tree_arrays_renew(CompiledScene *compiled)
 {
-    flat_array_renew(compiled, FLAT_NODES, 1); // leads nowhere: a kernel may visit it
+    flat_array_renew(compiled, FLAT_NODES, 1); // empty, since a kernel may visit it
     flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, 0, BVH_WIDTH_MIN, false);
     flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, 0, BVH_WIDTH_MIN, false);
     flat_array_renew(compiled, FLAT_BLOCK_PLACES, 0);
@@ -443,7 +443,7 @@ void bvh_shift(CompiledScene *compiled, uint32_t node_base, uint32_t leaf_base)
     }
 }
 
-// The boxes of the leaves around their primitives.
+// Fits the boxes of leaves to their primitives.
 static void leaves_fit(void *context, size_t begin, size_t end)
 {
     const CompiledScene *compiled = context;

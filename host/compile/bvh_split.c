@@ -28,7 +28,7 @@ static inline Float4 float4_select(Int4 take_a, Float4 a, Float4 b)
     return (Float4)((take_a & (Int4)a) | (~take_a & (Int4)b));
 }
 
-// gcc makes no minps of a comparison and a choice.
+// gcc does not make minps of a comparison and a selection.
 #ifdef __SSE__
 static inline Float4 float4_min(Float4 a, Float4 b)
 {
@@ -112,7 +112,7 @@ typedef struct {
     BvhLeaves leaves;
 } BinMap;
 
-// What testing `count` primitives costs, relative to one primitive or to one block.
+// Returns the cost of testing `count` primitives, relative to one primitive or to one block.
 static inline float test_cost(BvhLeaves leaves, uint32_t count)
 {
     return (float)(leaves.counts_blocks ? (count + leaves.block_size - 1) / leaves.block_size : count);
@@ -177,7 +177,7 @@ typedef struct {
     pthread_mutex_t lock;
 } Binning;
 
-// Joining boxes in another order leaves them the same.
+// Fills the bins from a range of primitives. The order in which boxes are joined does not change them.
 static void range_bin(void *context, size_t begin, size_t end)
 {
     Binning *binning = context;
@@ -219,7 +219,7 @@ static void axis_sweep(const Bins *bins, int axis, const BinMap *map, Split *bes
     }
 }
 
-// The cheapest split between bins of centers, over all axes.
+// Returns the cheapest split between bins of centers over all axes.
 static Split split_find(const PrimitiveReference *references, size_t count, const BinMap *map,
                         bool is_parallel)
 {
@@ -237,7 +237,7 @@ static Split split_find(const PrimitiveReference *references, size_t count, cons
     return best;
 }
 
-// The same of few primitives.
+// Returns the cheapest split of at most FEW_MAX primitives over all axes, without filling bins.
 static Split split_find_of_few(const PrimitiveReference *references, int count, const BinMap *map)
 {
     Int4 bins[FEW_MAX];
@@ -312,7 +312,7 @@ size_t range_split(PrimitiveReference *references, size_t count, const RangeBoun
 {
     const bool fits = range_fits_leaf(references, count, leaves);
     if (fits && all_in_blocks(references, count, leaves)) return count;
-    leaves.counts_blocks &= !fits; // what fits and is not in blocks is tested one by one
+    leaves.counts_blocks &= !fits; // ranges that fit but are not in blocks are tested one by one
     const BinMap map = bins_make(bounds->centers, count, leaves);
     const Split split = count <= FEW_MAX ? split_find_of_few(references, (int)count, &map)
                                          : split_find(references, count, &map, is_parallel);

@@ -1,5 +1,5 @@
-// Where a range of primitives is best split in two, by the surface area heuristic on bins of their centers
-// (Wald, On fast construction of SAH-based bounding volume hierarchies, RT 2007).
+// Splits a range of primitives in two by the surface area heuristic on bins of their centers (Wald, On fast
+// construction of SAH-based bounding volume hierarchies, RT 2007).
 #pragma once
 
 #include "host/compile/bvh.h"
@@ -11,8 +11,8 @@
 typedef float Float4 __attribute__((vector_size(16)));
 typedef int32_t Int4 __attribute__((vector_size(16)));
 
-// Boxes while the tree is built: single precision is enough to choose splits. Scaled so that the largest
-// coordinate is about 1, which keeps areas of any scene within range.
+// A box while the tree is built. Single precision suffices to choose splits. Coordinates are scaled so that
+// the largest is about 1, which keeps areas of any scene in range.
 typedef struct {
     Float4 low, high; // the fourth lanes unused
 } BuildBox;
@@ -23,12 +23,12 @@ typedef struct {
     BuildBox box;
 } PrimitiveReference;
 
-// Around the primitives' boxes, and around their centers.
+// The bounds of the primitives' boxes, and of their centers.
 typedef struct {
     BuildBox boxes, centers;
 } RangeBounds;
 
-// `scale`: of the box's coordinates; index: below 2^28.
+// Makes a reference with an index below 2^28. Multiplies the box's coordinates by `scale`.
 PrimitiveReference reference_make(Bounds box, double scale, uint32_t index, uint8_t type);
 
 static inline uint32_t reference_index(const PrimitiveReference *reference)
@@ -48,8 +48,8 @@ RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count);
 // Returns whether the range is within the leaf size of every type in it.
 bool range_fits_leaf(const PrimitiveReference *references, size_t count, BvhLeaves leaves);
 
-// Partitions the range where that pays or it is too large for a leaf, and sets the bounds of both sides.
-// `is_parallel`: by several threads, which are idle. Returns how many are on the left side; `count` where the
-// range stays whole.
+// Partitions the range if that pays or the range is too large for a leaf, and sets the bounds of both sides.
+// With `is_parallel`, uses several idle threads. Returns the number of primitives on the left side, or
+// `count` if the range stays whole.
 size_t range_split(PrimitiveReference *references, size_t count, const RangeBounds *bounds, BvhLeaves leaves,
                    bool is_parallel, RangeBounds sides[2]);

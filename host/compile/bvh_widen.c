@@ -8,21 +8,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-// SAH costs: testing a node's boxes, visiting a child, testing a primitive, or a block. Tuned by measurement:
-// a primitive's test is cheap because its arithmetic overlaps memory latency.
+// SAH costs of testing a node's boxes, visiting a child, testing a primitive, and testing a block. Tuned by
+// measurement. A primitive's test is cheap because its arithmetic overlaps memory latency.
 static const double node_cost = 1, visit_cost = 1, intersection_cost = 0.4, block_cost = 2;
 
-// What takes one slot where it might take several costs something even where its area is nothing: this
-// decides ties, and vanishes against other costs, which are of the order of 1.
+// The extra cost of a subtree that takes one slot. It decides ties where areas are 0 and vanishes against
+// other costs, which are of the order of 1.
 static const float tie_cost = 0x1p-40f;
 
-// Entry i: a subtree's least cost where it takes at most i slots of the wide node above it, minus
-// leaves_cost; entry 0 is unused. In one slot it is a separate wide node, or a leaf. The leaves cost the
-// same in all slots: left out, they leave the float's digits, and ties, to what differs.
+// Entry i is a subtree's least cost in at most i slots of the wide node above it, minus leaves_cost; entry 0
+// is unused. In one slot it is a separate wide node or a leaf. The leaves cost the same in all slots.
+// Leaving them out keeps the float's digits, and ties, for what differs.
 typedef float Costs[BVH_WIDTH_MAX + 1];
 
 typedef struct {
-    Costs costs; // of up to slots_max slots: its leaves need no more
+    Costs costs; // for up to slots_max slots; its leaves need no more
     unsigned slots_max;
     float leaves_cost;     // of the binary tree's leaves
     uint32_t first, count; // its primitives; count 0: more, or of more types, than a leaf may hold
@@ -53,7 +53,7 @@ static float leaf_cost(const Widening *widening, double half_area, uint32_t firs
     return (float)(half_area * widening->scale * (visit_cost + test_cost));
 }
 
-// `leaf`: where that of a leaf has room.
+// Returns a child's subtree, which for a leaf is stored in *leaf.
 static const Subtree *child_subtree(const Widening *widening, const BvhChild *child, Subtree *leaf)
 {
     if (child_is_node(child)) return &widening->subtrees[child->first];
@@ -63,7 +63,7 @@ static const Subtree *child_subtree(const Widening *widening, const BvhChild *ch
     return leaf;
 }
 
-// How many of the slots, which both together may use, the first of two children best takes.
+// Returns how many of the slots that two children may use together are best used by the first.
 static unsigned slots_share(const Subtree *first, const Subtree *second, unsigned slots)
 {
     const unsigned end = first->slots_max < slots - 1 ? first->slots_max : slots - 1;
@@ -74,7 +74,7 @@ static unsigned slots_share(const Subtree *first, const Subtree *second, unsigne
     return best;
 }
 
-// Both sides' primitives, where they make one leaf.
+// Sets the subtree's primitives. The count is 0 unless both sides fit into one leaf.
 static void subtree_count(const Widening *widening, const Subtree *first, const Subtree *second,
                           Subtree *subtree)
 {
@@ -86,7 +86,7 @@ static void subtree_count(const Widening *widening, const Subtree *first, const 
     subtree->count = joins ? first->count + second->count : 0;
 }
 
-// From the leaves up: children come after their parent.
+// Computes the costs from the leaves up. Children come after their parent.
 static void costs_find(Widening *widening)
 {
     const Bvh *bvh = widening->bvh;
@@ -168,7 +168,7 @@ void bvh_widen(BvhWide *wide, const Bvh *bvh, unsigned width)
     *wide = (BvhWide){
         .nodes = memory_allocate(bvh->node_count, sizeof *wide->nodes),
         .node_count = 1,
-        .leaves = memory_allocate((bvh->node_count + 1) / 2, sizeof *wide->leaves), // none within another
+        .leaves = memory_allocate((bvh->node_count + 1) / 2, sizeof *wide->leaves), // leaves are not nested
     };
     roots[0] = 0;
     for (size_t i = 0, level_end = 0; i < wide->node_count; i++) {

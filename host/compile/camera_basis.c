@@ -23,9 +23,9 @@ CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
 }
 
 // The roundings of the three vectors, which are perpendicular, add up to sqrt 3, those of two sums to 2, of
-// an offset in the pixel to 1 and of the unit length to 1. Where the frame is shifted, the middle and the
-// offset from there, each at most |middle| + |d| long, may cancel down to the ray's d, which is at least 1
-// long: docs/numerics.md.
+// an offset in the pixel to 1 and of the unit length to 1. If the frame is shifted, the middle and the
+// offset from it, each at most |middle| + |d| long, may cancel down to the ray's d, which is at least 1 long
+// (docs/numerics.md).
 double camera_direction_error(const CameraBasis *basis)
 {
     return vector_is_zero(basis->shift) ? 7 : 6 * (1 + vector_length(basis->middle));

@@ -1,4 +1,4 @@
-// The camera's frame, worked out in double so that every device starts from the same bits.
+// Computes the camera's frame in double, so that every device starts from the same bits.
 #pragma once
 
 #include "host/scene/scene.h"
@@ -12,8 +12,8 @@ typedef struct {
     Vector3 middle, shift;
 } CameraBasis;
 
-// Where `up` is zero or parallel to the view, the world axis least aligned with the view stands in for it
-// (the first of x, y, z where several are).
+// Returns the frame. The world axis least aligned with the view (the first of x, y, z in a tie) replaces an
+// `up` that is zero or parallel to the view.
 CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height);
 
 // Returns a bound on the error of a kernel's rays in perspective, in units of roundoff of their length.

@@ -3,13 +3,13 @@
 #include "host/compile/stages.h"
 #include <stdatomic.h>
 
-// A primitive's reach is its largest coordinate seen from the eye: its distance, or its size if that is more.
-// The error of any point near it is at least u times that, whichever ray comes there, and the bounds are
-// products of two such lengths. Those are normal numbers, and roundings below them do not count, if the reach
-// lies within this range: in float the least one is (2^-24 2^-36)^2 = 2^-120.
+// A primitive's reach is its largest coordinate seen from the eye: its distance, or its size if that is
+// larger. The error of any point near it is at least u times the reach for every ray, and the bounds are
+// products of two such lengths. If the reach lies within this range, those are normal numbers, and smaller
+// roundings do not count. In float the least is (2^-24 2^-36)^2 = 2^-120.
 //
-// A torus' turning points are the zeros of a cubic of its size, which must be in range to the last bit. A
-// smaller one may be open everywhere: where the error of a point exceeds its size.
+// The turning points of a torus are the zeros of a cubic of its size, which must be in range to the last
+// bit. A smaller torus may be uncertain everywhere, if the error of a point exceeds its size.
 typedef struct {
     double reach_min, reach_max, plane_min, plane_max, torus_min, torus_max, roundoff;
 } CertifiedRange;
@@ -32,8 +32,8 @@ static double primitive_reach(size_t type, const void *primitive)
     return shape_ops[type]->largest_coordinate(primitive);
 }
 
-// In the unit shape's space, where distances are up to twice the inverse's norm times as large, and not
-// smaller.
+// Returns whether an oval is in range in the unit shape's space, where distances are up to twice the
+// inverse's norm times as large, and not smaller.
 static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, double reach)
 {
     const double unit = oval->sizes.x;
@@ -45,7 +45,7 @@ static bool oval_is_in_range(const CertifiedRange *range, const Oval *oval, doub
 static bool is_in_range(const CertifiedRange *range, size_t type, const void *primitive)
 {
     const double reach = primitive_reach(type, primitive);
-    // no square is taken of a plane's distance
+    // a plane's distance is not squared
     if (type == TYPE_PLANES) return reach == 0 || (reach >= range->plane_min && reach <= range->plane_max);
     if (!(reach >= range->reach_min && reach <= range->reach_max)) return false;
     if (type == TYPE_OVALS) return oval_is_in_range(range, primitive, reach);

@@ -4,7 +4,7 @@
 #include <float.h>
 #include <math.h>
 
-// What the rounding of shading may add to a color that is bounded in exact arithmetic.
+// The most that rounding in shading may add to a color that is bounded in exact arithmetic.
 static const double shading_slack = 1.01;
 
 static Color background_max(const CompiledScene *compiled, const Scene *scene)

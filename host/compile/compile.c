@@ -23,7 +23,7 @@ static Rounding rounding_from(Vector3 eye, const CompileSettings *settings)
                       .certifies = settings->certifies};
 }
 
-// The stages of a scene in the device's unit.
+// Runs the stages on a scene in the device's unit.
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
 {
@@ -77,7 +77,7 @@ bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSet
     return done;
 }
 
-// What depends on the eye. After a failure the arrays are seen from no eye.
+// Updates what depends on the eye. After a failure the arrays belong to no eye.
 static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                      MessageList *messages)
 {
@@ -99,14 +99,14 @@ static bool eye_move(CompiledScene *compiled, const Scene *scene, const CompileS
     return true;
 }
 
-// Sets the eye's offset from that of the arrays: of a preview any, else 0. False if they must move.
+// Sets the eye's offset from the arrays' eye, 0 unless a preview. Returns false if the arrays must move.
 static bool eye_shift(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const Rounding rounding = rounding_from(compiled->eye, settings);
     const Vector3 offset = point_from_eye(&rounding, eye_of(scene, settings));
     const bool is_same = vector_is_zero(offset) && vectors_equal(compiled->eye, eye_of(scene, settings));
     const bool fits = isfinite(offset.x) && isfinite(offset.y) && isfinite(offset.z);
-    // at `certified` the offset's own rounding has no bound
+    // at `certified` the offset's rounding has no bound
     if (!is_same && !(settings->is_preview && fits && !settings->certifies)) return false;
     if (vectors_equal(offset, compiled->eye_offset)) return true;
     compiled->eye_offset = offset;

@@ -5,18 +5,18 @@
 #include "host/compile/compiled_scene.h"
 #include "host/compile/settings.h"
 
-// Every number of the scene is rounded to the kernel's precision once, after the eye's position was
-// subtracted in double; what is derived from numbers (axes, slopes, squares of a checker) is derived from the
-// rounded ones. Returns false with a message, and nothing to free, where the scene is too large, a number or
-// a light's distance does not fit the precision, or a texture cannot be read.
+// Compiles a scene. Rounds each of its numbers to the kernel's precision once, after subtracting the eye's
+// position in double, and derives axes, slopes and squares of a checker from the rounded numbers. Returns
+// false with a message, and nothing to free, if the scene is too large, if a number or a light's distance
+// does not fit the precision, or if a texture cannot be read.
 bool scene_compile(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                    MessageList *messages);
-// Takes another camera, size, samples or bounces; all else in `scene` and `settings` is what the scene was
-// compiled with. The BVH keeps its tree, so that this takes a fraction of the time. Returns false with
-// messages if it fails; `compiled` then belongs to no scene until a move succeeds.
+// Recompiles for another camera, size, samples or bounces. All else in `scene` and `settings` must be what
+// the scene was compiled with. Keeps the BVH's tree, so this takes a fraction of the time. Returns false
+// with messages on failure; `compiled` then belongs to no scene until a move succeeds.
 bool scene_move(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                 MessageList *messages);
 
 // Returns the largest channel that a pixel of the compiled scene can have with that many bounces, by its
-// lights, materials, textures and background; infinite where it overflows.
+// lights, materials, textures and background, or infinity if it overflows.
 double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32_t bounces);

@@ -8,7 +8,7 @@
 #include <string.h>
 
 // clang-format off
-// Of a struct whose uint4 members are those from `first` to `last`, and of one that has none.
+// Describe a struct whose uint4 members are those from `first` to `last`, and one that has none.
 #define LAYOUT(Type, first, last)                           \
     {sizeof(Type), offsetof(Type, first) / sizeof(scalar4), \
      (offsetof(Type, last) + sizeof((Type *)0)->last - offsetof(Type, first)) / sizeof(uint4)}
@@ -21,7 +21,7 @@ static const FlatLayout layouts[FLAT_COUNT] = {
     [FLAT_TRIANGLE_NORMALS] = LAYOUT_OF_REALS(TriangleNormals),
     [FLAT_TRIANGLE_UVS] = LAYOUT_OF_REALS(TriangleUvs),
     [FLAT_TRIANGLE_NEIGHBORS] = LAYOUT(TriangleNeighbors, ids_sides, ids_sides),
-    // the widest; flat_wide_array_renew makes them as wide as the kernel's
+    // of the largest width; flat_wide_array_renew narrows them to the kernel's
     [FLAT_TRIANGLE_BLOCKS] = {BVH_WIDTH_MAX / 4 * BLOCK_ROWS * sizeof(scalar4), BVH_WIDTH_MAX / 4 * BLOCK_ROWS, 0},
     [FLAT_SPHERE_BLOCKS] = {BVH_WIDTH_MAX / 4 * (SPHERE_ROWS * sizeof(scalar4) + 2 * sizeof(uint4)),
                             BVH_WIDTH_MAX / 4 * SPHERE_ROWS, BVH_WIDTH_MAX / 4 * 2},
@@ -100,7 +100,7 @@ uint64_t flat_array_hash(uint64_t hash, const FlatArray *array)
     return hash;
 }
 
-// A shape's struct has its id in its first uint4, right behind its scalar4 members.
+// Returns the id of a shape's struct, in its first uint4, right after its scalar4 members.
 uint32_t *flat_id(const FlatArray *array, void *primitive)
 {
     return (uint32_t *)(void *)((char *)primitive + array->layout.scalar4_count * sizeof(scalar4));

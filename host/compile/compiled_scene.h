@@ -1,4 +1,4 @@
-// What the kernels render: the scene's flat arrays, in double and relative to the eye.
+// The scene's flat arrays, in double and relative to the eye, which the kernels render.
 #pragma once
 
 #include "host/compile/features.h"
@@ -7,7 +7,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-// How a flat struct is laid out: its scalar4 members first, its uint4 members after them.
+// The layout of a flat struct: its scalar4 members first, then its uint4 members.
 typedef struct {
     size_t size, scalar4_count, uint4_count;
 } FlatLayout;
@@ -43,14 +43,14 @@ typedef struct {
     uint64_t primitives_hash; // of the shapes and objects before the BVH orders them, if settings ask for it
     double bvh_seconds;       // building or refitting the BVH
     double flatten_seconds;   // everything else in scene_compile or scene_move
-    // What the stages leave for later ones and for the header.
-    CompiledTexture *textures;       // of each of the scene's textures
+    // The results of stages that later ones and the header need.
+    CompiledTexture *textures;       // one for each of the scene's textures
     struct InstancePlan *instances;  // NULL: no mesh is shared
     uint32_t bvh_counts[TYPE_COUNT]; // primitives in the BVH, the first of their arrays
-    Bounds bvh_bounds;               // of these; 0 where there are none
-    uint32_t cull_sphere_count;      // of each common origin
+    Bounds bvh_bounds;               // of these; 0 if there are none
+    uint32_t cull_sphere_count;      // per common origin
     Vector3 eye;                     // from which the arrays are seen; NAN: a move failed
-    Vector3 eye_offset;              // of the camera's eye from there; 0 unless a preview
+    Vector3 eye_offset;              // from there to the camera's eye; 0 unless a preview
     Bounds contact;                  // where transparent and opaque primitives may touch
 } CompiledScene;
 
@@ -73,16 +73,16 @@ void flat_wide_array_renew(CompiledScene *compiled, size_t type, size_t count, u
                            bool is_narrow);
 void flat_array_renew_as(CompiledScene *compiled, size_t type, size_t count, FlatLayout layout);
 void *flat_array_at(const FlatArray *array, size_t index);
-// Whether the order of an array, or all of it, follows from the BVH, and so from the kernel's lanes.
+// Returns whether an array's order, or its entire content, depends on the BVH, and so on the kernel's lanes.
 bool is_ordered_by_bvh(size_t type);
 // Extends the hash by the members of an array's structs.
 uint64_t flat_array_hash(uint64_t hash, const FlatArray *array);
-// The object's id in a shape's struct of this array.
+// Returns a pointer to the object's id in a shape's struct of this array.
 uint32_t *flat_id(const FlatArray *array, void *primitive);
 
-// Flat structs for which a thread is worthwhile.
+// The fewest flat structs that are worth a thread.
 enum { FLAT_RANGE_MIN = 16384 };
 
-// Bytes of an array in the kernel's width, and the array itself written there: `target` has room for them.
+// Return an array's bytes in the kernel's width, and write them to `target`, which holds as many.
 size_t flat_array_size(const FlatArray *array, bool is_double);
 void flat_array_write(const FlatArray *array, bool is_double, void *target);

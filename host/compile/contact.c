@@ -12,12 +12,12 @@
 // 140 u and 180 u times its condition at most, those of an oval 420 u and 120 u times its condition.
 #define NEARNESS 0x1p-14
 
-// More pairs than this, 5 to 30 ms of them, are not compared: a box around all bounded opaque primitives
-// takes their place.
+// More pairs than this, 5 to 30 ms of them, are not compared. A box around all bounded opaque primitives
+// replaces them.
 #define PAIRS_MAX ((size_t)1 << 19)
 
-// Where a primitive is: in its box, infinite where it is unbounded; what is flat also in its plane, normal .
-// p = offset.
+// The place of a primitive: its box, infinite if it is unbounded, and for a flat one its plane, normal . p =
+// offset.
 typedef struct {
     Bounds box;
     Vector3 normal; // 0: not flat
@@ -67,8 +67,8 @@ static Interval interval_scale(double low, double high, double factor)
     return factor > 0 ? (Interval){low * factor, high * factor} : (Interval){high * factor, low * factor};
 }
 
-// The part of a box within `margin` of a plane: along each axis with n_x != 0, n_x x = offset - n_y y - n_z z
-// for all y and z of the box.
+// Returns the part of a box within `margin` of a plane. Along each axis with n_x != 0, it solves n_x x =
+// offset - n_y y - n_z z for all y and z of the box.
 static Bounds bounds_near_plane(Bounds box, const ContactRegion *flat, double margin)
 {
     const double normal[3] = {flat->normal.x, flat->normal.y, flat->normal.z};
@@ -87,8 +87,8 @@ static Bounds bounds_near_plane(Bounds box, const ContactRegion *flat, double ma
     return (Bounds){{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
 }
 
-// A box around where two may touch. The error of an unbounded primitive grows with the distance: two such may
-// touch anywhere.
+// Returns a box around the places where two may touch. Two unbounded ones may touch anywhere, since their
+// error grows with the distance.
 static Bounds regions_meet(const ContactRegion *a, const ContactRegion *b, double margin)
 {
     if (!region_is_bounded(a) && !region_is_bounded(b)) return everywhere();
@@ -109,7 +109,7 @@ static bool instance_has(const CompiledScene *compiled, const Instance *instance
     return transparent ? shared->is_transparent_somewhere : shared->is_opaque_somewhere;
 }
 
-// The transparent primitives, or the opaque ones. Returns their largest coordinate.
+// Collects the transparent or the opaque primitives. Returns their largest coordinate.
 static double regions_collect(ContactRegionList *list, const CompiledScene *compiled, bool transparent)
 {
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
@@ -134,7 +134,7 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
     return largest;
 }
 
-// One in place of all bounded ones.
+// Replaces all bounded regions by one.
 static void regions_join_bounded(ContactRegionList *list)
 {
     Bounds all = bounds_empty();
@@ -149,7 +149,7 @@ static void regions_join_bounded(ContactRegionList *list)
     list->count = count;
 }
 
-// Removes what is far from all of the others.
+// Removes regions that are far from all of the others.
 static void regions_keep_near(ContactRegionList *list, const ContactRegionList *others, double margin)
 {
     Bounds around = bounds_empty();

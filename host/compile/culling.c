@@ -4,7 +4,7 @@
 #include <float.h>
 #include <math.h>
 
-// The slacks of |v|^2, and of the distance to what a sphere has in it, if that has instances.
+// The slack of |v|^2 and, for a sphere around instances, of the distance to them.
 typedef struct {
     double squared, distance;
 } CullSlack;
@@ -19,7 +19,7 @@ static CullSphere cull_sphere(BoundingSphere sphere, Vector3 common_origin, Cull
     return (CullSphere){{v.x, v.y, v.z, power}};
 }
 
-// Where the BVH is empty all rays miss.
+// Returns the BVH's cull sphere, which all rays miss if the BVH is empty.
 static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_origin, CullSlack slack)
 {
     uint32_t count = 0;
@@ -29,8 +29,8 @@ static CullSphere bvh_cull_sphere(const CompiledScene *compiled, Vector3 common_
     return cull_sphere(box_bounding_sphere(&compiled->bvh_bounds), common_origin, slack);
 }
 
-// The first primitive of a type outside the BVH, and the end of those that have cull spheres: planes have
-// none.
+// The first primitive of a type outside the BVH, and the end of those that have cull spheres. Planes do not
+// have them.
 typedef struct {
     size_t first, end;
 } Outside;
@@ -54,7 +54,7 @@ static void row_fill(const CompiledScene *compiled, Vector3 common_origin, CullS
     }
 }
 
-// 16 MiB of floats; a scene that would need more does without.
+// 16 MiB of floats. A scene that would need more has no cull spheres.
 enum { CULL_SPHERES_MAX = 1 << 20 };
 
 void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
@@ -71,13 +71,13 @@ void culling_fill(CompiledScene *compiled, const CompileSettings *settings)
         count += outside.end - outside.first;
     }
     if (count > CULL_SPHERES_MAX / (1 + lights->count)) {
-        // a kernel's argument all the same
+        // still a kernel argument
         compiled->cull_sphere_count = 0;
         flat_array_renew(compiled, FLAT_CULL_SPHERES, 1);
         return;
     }
     compiled->cull_sphere_count = (uint32_t)count;
-    // with unused ones at the end, because kernels read as many at once as they have lanes
+    // unused ones follow, because kernels read as many at once as they have lanes
     flat_array_renew(compiled, FLAT_CULL_SPHERES, count * (1 + lights->count) + BVH_WIDTH_MAX);
     CullSphere *row = compiled->arrays[FLAT_CULL_SPHERES].items;
     row_fill(compiled, compiled->eye_offset, slack, row);

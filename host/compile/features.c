@@ -27,7 +27,7 @@ static FeatureSet material_features(const Material *material)
     if (material->cutout > 0) set |= FEATURE_CUTOUTS;
     if (material->normal_texture > 0) set |= FEATURE_NORMAL_MAPS;
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
-    // which includes reflected rays: total internal reflection
+    // includes reflected rays, for total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
     // shadow rays must pass through it
     if (material->shadow == SHADOW_NONE) set |= FEATURE_TRANSMISSION;
@@ -39,7 +39,7 @@ static FeatureSet material_features(const Material *material)
         set |= FEATURE_TINTS;
     if (!vector_is_zero(material->emission)) set |= FEATURE_EMISSION;
     if (material->conductor_n.x > 0 && set & FEATURE_REFLECTION) set |= FEATURE_CONDUCTORS | FEATURE_TINTS;
-    // which needs the index of refraction and the side of the surface
+    // needs the index of refraction and the side of the surface
     if (material->fresnel && set & (FEATURE_REFLECTION | FEATURE_TRANSMISSION))
         set |= FEATURE_FRESNEL | FEATURE_TRANSMISSION;
     return set;

@@ -1,4 +1,4 @@
-// Which parts of the kernel a scene needs; the list itself is kernels/features.h.
+// The parts of the kernel that a scene needs. kernels/features.h lists them.
 #pragma once
 
 #include "host/base/text.h"

@@ -4,13 +4,13 @@
 #include <float.h>
 #include <string.h>
 
-// Kernels built with -cl-finite-math-only need not know infinities.
+// Clamps to finite floats, because kernels built with -cl-finite-math-only need not know infinities.
 static scalar4 scalar4_within_floats(Vector3 v)
 {
     return scalar4_of(vector_max(vector_min(v, vector_all(FLT_MAX)), vector_all(-FLT_MAX)), 0);
 }
 
-// The center, and the largest distance from it to a point inside, summed over the axes.
+// Returns the center and, in w, the largest distance from it to a point inside, summed over the axes.
 static scalar4 center_and_half_extent(const Bounds *bounds)
 {
     Vector3 half_low = vector_scale(bounds->min, 0.5), half_high = vector_scale(bounds->max, 0.5);
@@ -18,7 +18,7 @@ static scalar4 center_and_half_extent(const Bounds *bounds)
     return scalar4_of(vector_add(half_low, half_high), half_extents.x + half_extents.y + half_extents.z);
 }
 
-// The largest scalar, or its negative if an error bound may underflow or overflow.
+// Returns the largest scalar, negated if an error bound may underflow or overflow.
 static double first_rival(const CompiledScene *compiled, const CompileSettings *settings)
 {
     const double largest = settings->precision == PRECISION_DOUBLE ? DBL_MAX : FLT_MAX;

@@ -7,11 +7,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The triangles of instances up to which meshes are copied: rays take longer to hit shared ones.
+// Meshes with up to this many triangles in all instances are copied, because shared ones are slower to hit.
 enum { COPIED_TRIANGLES_MAX = 1 << 18 };
 
-// A map's entries and a light's distance from an instance, in units of the mesh's size, are within this, so
-// that no square of a float overflows.
+// The largest entry of a map, and the largest distance of a light from an instance, in units of the mesh's
+// size. Within these no square of a float overflows.
 #define ENTRY_MAX          0x1p50
 #define LIGHT_DISTANCE_MAX 0x1p59
 
@@ -115,7 +115,7 @@ static void shared_mesh_classify(const Scene *scene, SharedMeshPlan *shared)
 typedef struct {
     InstancePlan *plan;
     const Scene *scene;
-    uint32_t *first; // of each of the scene's meshes: 1 + its first shared one, or 0
+    uint32_t *first; // for each of the scene's meshes: 1 + its first shared one, or 0
 } Planning;
 
 // Returns 1 + the shared mesh of the object. If texture coordinates depend on the material that replaces the

@@ -11,7 +11,7 @@ typedef struct {
     uint32_t next;     // 1 + another one of the same mesh, or 0
     uint32_t object_material; // of triangles without another one
     bool is_opaque_somewhere, is_transparent_somewhere;
-    Vector3 center, extent; // of its box; half of it
+    Vector3 center, extent; // of its box; extent is half its size
     double scale;           // of its space, a power of two
 } SharedMeshPlan;
 
@@ -22,8 +22,8 @@ typedef struct InstancePlan {
     SharedMeshPlan *meshes;
     size_t mesh_count, instance_count;
     size_t triangle_count;                // of the instances
-    double condition;                     // the largest of the instances'
-    size_t hidden_counts[EXTENDED_COUNT]; // see shared_meshes_toggle
+    double condition;                     // the largest of all instances
+    size_t hidden_counts[EXTENDED_COUNT]; // used by shared_meshes_toggle
 } InstancePlan;
 
 // A map from a shared mesh's or a unit shape's space to the scene's, without its translation, and its
@@ -33,13 +33,13 @@ typedef struct {
     double determinant;
 } InstanceMap;
 
-// `is_exact`: the inverse is rounded once from quadruple precision. Otherwise it is off by some roundings of
-// a double times the condition, which floats do not resolve.
+// Returns a transform's map. With `is_exact` the inverse is rounded once from quadruple precision. Otherwise
+// its error is some roundings of a double times the condition, which floats do not resolve.
 InstanceMap instance_map(const Affine *transform, double scale, bool is_exact);
 // Returns the largest sum of a row of |map| |inverse|; NAN or infinite if the map has no inverse.
 double map_condition(const InstanceMap *map);
 
-// Returns NULL if no mesh is shared.
+// Returns a plan of which objects share meshes, or NULL if none does.
 InstancePlan *instances_plan(const Scene *scene, const CompileSettings *settings);
 void instance_plan_free(InstancePlan *plan);
 

@@ -12,7 +12,7 @@ _Static_assert((int)AREA_NONE == LIGHT_AREA_NONE && (int)AREA_RECTANGLE == LIGHT
 _Static_assert((int)SKY_CELL_ROWS == SKY_ROWS && (int)SKY_CELL_COLUMNS == SKY_COLUMNS,
                "the sky has the kernels' cells");
 
-// 1 - cos of an angle in degrees, without cancellation.
+// Returns 1 - cos of an angle in degrees, without cancellation.
 static double versine(double degrees)
 {
     double half = portable_sine(degrees * (M_PI / 360));

@@ -13,7 +13,7 @@
 bool size_fits(const CompiledScene *compiled, const Scene *scene, MessageList *messages)
 {
     const size_t id_max = INT32_MAX - 1, largest = (size_t)1 << 28; // bits that the BVH counts with
-    const size_t copied_max = (size_t)1 << 24;                      // the cost of a hostile file
+    const size_t copied_max = (size_t)1 << 24;                      // bounds the cost of a hostile file
     const InstancePlan *plan = compiled->instances;
     const size_t count = scene_primitive_count(scene), single = count - (plan ? plan->triangle_count : 0);
     if (count > id_max)
@@ -129,7 +129,7 @@ bool features_fit(const Scene *scene, const CompileSettings *settings, MessageLi
     return true;
 }
 
-// Returns by how much the mapped rays of an oval differ in length, at most (shapes/oval.h).
+// Returns the largest ratio of lengths of an oval's mapped rays (shapes/oval.h).
 static double stretch_largest(const Scene *scene)
 {
     double largest = 1;

@@ -15,14 +15,14 @@ static uint4 optical_depth_of(double transmission)
     return (uint4){(uint32_t)llround(ldexp(log2_loss, 24)), (uint32_t)fine, (uint32_t)(fine >> 32), 0};
 }
 
-// A part that no precision rounds to 0, which would end the path.
+// Returns a part that no precision rounds to 0, which would end the path.
 static double part_of_light(double part)
 {
     return part > 0 ? fmax(part, FLT_MIN) : 0;
 }
 
-// A density whose products with lengths are in range: times the largest length of kernels/shading/medium.h it
-// is at least 2^10, of which exp makes 0.
+// Returns a density whose products with lengths are in range. Times the largest length of
+// kernels/shading/medium.h it is at least 2^10, of which exp makes 0.
 static double density_of(double absorption, bool is_double)
 {
     const double largest = is_double ? 0x1p500 : 0x1p60;
@@ -57,7 +57,7 @@ static uint4 texture_of(const CompiledScene *compiled, uint32_t number, const Te
     return (uint4){1 + texture->first_level, texture->level_count, wraps[0], wraps[1]};
 }
 
-// `any` is the texture whose texels define the surface's texel density.
+// Sets the normal map. `any` is the texture whose texels define the surface's texel density.
 static void normal_map_set(FlatMaterial *flat, const CompiledScene *compiled, const Material *material,
                            const CompiledTexture *any)
 {

@@ -1,4 +1,4 @@
-// Triangles that share an edge, and how they lie to each other, by exact signs.
+// Finds triangles that share an edge, and the exact signs of their positions relative to each other.
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/stages.h"
@@ -168,9 +168,9 @@ static Side side_of_quad(const Vector3 *a, const Vector3 *b, const Vector3 *c, c
     return volume > error ? IN_FRONT : volume < -error ? BEHIND : UNKNOWN;
 }
 
-// The side of a triangle's plane that a point is on, exact or UNKNOWN. The bound of the determinant in double
-// is that of Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric predicates,
-// Discrete & Computational Geometry 18, 1997, section 4.3, with room to spare.
+// Returns the side of a triangle's plane that a point is on, exact or UNKNOWN. The bound of the determinant
+// in double is that of Shewchuk, Adaptive precision floating-point arithmetic and fast robust geometric
+// predicates, Discrete & Computational Geometry 18, 1997, section 4.3, with some slack.
 static Side side_of(const Triangles *triangles, const uint32_t *corners, uint32_t point)
 {
     const Vector3 *a = &triangles->all.vertices[corners[0]], *b = &triangles->all.vertices[corners[1]],

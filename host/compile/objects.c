@@ -92,14 +92,14 @@ typedef struct {
     _Atomic FeatureSet features;
 } Move;
 
-// In the order of the array, so that memory is written one after the other.
+// Moves structs in the order of the array, so that memory is written sequentially.
 static void range_move(void *context, size_t begin, size_t end)
 {
     Move *move = context;
     Flattening flattening = move->flattening;
     const Scene *scene = flattening.scene;
     const uint32_t *first_ids = move->first_ids;
-    size_t object = 0; // neighbors are mostly of the same
+    size_t object = 0; // adjacent ones mostly have the same
     for (size_t i = begin; i < end; i++) {
         flattening.moved = flat_array_at(move->array, i);
         const uint32_t id = *flat_id(move->array, flattening.moved);

@@ -16,14 +16,14 @@ Vector3 random_in_sphere(Random *random);                     // of radius 1
 Vector3 random_unit_vector(Random *random);
 Vector3 random_world_axis(Random *random); // either way, its zeros of either sign
 
-// The nearest point of a grid that is fine for the sizes and coarse for the positions of random objects: sums
-// and differences are floats.
+// Returns the nearest point of a grid that is fine for the sizes and coarse for the positions of random
+// objects, so that sums and differences are floats.
 Vector3 vector_on_grid(Vector3 point);
 
 typedef struct {
     Object object;
     Vector3 center;
-    double radius; // around the center, of what matters: all of a bounded object
+    double radius; // around the center; contains all of a bounded object
     Vector3 axis;  // along which rays are special: an axis, a normal, an edge; not unit
 } RandomShape;
 
@@ -35,7 +35,7 @@ typedef struct {
     bool bounded;
 } ShapeForm;
 
-// Every form of every shape but the mesh, shape by shape. Returns how many.
+// Lists every form of every shape except the mesh, shape by shape. Returns their number.
 enum { SHAPE_FORMS_MAX = 64 };
 size_t shape_forms(ShapeForm forms[SHAPE_FORMS_MAX]);
 

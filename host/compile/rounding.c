@@ -5,8 +5,8 @@ Quad3 exact_from_eye(const Rounding *rounding, Vector3 point)
     return quad3_subtract(quad3(point), quad3(rounding->eye));
 }
 
-// Both the rounding of the point and the kernels' sum n . (p - o) are off by up to some u of the sum of |n p|
-// over the axes.
+// The rounding of the point and that of the kernels' sum n . (p - o) are each at most some u of the sum of
+// |n p| over the axes.
 Vector3 plane_point_from_eye(const Rounding *rounding, Vector3 point, Vector3 normal)
 {
     if (rounding->is_double && !rounding->has_eye && !rounding->certifies)

@@ -13,7 +13,7 @@ typedef struct {
     bool certifies; // bounds are by the eye's power where the eye is near, for the shape's size
 } Rounding;
 
-// The eye is near a shape within this part of its numbers.
+// The eye is near a shape if it is within this part of the shape's size.
 #define NEAR_EYE 0x1p-6
 
 // GCC 12 at -O2 drops a conversion to float and back where it merges stores (-ftree-slp-vectorize); volatile
@@ -41,12 +41,12 @@ static inline double roundoff_of(const Rounding *rounding) // half an ulp of 1
 }
 
 Quad3 exact_from_eye(const Rounding *rounding, Vector3 point);
-// A point of a plane, rounded, that the rounding moves off the plane by at most some ulp of the plane's
-// distance from the eye: the given one, or where that is too far away the one nearest to the eye. In double
-// without an eye the given one, which nothing rounds.
+// Returns a rounded point of a plane that is off the plane by at most some ulp of the plane's distance from
+// the eye: the given one or, if that is too far away, the one nearest to the eye. In double without an eye,
+// returns the given one unrounded.
 Vector3 plane_point_from_eye(const Rounding *rounding, Vector3 point, Vector3 normal);
 
-// The same direction, scaled by a power of two so that its largest component lies in 1/2..1: exact.
+// Returns the same direction, scaled exactly by a power of two so that its largest component lies in 1/2..1.
 static inline Vector3 axis_scaled(Vector3 axis)
 {
     const double largest = vector_largest(axis);
@@ -63,5 +63,5 @@ static inline Vector3 axis_scaled(Vector3 axis)
     return vector_scale(axis, scale);
 }
 
-// A plane's normal, not unit, and in w one over its length.
+// Returns a plane's normal, not unit, with one over its length in w.
 scalar4 normal_and_inverse_length(const Rounding *rounding, Vector3 normal);

@@ -1,4 +1,4 @@
-// What a Scene is compiled for.
+// The settings that a Scene is compiled for.
 #pragma once
 
 #include "host/base/stage.h"
@@ -16,11 +16,11 @@ typedef enum {
 } Precision;
 extern const char *const precision_names[PRECISION_COUNT];
 
-// Whether rays traverse a BVH. The image is the same either way.
+// Selects whether rays traverse a BVH. The image is the same either way.
 typedef enum { BVH_AUTO, BVH_ON, BVH_OFF, BVH_CHOICE_COUNT } BvhChoice;
 extern const char *const bvh_choice_names[BVH_CHOICE_COUNT];
 
-// Whether instances of a mesh share it, or each has a copy.
+// Selects whether instances of a mesh share it or each has a copy.
 typedef enum {
     INSTANCES_AUTO, // shared if copies would be large
     INSTANCES_SHARED,
@@ -33,7 +33,7 @@ typedef struct {
     uint32_t bounce_count;   // of a ray, at most
     double min_contribution; // the least weight of a secondary ray
     Precision precision;
-    bool certifies; // at `certified`, and at `double` what that repeats: culls are wider
+    bool certifies; // at `certified`, and at `double` for what it re-renders: culls are wider
     uint32_t lanes; // of the kernel: 1, 4, 8, 16
     BvhChoice bvh;
     InstanceChoice instances;
@@ -41,7 +41,7 @@ typedef struct {
     bool shift_to_eye;         // positions are relative to the eye; else as they are
     bool hashes_primitives;    // sets CompiledScene.primitives_hash
     bool is_preview;           // scene_move leaves the arrays as the last eye saw them, and takes no time
-    // From an earlier compilation of the same textures, whose arrays are then left empty; NULL: none.
+    // Reused from an earlier compilation of the same textures, whose arrays are then left empty; NULL: none.
     const struct CompiledTexture *textures;
     Stage *stage; // NULL: not wanted
 } CompileSettings;

@@ -1,8 +1,8 @@
 #include "host/compile/texture_mapping.h"
 
-// Where the eye is along a unit direction, in squares or textures of `size`, modulo `period` of them. The
-// remainder is exact, and only then divided: far from the origin a rounded quotient has no bits left within
-// the period.
+// Returns the eye's coordinate along a unit direction, in squares or textures of `size`, modulo `period` of
+// them. Divides only the exact remainder, because a rounded quotient has no bits left within the period far
+// from the origin.
 static double eye_phase(const Flattening *flattening, Quad3 direction, double size, double period)
 {
     const Quad along = quad3_dot(quad3(flattening->rounding.eye), direction);
@@ -17,14 +17,14 @@ static scalar4 grid_axis(const Flattening *flattening, Quad3 direction, double s
                       eye_phase(flattening, direction, size, period));
 }
 
-// The part of an axis across the unit normal, unit.
+// Returns the unit vector of an axis' part perpendicular to the unit normal.
 static Quad3 axis_across(Vector3 axis, Quad3 unit_normal)
 {
     const Quad3 wide = quad3(axis);
     return quad3_unit(quad3_subtract(wide, quad3_scale(unit_normal, quad3_dot(wide, unit_normal))));
 }
 
-// A texture stands upright on a wall; on a floor or a ceiling its top lies towards -z.
+// Returns the direction of a texture's top: upright on a wall, towards -z on a floor or a ceiling.
 static Quad3 texture_up(Vector3 normal, Quad3 unit_normal)
 {
     bool level = fabs(normal.y) >= fmax(fabs(normal.x), fabs(normal.z));

@@ -15,8 +15,7 @@ static void texel_color(const Texel *texel, float color[3])
     memcpy(color, &texel->color, sizeof(float[3]));
 }
 
-// A line of texels re-divided: `part` from 0 to `count` covers the old texels first .. last, the outer ones
-// in part.
+// The old texels first .. last that one new texel covers, from `start` to `end`, the outer ones partly.
 typedef struct {
     double start, end;
     uint32_t first, last;
@@ -51,8 +50,8 @@ static uint32_t level_count_of(uint32_t width, uint32_t height)
     return count;
 }
 
-// Half as many texels in each dimension, rounded up; each is the mean of what it covers, so that the
-// texture's mean stays.
+// Halves the number of texels in each dimension, rounded up. Each is the mean of those that it covers, which
+// preserves the texture's mean.
 static void level_halve(Texel *coarse, const Texel *fine, uint32_t fine_width, uint32_t fine_height)
 {
     const uint32_t width = half_of(fine_width), height = half_of(fine_height);
@@ -78,7 +77,7 @@ static void level_halve(Texel *coarse, const Texel *fine, uint32_t fine_width, u
     }
 }
 
-// Light below 0, which the filters of other programs leave, counts as none.
+// Fills the first level. Values below 0, which filters of other programs leave, become 0.
 static void level_fill(Texel *texels, const Image *image, bool decodes)
 {
     size_t count = (size_t)image->width * image->height;
@@ -93,7 +92,7 @@ static void level_fill(Texel *texels, const Image *image, bool decodes)
     }
 }
 
-// A coarser level's texels are means.
+// Returns the largest texel of a full-size level. Coarser levels are means.
 static float largest_texel(const Texel *texels, size_t count)
 {
     float largest = 0, color[3];

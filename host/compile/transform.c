@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Every position and every other vector (axes, normals, directions), but for those of meshes. Scaling a
-// normal or a direction changes nothing: they need not be unit.
+// Changes every position and every other vector (axes, normals, directions) except those of meshes. Scaling
+// a normal or a direction has no effect, because they need not be unit vectors.
 static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, double factor), double factor)
 {
     change(&scene->camera.position, factor);
@@ -106,7 +106,7 @@ static void vector_mirror(Vector3 *vector, double factor)
     vector->x *= factor;
 }
 
-// A checker's squares lie at floor(x / size), which mirrors an even one to an odd one.
+// A checker's squares lie at floor(x / size), so mirroring turns an even one into an odd one.
 void scene_mirror(Scene *scene)
 {
     scene_for_each_vector(scene, vector_mirror, -1);

@@ -5,11 +5,11 @@
 
 // Multiplies every length; the image is the same, bit for bit where the factor is a power of two.
 void scene_scale(Scene *scene, double factor);
-// A scaled copy that shares what has no length with the scene, which must outlive it. Free with
+// Returns a scaled copy that shares what has no length with the scene, which must outlive it. Free it with
 // scene_scaled_free.
 Scene scene_scaled(const Scene *scene, double factor);
 void scene_scaled_free(Scene *scaled);
-// Negates x, which mirrors the image. Neither this nor the next transforms meshes.
+// Negates x, which mirrors the image. Leaves meshes unchanged.
 void scene_mirror(Scene *scene);
-// x becomes y, y becomes z, z becomes x; the image changes by rounding only.
+// Turns x into y, y into z and z into x, except in meshes. The image changes by rounding only.
 void scene_turn_axes(Scene *scene);

@@ -7,11 +7,11 @@ static double distance_largest(Vector3 from, Vector3 to)
     return vector_largest(vector_subtract(to, from));
 }
 
-// In float a torus of 1e12 units, or of 1e-12, is lost, as the third and fourth powers of lengths overflow or
-// underflow; other shapes are at 1e19 and 1e-19. So where the farthest point lies beyond 2^30, or within
-// 2^-30, the unit is the geometric mean of its distance and the smallest object's size, which puts them on
-// the two sides of 1; unless that would enlarge a large scene. Powers of two are exact: the image is that of
-// the scene as it is.
+// In float a torus of 1e12 units, or of 1e-12, is lost, because the third and fourth powers of lengths
+// overflow or underflow. Other shapes are lost at 1e19 and 1e-19. If the farthest point lies beyond 2^30 or
+// within 2^-30, the unit is the geometric mean of its distance and the smallest object's size, which puts
+// them on the two sides of 1, unless that would enlarge a large scene. Powers of two are exact, so the image
+// is that of the scene as it is.
 double scene_unit(const Scene *scene, const CompileSettings *settings)
 {
     const int harmless = 30; // exponents up to there

@@ -73,13 +73,13 @@ static void scene_send(void *context, SceneVariant variant, const CompiledScene 
 
 typedef struct {
     Request request;
-    BandRows rows; // handed out, and not received yet
-    Film band;     // of them, while its layers arrive; of no height: its header has not arrived
+    BandRows rows; // handed out and not yet received
+    Film band;     // collects their layers; height 0 until its header arrives
     Layer next_layer;
     bool wants_rows, end_sent, is_rejected, is_done;
 } RankState;
 
-// Receives the message of a status, which must have that size; else discards it and returns false.
+// Receives the message of a status if it has that size. Otherwise discards it and returns false.
 static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
 {
     int count;
@@ -92,8 +92,8 @@ static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
     return fits;
 }
 
-// False also for a rank that has not sent all its rows, or an answer to whose last request it did not wait
-// for.
+// Receives a request. Also returns false for a rank that has not sent all its rows, or did not wait for the
+// answer to its last request.
 static bool request_receive(RankState *state, const MPI_Status *status)
 {
     const bool is_due = !state->wants_rows && state->rows.row_count == 0;
@@ -102,7 +102,7 @@ static bool request_receive(RankState *state, const MPI_Status *status)
            state->request.rows_max > 0 && state->request.step > 0;
 }
 
-// Gives the scheduler the band once it has all layers.
+// Delivers the band to the scheduler once it has all layers.
 static void layers_await(RankState *state, Scheduler *scheduler, size_t worker)
 {
     while (state->next_layer < LAYER_COUNT && !state->band.layers[state->next_layer])
@@ -113,7 +113,7 @@ static void layers_await(RankState *state, Scheduler *scheduler, size_t worker)
     film_free(&state->band);
 }
 
-// False: it is not the band of the rows that the rank was given.
+// Receives the header of a band. Returns false if its rows are not those that the rank was given.
 static bool header_receive(const Ranks *ranks, RankState *state, const MPI_Status *status)
 {
     FilmHeader header;
@@ -126,7 +126,7 @@ static bool header_receive(const Ranks *ranks, RankState *state, const MPI_Statu
     return true;
 }
 
-// Its layers are messages like any other: a rank that sends none keeps nobody waiting.
+// Receives one layer. Each is a separate message, so a rank that sends none does not block the others.
 static bool layer_receive(RankState *state, const MPI_Status *status)
 {
     void *layer = state->band.height > 0 ? state->band.layers[state->next_layer] : NULL;
@@ -136,7 +136,7 @@ static bool layer_receive(RankState *state, const MPI_Status *status)
     return is_right;
 }
 
-// The others render the rows of a rank that cannot.
+// Drops a rank that cannot render its rows. The others render them.
 static void rank_drop(const Ranks *ranks, Scheduler *scheduler, size_t worker, int rank, const char *why)
 {
     fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host, why);
@@ -177,7 +177,7 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
               "it sent data that is not a band of its rows; the others continue without it");
 }
 
-// Answers a rank that wants rows, and reports the end to each once. False: there is nothing to do.
+// Answers a rank that wants rows, and reports the end to each once. Returns false if nothing is due.
 static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, int rank)
 {
     if (state->wants_rows && !state->is_done) {
@@ -236,7 +236,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
         fprintf(stderr, "usage: mpirun -n RANKS glint-mpi render SCENE... [OPTIONS]\n"
                         "The options are those of glint render; each rank renders on a device of its own.\n");
     } else {
-        static char name[] = "glint-mpi render"; // which getopt's messages begin with
+        static char name[] = "glint-mpi render"; // getopt's messages begin with it
         arguments[1] = name;
         RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
         if (command) {

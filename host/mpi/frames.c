@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 static const size_t NO_FRAME = SIZE_MAX;
-// The status of a frame that another device may be able to render.
+// A frame's status if another device may be able to render it.
 enum { FRAME_UNFIT = 256 };
 
 static int frame_render(RenderCommand *command, size_t frame)
@@ -23,11 +23,11 @@ static int frame_render(RenderCommand *command, size_t frame)
     return status == EXIT_USER && render_command_is_unfit(command) ? FRAME_UNFIT : status;
 }
 
-// Whether the files are shared.
+// Tests whether the files are shared.
 
 enum { MARKER_BYTES = 4096 };
 
-// What a rank was called with. glint-mpi's own name and its command's are not among them.
+// The arguments that a rank was called with, of which files_hash skips glint-mpi's name and its command's.
 typedef struct {
     int argument_count;
     char **arguments;
@@ -52,7 +52,7 @@ static uint64_t files_hash(const RenderCommand *command, Call call)
     return hash;
 }
 
-// Only one rank can read standard input, or write images or reports to standard output in order.
+// Returns whether standard streams are used, which only one rank can read, or write in order.
 static bool uses_standard_streams(const RenderCommand *command)
 {
     if (render_command_reports_to_stdout(command)) return true;
@@ -63,7 +63,7 @@ static bool uses_standard_streams(const RenderCommand *command)
     return false;
 }
 
-// A new file in the images' folder; its name is empty where there can be none.
+// Makes a new file in the images' folder. Its name is empty if that fails.
 static void marker_make(const RenderCommand *command, char *name)
 {
     const char *path = render_command_path(command, 0), *slash = strrchr(path, '/');
@@ -76,8 +76,8 @@ static void marker_make(const RenderCommand *command, char *name)
         name[0] = '\0';
 }
 
-// All ranks call it; `command` is NULL where the arguments could not be read. True: all see the scenes and
-// the images' folder.
+// Returns whether all ranks see the scenes and the images' folder. All ranks call it; `command` is NULL if
+// the arguments could not be read.
 static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
 {
     char marker[MARKER_BYTES] = "";
@@ -86,7 +86,7 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     const bool can_render =
         command && !uses_standard_streams(command) && render_command_open_devices(command);
     if (is_first) {
-        progress_hold_signals(); // the marker is removed whatever comes
+        progress_hold_signals(); // so that the marker is removed in any case
         marker_make(command, marker);
     }
     broadcast(marker, sizeof marker, MPI_COMM_WORLD);
@@ -98,21 +98,21 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     return all_see;
 }
 
-// The first rank's side: its own device renders in a thread.
+// The first rank. Its own device renders in a thread.
 
 typedef struct {
     pthread_mutex_t mutex;
     RenderCommand *command;
-    size_t next, end; // of the frames that were not dealt yet
+    size_t next, end; // frames that were not dealt yet
     struct {
-        size_t *items; // that a rank with a failed device had
+        size_t *items; // of ranks whose devices failed
         size_t count, capacity;
     } again;
     size_t workers, dealt; // workers whose devices work, frames that are being rendered
     bool has_ended;
 } Deal;
 
-// NO_FRAME: there is none now; later there may be where a rank fails that has one.
+// Returns the next frame, or NO_FRAME. There may be one later if a rank that has one fails.
 static size_t frame_take(Deal *deal)
 {
     size_t frame = NO_FRAME;
@@ -126,8 +126,8 @@ static size_t frame_take(Deal *deal)
     return frame;
 }
 
-// False: the worker's device failed, or does not fit the frame; others render it, and then all that are left.
-// A frame that does not fit the last worker's either is left out.
+// Records a frame's status. Returns false if the worker's device failed or does not fit the frame. Others
+// then render it, and all that are left. A frame that does not fit the last worker either is skipped.
 static bool frame_note(Deal *deal, size_t frame, int status)
 {
     pthread_mutex_lock(&deal->mutex);
@@ -146,7 +146,7 @@ static bool frame_note(Deal *deal, size_t frame, int status)
     return works;
 }
 
-// Whether no frame will be free any more.
+// Returns whether no frame will become free any more.
 static bool deal_is_over(Deal *deal)
 {
     pthread_mutex_lock(&deal->mutex);
@@ -183,7 +183,7 @@ typedef struct {
     bool wants, has_failed, end_sent, is_over;
 } RankFrames;
 
-// Receives what the rank says of its last frame.
+// Receives the status of the rank's last frame.
 static void frame_done_receive(Deal *deal, RankFrames *state, int rank)
 {
     int status;
@@ -193,7 +193,7 @@ static void frame_done_receive(Deal *deal, RankFrames *state, int rank)
     state->wants = true;
 }
 
-// Sends a frame to a rank that wants one, and the end to each once. False: there is nothing to do.
+// Sends a frame to a rank that wants one, and the end to each once. Returns false if nothing is due.
 static bool frame_send(Deal *deal, RankFrames *state, int rank)
 {
     if (!state->end_sent && (state->has_failed || deal_is_over(deal))) {
@@ -260,7 +260,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     return deal.end;
 }
 
-// Another rank's side.
+// The other ranks.
 
 static bool end_received;
 

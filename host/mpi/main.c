@@ -1,6 +1,6 @@
-// glint-mpi: glint render on the devices of an MPI job, one for each rank. The first rank reads the scene,
-// sends the compiled arrays to the others, hands out rows and writes the image; its own device renders in a
-// thread. The others need neither the scene's files nor the output's folder.
+// glint-mpi runs glint render on the devices of an MPI job, one per rank. The first rank reads the scene,
+// sends the compiled arrays to the others, hands out rows and writes the image, while its own device renders
+// in a thread. The others need neither the scene's files nor the output's folder.
 //
 // All ranks must be of one architecture and run the same program.
 #include "host/base/fault.h"

@@ -1,9 +1,7 @@
-// What the ranks of a job send each other. The first rank broadcasts a Job, again and again. For an image
-// follow
-//   the others' answers, their Ranks;
-//   Orders: the compiled scene for each variant that a rank needs, after which it follows, then the start.
-// From then on each asks the first one for rows and sends their bands, until it has sent TAG_DONE and
-// received TAG_END.
+// The messages between the ranks of a job. The first rank broadcasts one Job after another. For an image,
+// the others answer with their Ranks and then receive Orders: one for each variant that a rank needs,
+// followed by its compiled scene, and then the start. From then on, each asks the first rank for rows and
+// sends their bands, until it has sent TAG_DONE and received TAG_END.
 #pragma once
 
 #include "host/cli/ranks.h"
@@ -15,8 +13,8 @@ enum {
     TAG_BAND, // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,
     TAG_END,        // to a rank that renders: the render has ended
-    TAG_DONE,       // the last one of a rank: why its device failed, or an empty text
-    TAG_FRAME_DONE, // the exit status of a rank's frame; EXIT_DONE, too, before the first
+    TAG_DONE,       // a rank's last: why its device failed, or an empty text
+    TAG_FRAME_DONE, // the exit status of a rank's frame; EXIT_DONE before the first
     TAG_FRAME,      // the answer: the next frame's index, or NO_FRAME
 };
 
@@ -26,9 +24,9 @@ typedef struct {
 
 typedef struct {
     enum { JOB_END, JOB_FRAMES, JOB_IMAGE } type;
-    RenderSettings settings; // of an image, and what follows
+    RenderSettings settings; // of an image, like the members below
     unsigned aovs;
-    size_t selector_size; // the device selector's, which follows, with its NUL; 0: none
+    size_t selector_size; // of the device selector with its NUL, which follows; 0: none
 } Job;
 
 typedef struct {
@@ -36,15 +34,15 @@ typedef struct {
     SceneVariant variant; // of a scene
 } Order;
 
-// MPI waits by polling: this leaves the processor to the device.
+// Sleeps briefly. MPI waits by polling, and this leaves the processor to the device.
 void rest(void);
 
-// From the first of `ranks`.
+// Broadcasts from the first of `ranks`.
 void broadcast(void *bytes, size_t size, MPI_Comm ranks);
 void send_bytes(const void *bytes, size_t size, int rank, int tag);
 void receive_bytes(void *bytes, size_t size, int rank, int tag);
 bool has_message(int rank, int tag, MPI_Status *status);
 
-// Sends a compiled scene from the first rank to those of the others that take it, which allocate its arrays.
-// All ranks call it; `compiled` is unused by a rank that does not take it.
+// Sends a compiled scene from the first rank to those with `takes`, which allocate its arrays. All ranks
+// call it. A rank that does not take the scene leaves `compiled` unchanged.
 void scene_broadcast(CompiledScene *compiled, int rank, bool takes);

@@ -44,13 +44,13 @@ static bool band_give(void *ended, const Film *band)
     return !has_ended(ended);
 }
 
-// What this rank renders with.
+// The state of this rank's renderer.
 typedef struct {
     int rank;
     size_t local_rank;
     OpenDevices devices;
     bool is_open;
-    Renderer *renderer; // NULL: it cannot render, see `messages` or the device's failure
+    Renderer *renderer; // NULL: cannot render, for a reason in `messages` or the device
     MessageList messages;
     Rank own;
 } RankRenderer;
@@ -63,7 +63,7 @@ static void device_close_quietly(RankRenderer *worker)
     worker->is_open = false;
 }
 
-// Prepares for another image; a device that failed is reopened.
+// Prepares for another image. Reopens a device that failed.
 static void worker_begin(RankRenderer *worker, const Job *job, const char *selector)
 {
     Rank *own = &worker->own;
@@ -83,7 +83,7 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
         own->lanes[pass] = renderer_lanes(worker->renderer, pass);
 }
 
-// All ranks of a variant receive its scene, also those that can render no longer.
+// Receives a scene. All ranks of its variant take part, even those that can no longer render.
 static void scene_receive(RankRenderer *worker, SceneVariant variant)
 {
     CompiledScene compiled;
@@ -98,8 +98,8 @@ static void scene_receive(RankRenderer *worker, SceneVariant variant)
     }
 }
 
-// Renders until the first rank has no more rows, and says why the device could not. It also waits for the
-// message that ends this job, which would end the next one if it came late.
+// Renders until the first rank has no more rows, and sends the reason if the device failed. Waits for the
+// message that ends this job, because a late one would end the next job.
 static void worker_render(RankRenderer *worker, unsigned aovs)
 {
     char failure[sizeof worker->own.failure] = "";
@@ -134,7 +134,7 @@ static void job_run(RankRenderer *worker, const Job *job)
     message_list_free(&worker->messages);
 }
 
-// An interrupt reaches all ranks: the first one ends the render, and the job.
+// Ignores interrupts, which reach all ranks. The first rank ends the render and the job.
 static void signals_ignore(void)
 {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};

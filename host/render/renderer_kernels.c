@@ -53,7 +53,7 @@ static void variant_close(Renderer *renderer, KernelVariant *variant)
     for (size_t type = 0; type < KERNEL_COUNT; type++) {
         KernelSlot *slot = &variant->kernels[type];
         if (slot->kernel) {
-            // it has been launched: its program's binary holds finished machine code
+            // since its launch, its program's binary holds finished machine code
             program_store(renderer->compute, &slot->request, &slot->program);
             clReleaseKernel(slot->kernel);
         }
@@ -100,7 +100,7 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
     text_appendf(text, "#define REPAIRS_DIVIDE %d\n", repairs_divide(renderer));
     text_appendf(text, "#define HAS_FMA %d\n", renderer->passport->uses_fma);
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
-    // a million primitives in nodes of four children need 34: a GPU may keep as many for each of its threads
+    // a million primitives in nodes of four children need 34, which a GPU may keep for each of its threads
     text_appendf(text, "#define STACK_CAPACITY %u\n",
                  capacity_for(renderer, renderer->compiled.pending_children_max, 40));
     text_appendf(text, "#define IS_COUNTING %d\n", settings->counting);

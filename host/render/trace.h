@@ -13,8 +13,8 @@ typedef struct {
     double origin[3], direction[3], tmin, tmax;
 } TraceRay;
 
-// What is known at `certified`, where tmin is 0 and `light` is undefined, about a hit or miss. A certain hit
-// has the object that exact arithmetic on the ray's and the scene's numbers finds, and bounds on its t.
+// The certainty of a hit or miss at `certified`, where tmin is 0 and `light` is undefined. A certain hit has
+// the object that exact arithmetic on the ray's and the scene's numbers finds, and bounds on its t.
 typedef enum {
     TRACE_UNCERTAIN,
     TRACE_CERTAIN,           // proven in float

@@ -125,7 +125,7 @@ static double angle_between(Vector3 a, Vector3 b)
     return along < 0 ? M_PI - angle : angle;
 }
 
-// What a triangle adds to the normals of its vertices.
+// The contribution of a triangle to the normals of its vertices.
 typedef struct {
     Vector3 unit;
     double angles[3];

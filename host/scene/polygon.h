@@ -1,4 +1,4 @@
-// Cuts flat polygons, also concave ones, into triangles that use all their corners.
+// Cuts flat polygons, including concave ones, into triangles that use all their corners.
 #pragma once
 
 #include "host/scene/vector.h"
@@ -17,8 +17,8 @@ typedef struct {
 } PolygonTriangles;
 
 // Fills `triangles`, whose storage it reuses. The time grows with the square of the number of corners.
-// Corners may repeat and lie on a line with their neighbors; a corner on an edge stays a corner of triangles,
-// so that a neighboring polygon which has it too leaves no gap.
+// Corners may repeat and lie on a line with their neighbors. A corner on an edge stays a corner of
+// triangles, so that an adjacent polygon with the same corner leaves no gap.
 PolygonStatus polygon_triangulate(const Vector3 *corners, size_t count, PolygonTriangles *triangles);
 
 // Returns the exact sign of the area of a, b, c in the plane, positive where they turn left.

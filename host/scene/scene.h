@@ -38,8 +38,8 @@ typedef struct {
 
 typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightType;
 
-// What a light shines from: its position, a rectangle or an ellipse around it, a sphere, a triangle, or the
-// directions of sky.cells.
+// The area that a light shines from: its position, a rectangle or an ellipse around it, a sphere, a
+// triangle, or the directions of sky.cells.
 typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE, AREA_SKY } LightArea;
 
 typedef struct {
@@ -50,9 +50,9 @@ typedef struct {
     // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
     double half_angle, penumbra;
     LightArea area;
-    // From the center of a rectangle or an ellipse to the middles of two sides; for a directional light
-    // across `direction`, and relative to its length. Two sides of a triangle from one vertex, which is at
-    // position - (across[0] + across[1]) / 4.
+    // The vectors from the center of a rectangle or an ellipse to the middles of two sides. For a
+    // directional light they are across `direction`, and relative to its length. For a triangle they are two
+    // sides from one vertex, which is at position - (across[0] + across[1]) / 4.
     Vector3 across[2];
     double radius;   // of a sphere or a disc
     bool is_visible; // the area is an object that shows `color` and casts no shadow
@@ -69,10 +69,10 @@ static inline bool light_fades(const Light *light)
 // Divides the color by a fading that is the same at all distances, and clears it.
 void light_fold_fading(Light *light);
 
-// How a texture on a mesh continues beyond its edges.
+// The continuation of a texture on a mesh beyond its edges.
 typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap;
 
-// What a shadow ray loses at a surface: what is not transmitted, all, or nothing.
+// The part of a shadow ray that a surface blocks: what it does not transmit, all, or nothing.
 typedef enum { SHADOW_OF_TRANSMISSION, SHADOW_FULL, SHADOW_NONE } ShadowType;
 
 typedef struct {
@@ -89,7 +89,7 @@ typedef struct {
     Color conductor_n, conductor_k; // reflects by the complex index n + i k; n is 0 if it does not
     double ior;
     ShadowType shadow;
-    Color absorption; // of what is transmitted exp(-absorption d) is left after a length d within
+    Color absorption; // exp(-absorption d) of what is transmitted is left after a length d within
     bool checker;
     Color checker_colors[2];     // in place of color
     double checker_size;         // side of a square, > 0, in scene units
@@ -101,10 +101,10 @@ typedef struct {
     uint32_t normal_texture;
     double normal_rows[2][3], normal_strength;
     TextureWrap normal_wrap[2];
-    uint32_t cutout_texture; // the surface is not there where the alpha of this texture is below `cutout`
+    uint32_t cutout_texture; // the surface is absent where the alpha of this texture is below `cutout`
     double cutout;           // 0: it is everywhere
     bool cutout_blends;      // its format blends by this alpha
-    bool ignores_alpha;      // its format defines what becomes of the alpha of `texture`
+    bool ignores_alpha;      // its format defines the use of the alpha of `texture`
 } Material;
 
 // Returns the texture whose place on a surface is that of all textures of its material, or 0.
@@ -121,7 +121,7 @@ static inline uint32_t material_any_texture(const Material *material)
 // The largest number of texels of all images: coarser levels add a third, and kernels count in 32 bits.
 enum { TEXTURE_SIDE_MAX = 1 << 16, TEXELS_MAX = 1 << 28 };
 
-// What an image's values are.
+// The meaning of an image's values.
 typedef enum {
     TEXTURE_COLORS,
     TEXTURE_OPACITY, // colors; if every pixel is opaque, decoding sets alpha to the luminance
@@ -210,10 +210,10 @@ typedef struct {
             double focal_length, height;
             bool finite, caps;
         } paraboloid;
-        // a round shape that an affine map has left of another type (host/scene/oval.h): the points center +
-        // x axes[0] + y axes[1] + z axes[2] for those of a unit shape. half_height: where finite. radii: of a
-        // finite cone at its ends, the larger 1, or of a torus, whose sum is 1. rise: the slope of an
-        // infinite cone, or r^2 / z of an infinite paraboloid.
+        // a round shape that an affine map has changed to another type (host/scene/oval.h): the points
+        // center + x axes[0] + y axes[1] + z axes[2] for those of a unit shape. half_height: of a finite
+        // one. radii: of a finite cone at its ends, the larger 1, or of a torus, with the sum 1. rise: the
+        // slope of an infinite cone, or r^2 / z of an infinite paraboloid.
         struct {
             Vector3 center, axes[3];
             double half_height, radii[2], rise;
@@ -240,7 +240,7 @@ typedef struct {
     uint32_t *materials; // one for each triangle, or NULL: the object's
     size_t triangle_count;
     Bounds bounds;                    // of the vertices, if the mesh has instances
-    char *path;                       // that it was read from, or NULL
+    char *path;                       // the file it was read from, or NULL
     uint64_t file_device, file_index; // of that file, by whatever name
 } Mesh;
 
@@ -257,7 +257,7 @@ typedef struct {
 
 enum { SKY_CELL_ROWS = 128, SKY_CELL_COLUMNS = 128 };
 
-// How a format defines colors: as linear light, or as values that a display takes unchanged.
+// The meaning of a format's colors: linear light, or values that a display shows unchanged.
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 
 typedef struct {
@@ -315,7 +315,7 @@ typedef struct {
     bool is_animated;     // values depend on the frame
     uint32_t frame_count; // of the animation; 0: not given
     double frame_rate;    // its frames per second; 0: not given
-    double frame;         // that the options named
+    double frame;         // named by the options
     double shutter;       // the part of the time to the next frame for which the shutter is open, 0 to 1
     bool has_shutter;     // whether it is given
     ColorMeaning color_meaning;
@@ -324,8 +324,8 @@ typedef struct {
 
 void scene_free(Scene *scene); // and zeroes
 
-// Returns the distance along the view that is in focus, above 0. Without a lens, or if the point in focus
-// lies behind it, returns 0: all distances are.
+// Returns the distance along the view that is in focus, above 0. Returns 0, for all distances, if there is
+// no lens or the point in focus lies behind it.
 double camera_focal_distance(const Camera *camera);
 
 // Returns the part of the light that a surface lets through to what it shadows.
@@ -340,16 +340,16 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
 // Bounds the cost of a hostile file.
 enum { SCENE_TEXTURES_MAX = 1000 };
 
-// Returns what a material's `texture` is for the image, which materials with the same image share, or 0 if
-// the scene has too many. `layer` may be NULL, as in SceneTexture.
+// Returns the value of a material's `texture` for the image, which materials with the same image share, or 0
+// if the scene has too many. `layer` may be NULL, as in SceneTexture.
 uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, TextureContent content,
                            size_t offset);
 
 // Adds an object with a separate material.
 void scene_add_object(Scene *scene, Object object, const Material *material);
 
-// Adds PATH=VALUE to the scene's overrides, which its reader applies. `name` says in messages where it comes
-// from, and must outlive the scene.
+// Adds PATH=VALUE to the scene's overrides, which its reader applies. `name` names its origin in messages,
+// and must outlive the scene.
 void scene_add_override(Scene *scene, const char *name, const char *text);
 
 // Returns whether `path` is the file that the scene was read from or includes, or one of its images or
@@ -366,8 +366,8 @@ Color color_tint(Color color);
 Color color_absorption(Color left, double distance);
 // Returns the factors of a tint, which are 1 where it is 0.
 Color tint_factors(Color tint);
-// Makes a material pass the fraction 1 - opacity of the light from behind, unbent, and dims what the surface
-// itself shows by the opacity.
+// Makes a material pass the fraction 1 - opacity of the light from behind, undeflected, and dims what the
+// surface itself shows by the opacity.
 void material_set_opacity(Material *material, double opacity);
 
 enum { FRAMES_MAX = 1000000 };

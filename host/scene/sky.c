@@ -113,10 +113,10 @@ static bool is_even(const double *light, size_t length, size_t item)
     return fmax(before, fmax(light[item], after)) <= RATIO_MAX * fmin(before, fmin(light[item], after));
 }
 
-// Divides a line of items into parts of nearly equal light. Part i lies between edges[i] and edges[i + 1], in
-// items. Next to items with another brightness, edges lie within an item only between parts that do so as a
-// whole: a part that spans a bright item and dark ones would seldom be sampled where it is bright. `light`:
-// of each item.
+// Divides a line of items into parts of nearly equal light. Part i lies between edges[i] and edges[i + 1],
+// in items. Next to items with another brightness, edges lie within an item only between parts that do so as
+// a whole, because a part that spans a bright item and dark ones would seldom be sampled where it is bright.
+// `light` has a value per item.
 static void line_divide(const double *light, size_t length, double *edges, size_t part_count)
 {
     double sum = 0, before = 0;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A pixel of a cell of the image, which is at least one pixel wide and high.
+// Chooses a pixel of a cell of the image by a hash. The cell is at least one pixel wide and high.
 static void place_choose(const CertifySample *sample, uint32_t columns, uint32_t rows, size_t index,
                          uint32_t place[2])
 {
@@ -74,7 +74,7 @@ void certify_sample_close(CertifySample *sample)
     *sample = (CertifySample){0};
 }
 
-// The largest error of a channel; infinite if one is not finite.
+// Returns the largest error of a channel, or infinity if a channel is not finite.
 static double color_error(const double color[3], const Color *expected)
 {
     const double errors[3] = {fabs(color[0] - expected->x), fabs(color[1] - expected->y),
@@ -161,7 +161,7 @@ typedef struct {
     Uncertainty *uncertainties;
 } Examination;
 
-// Whether two answers differ in more than rounding.
+// Returns whether two answers differ by more than rounding.
 static bool is_other(const ReferencePixel *a, const ReferencePixel *b)
 {
     const double color[3] = {a->color.x, a->color.y, a->color.z};

@@ -1,64 +1,63 @@
-// A scene's image against the reference, on a sample of its pixels: which objects, shadows and paths are not
-// those of quadruple precision (113 bits) on the scene as its file says it, and how far colors are off.
+// Compares a sample of an image's pixels with quadruple precision (113 bits) on the scene exactly as its
+// file defines it: objects, shadows, paths and color errors.
 #pragma once
 
 #include "host/render/film.h"
 #include "host/verify/reference_color.h"
 
-// What the reference says of a sample of an image's pixels.
+// The reference's answers for a sample of an image's pixels.
 typedef struct {
     uint32_t width, height, light_count;
     size_t count;
     uint32_t (*places)[2]; // x, y
     ReferencePixel *pixels;
-    bool *shadows; // of each pixel, for each light
+    bool *shadows; // per pixel and light
 } CertifySample;
 
-// One pixel of each of about `count` equal parts of the image, at a place that a hash chooses; all of it if
-// it has no more. Computes on all processors. False if `stop` returned true; there is nothing to close then.
+// Computes one pixel, chosen by a hash, in each of about `count` equal parts of the image, or every pixel if
+// there are fewer. Uses all processors. Returns false, with nothing to close, if `stop` returned true.
 bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
                          size_t count, ReferencePath path, bool (*stop)(void));
 void certify_sample_close(CertifySample *sample);
 
-// What `certified` claims of a pixel that AOV_DOUBT does not list as uncertified: the object, which lights
-// reach it and the path are those of exact arithmetic on the scene's numbers and the camera's vectors in
-// double, and the color, unless a texture is on the path, is within CERTIFIED_COLOR_ERROR of its largest
-// channel, or of 1 if that is more. So a checker's cell or a shadow that is seen in a mirror is claimed by
-// the color.
+// `certified` makes this claim about each pixel that AOV_DOUBT does not list as uncertified. Its object,
+// path and the lights that reach it are those of exact arithmetic on the scene's numbers and the camera's
+// vectors in double. Its color, unless a texture is on the path, is within CERTIFIED_COLOR_ERROR of its
+// largest channel, or of 1 if that is more. The color thus covers a checker's square or a shadow that is
+// seen in a mirror.
 //
-// The counts of pixels where an image differs from that. A pixel is wrong in one way at most, the first of
-// these.
+// These are the counts of pixels that violate the claim. A pixel counts once, as the first of these faults.
 typedef struct {
-    size_t compared; // the reference decides them
+    size_t compared; // those that the reference decides
     size_t object, shadow, path, color;
-    size_t colors;      // of pixels without a texture, right or wrong
-    double right_color; // the largest error of a channel where nothing is wrong
-    double wrong_color; // and where something is
-    uint32_t worst[2];  // where the larger of these is
-    // Of wrong pixels: how far the exact ray is from the curve at which its answer changes, the most, in
-    // parts of the distance. What single may see wrong is at most some units of roundoff from it.
+    size_t colors;      // compared: pixels without a texture, right or wrong
+    double right_color; // the largest error of a channel in right pixels
+    double wrong_color; // and in wrong pixels
+    uint32_t worst[2];  // the pixel with the larger of the two
+    // The largest distance of a wrong pixel's exact ray from the curve where its answer changes, relative to
+    // the hit's distance. Faults of single precision are at most some units of roundoff from it.
     double margin;
-    // Pixels that the reference leaves uncertain, and AOV_DOUBT does not; how many of these differ from it.
+    // Pixels that are uncertain in the reference but not in AOV_DOUBT, and how many of them differ from it.
     size_t unconfirmed, contradicted;
-    // Pixels that contradict the claim: wrong or contradicted, and not uncertified; and which of them has the
-    // largest margin.
+    // Pixels that violate the claim, because they are wrong or contradicted but not uncertified, and the one
+    // with the largest margin.
     size_t wrong_decided;
     uint32_t wrong_decided_place[2];
     double wrong_decided_margin;
 } CertifyErrors;
 
-// `film` has AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color.
+// Compares a film, which needs AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color, with the sample.
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film);
 
-// Pixels that an image at `certified` leaves uncertified, and why those examined are. Witnessed: rays whose
-// starts and directions err by up to 2^-50, as double's may, give another answer in one of 16 tries. Close:
-// else a quantity that decides may be below 2^-49, in parts of the distance, as where surfaces coincide. The
-// others may be open for loose bounds alone.
+// Pixels that an image at `certified` leaves uncertified, classified by cause. Witnessed: one of 16 tries
+// with ray starts and directions off by up to 2^-50, the error of double, gives another answer. Close:
+// otherwise, a deciding quantity may be below 2^-49 relative to the distance, for example where surfaces
+// coincide. The others may be uncertified only because bounds are loose.
 typedef struct {
     size_t count, examined, witnessed, close;
 } CertifyUncertified;
 
-// Examines at most about `most`, evenly over the image, on all processors. Nothing is examined if `stop`
-// returned true.
+// Examines at most about `most` pixels, spread evenly over the image, on all processors. Examines none if
+// `stop` returned true.
 CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, size_t most, ReferencePath path,
                                        bool (*stop)(void));

@@ -39,7 +39,7 @@ Object *verify_objects(const VerifyRun *run, const Scene *scene)
     return objects;
 }
 
-// Whether the tier leaves open that the ray hits the target.
+// Returns whether the tier permits both a hit and a miss of the target.
 static bool is_open(const VerifyRun *run, const VerifyTarget *target, const ReferenceHit *exact)
 {
     const double u = verify_roundoff(run);
@@ -49,7 +49,7 @@ static bool is_open(const VerifyRun *run, const VerifyTarget *target, const Refe
     return exact->margin <= 16 * u * target->feature_radius;
 }
 
-// What t may be off, in its own unit.
+// Returns the permitted error of t, in units of t.
 static double bound_of(const VerifyRun *run, const VerifyTarget *target, const ReferenceHit *exact,
                        double length, const VerifyLimits *limits)
 {
@@ -144,7 +144,7 @@ void verify_check_ray(VerifyRun *run, const Object *objects, size_t count, const
     run->result->wrong += wrong;
 }
 
-// How far a hit's point may be off the surface.
+// Returns the permitted distance of a hit point from the surface.
 static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length,
                             double bounding_radius)
 {
@@ -154,7 +154,7 @@ static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t,
     return 2 * verify_ulp(run, t) * length + 8 * u * bounding_radius;
 }
 
-// The angle between two nearly parallel vectors, the second a unit vector.
+// Returns the angle between two nearly parallel vectors. The second is a unit vector.
 static double turned_by(Quad3 normal, Quad3 exact)
 {
     Vector3 unit = quad3_rounded(exact);
@@ -174,7 +174,7 @@ void verify_check_surface(VerifyRun *run, const Object *object, const TraceRay *
     run->result->off_surface += !(distance <= bound);
     run->result->worst_position_ratio = fmax(run->result->worst_position_ratio, (double)distance / bound);
 
-    // at an edge the normal may be that of any of the sheets that meet there
+    // at an edge the normal may be that of any adjacent sheet
     Quad3 normal = quad3(verify_vector(hit->normal));
     double least_part = INFINITY;
     for (int i = 0; i < surface.count; i++) {

@@ -1,33 +1,33 @@
-// What the tiers require of hits, against the reference.
+// Checks hits against the reference, within the bounds of the tiers.
 #pragma once
 
 #include "host/verify/rays.h"
 #include "host/verify/reference.h"
 #include "host/verify/run.h"
 
-// An object as the renderer has it, seen from where rays start.
+// An object as the renderer stores it, relative to the rays' origin.
 typedef struct {
     Object object;
-    double distance;                        // of the rays' origin from the object's center
-    double bounding_radius, feature_radius; // as of ReferenceSurface
+    double distance;                        // from the rays' origin to the object's center
+    double bounding_radius, feature_radius; // those of ReferenceSurface
 } VerifyTarget;
 
-// Relative to an eye, in the numbers of the precision at work.
+// Returns the object relative to an eye, rounded to the precision at work.
 VerifyTarget verify_target(const VerifyRun *run, const Object *object, Vector3 eye);
 
-// What the ray of a pixel should hit of a target.
+// Returns the exact hit of a target by the ray of a pixel.
 ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, size_t pixel);
-// Checks hit or miss and the distance at a pixel of an image of the target alone; returns what is exact.
+// Checks hit or miss and the distance at a pixel of an image of the target alone. Returns the exact hit.
 ReferenceHit verify_check_pixel(VerifyRun *run, const VerifyTarget *target, const Film *image, size_t pixel);
 
-// The objects of a scene in the numbers of the precision at work; the caller frees them.
+// Returns the objects of a scene rounded to the precision at work. The caller frees them.
 Object *verify_objects(const VerifyRun *run, const Scene *scene);
 ReferenceRay verify_reference_ray(const TraceRay *ray);
 
-// Whether the ray has to hit or to miss as it does exactly, however near the boundary.
+// Returns whether the ray must hit or miss exactly as the reference does, however near the boundary.
 bool verify_is_decided(const VerifyRun *run, const VerifyTestRay *test);
-// What the tier requires of a ray at an object: the exact hit, or the touch that counts as one; whether hit
-// or miss is open by the margin; and what t may be off, in its own unit.
+// The tier's requirements for a ray and an object: the exact hit, or the tangent that counts as one, whether
+// the margin permits both hit and miss, and the permitted error of t in units of t.
 typedef struct {
     ReferenceHit exact;
     bool open;
@@ -36,8 +36,8 @@ typedef struct {
 
 VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const VerifyTestRay *test,
                                ReferenceHit exact);
-// Checks what a ray hit of objects. Where they meet, as at an edge of a mesh, any of them may be reported.
+// Checks the hit of a ray. Where objects touch, as at an edge of a mesh, any of them may be reported.
 void verify_check_ray(VerifyRun *run, const Object *objects, size_t count, const VerifyTestRay *test,
                       const TraceHit *hit);
-// Checks how far a hit's point, o + t d, is off its object's surface, and its normal.
+// Checks the distance of a hit point, o + t d, from its object's surface, and checks its normal.
 void verify_check_surface(VerifyRun *run, const Object *object, const TraceRay *ray, const TraceHit *hit);

@@ -76,7 +76,7 @@ static TraceRay ray_toward(Vector3 origin, Vector3 target)
     return ray_along(origin, vector_subtract(target, origin));
 }
 
-// A point of the unit circle, by its rational parametrization.
+// Computes a point of the unit circle by its rational parametrization.
 static void on_circle(double turn, double *cosine, double *sine)
 {
     unsigned quarter = (unsigned)(turn * 4);
@@ -104,7 +104,7 @@ TraceRay family_disc_rim(uint64_t i)
     return ray_toward(combine(distances[i % 3], away, 0, nowhere, 0, nowhere, center), target);
 }
 
-// Toward a place on an edge, a corner and a place in a face of the room, in turn.
+// Aims at a point on an edge, a corner and a point in a face of the room, in turn.
 TraceRay family_in_room(uint64_t i)
 {
     unsigned axis = random_choice(5, i, 0, 3);
@@ -116,7 +116,7 @@ TraceRay family_in_room(uint64_t i)
     return ray_toward((Vector3){0.1, 0.2, 0.3}, (Vector3){target[0], target[1], target[2]});
 }
 
-// In turn from inside toward a rim, and from outside a little inward of it, so that no ray misses.
+// Alternates rays from inside toward a rim with rays from outside slightly inward of it, so that none miss.
 TraceRay family_cylinder_rim(uint64_t i)
 {
     const Vector3 base = {5, 5, 5}, axis = {1.0 / 3, 2.0 / 3, 2.0 / 3};
@@ -175,7 +175,7 @@ void scene_add_triangle(Scene *scene, const Vector3 vertices[3])
     array_push(scene->objects, object);
 }
 
-// Corner i has the signs of its bits.
+// Returns corner i, whose coordinates have the signs of the bits of i.
 static Vector3 room_corner(unsigned i)
 {
     return (Vector3){i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1};
@@ -194,7 +194,8 @@ void scene_triangle_room(Scene *scene)
     }
 }
 
-// Off the unit sphere by up to a fifth, by the vertex' own bits: the same wherever it is met.
+// Moves a vertex off the unit sphere by up to 20 %. A hash of its coordinates seeds the offset, so all
+// triangles that share the vertex agree.
 static Vector3 jittered(Vector3 vertex)
 {
     const double parts[] = {vertex.x + 0.0, vertex.y + 0.0, vertex.z + 0.0};
@@ -212,7 +213,7 @@ typedef struct {
     Vector3 corners[3];
 } Corners;
 
-// One of the 4^depth parts of a triangle on the sphere: each two bits of `path`, from the highest, say which.
+// Returns one of the 4^depth parts of a spherical triangle, which pairs of bits of `path` select.
 static Corners icosphere_part(Corners whole, unsigned depth, unsigned path)
 {
     while (depth-- > 0) {
@@ -256,8 +257,8 @@ void scene_icosphere(Scene *scene)
         scene_add_triangle(scene, icosphere_triangle(i).corners);
 }
 
-// From 100 points near the center, less than 0.3 away, so within the mesh, toward places on edges (two of
-// five), vertices (two) and in faces (one).
+// Starts from 100 points less than 0.3 from the center, so within the mesh, and aims at points on edges (two
+// of five), at vertices (two) and at points in faces (one).
 TraceRay family_from_within(uint64_t i)
 {
     unsigned point = random_choice(31, i, 0, 100);

@@ -1,5 +1,5 @@
-// Pseudorandom rays and meshes. All but scene_far_sphere are computed by + - * / and sqrt alone, which IEEE
-// 754 rounds correctly, so that their bits are the same on every machine.
+// Pseudorandom rays and meshes. All but scene_far_sphere use only + - * / and sqrt, which IEEE 754 rounds
+// correctly, so their bits are the same on every machine.
 #pragma once
 
 #include "host/render/trace.h"
@@ -9,8 +9,8 @@
 
 typedef TraceRay (*RayFamily)(uint64_t index);
 
-// Counter-based random numbers: dimension `dimension`, 0 to 31, of sample `index` of sequence `seed`. From 0
-// to 1; from -1 to 1; of three dimensions a point of the cube from -1 to 1, and a unit vector.
+// Counter-based random numbers in dimension `dimension`, 0 to 31, of sample `index` of sequence `seed`: from
+// 0 to 1, from -1 to 1, a point of the cube from -1 to 1 and a unit vector (these two of three dimensions).
 double random_at(unsigned seed, uint64_t index, unsigned dimension);
 double random_symmetric(unsigned seed, uint64_t index, unsigned dimension);
 Vector3 random_in_cube(unsigned seed, uint64_t index, unsigned first_dimension);
@@ -24,12 +24,12 @@ TraceRay family_across_torus(uint64_t index);     // T3
 TraceRay family_beside_sliver(uint64_t index);    // M4
 TraceRay family_from_within(uint64_t index);      // M1
 
-// An empty scene with a camera and one material.
+// Returns a scene with a camera, one material and no objects.
 Scene scene_empty(void);
 void scene_add_triangle(Scene *scene, const Vector3 vertices[3]);
 void scene_triangle_room(Scene *scene); // the cube from -1 to 1
-void scene_icosphere(Scene *scene);     // 20480 triangles, radii off by up to a fifth
-// A sphere of radius 2 around a center far away, 50 by 50 quadrilaterals.
+void scene_icosphere(Scene *scene);     // 20480 triangles, radii off by up to 20 %
+// Adds a sphere of radius 2 around a distant center, made of 50 by 50 quadrilaterals.
 void scene_far_sphere(Scene *scene);
 extern const Vector3 far_sphere_center;
 extern const Vector3 sliver_corners[3]; // M4's triangle

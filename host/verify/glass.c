@@ -7,8 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// The signature of the light transport path that passes through each object of a list and ends at the last,
-// by the rule in kernels/types.h.
+// Returns the signature of the light transport path that passes through each object of a list and ends at
+// the last, by the rule in kernels/types.h.
 static uint32_t passed_path(const uint32_t *objects, size_t count)
 {
     const uint32_t events = 8, refracted = 2;
@@ -18,8 +18,8 @@ static uint32_t passed_path(const uint32_t *objects, size_t count)
     return path;
 }
 
-// A red sphere in a coat of glass thinner than most epsilons: all that is seen through the glass is the inner
-// sphere, at any scale.
+// Checks a red sphere in a coat of glass thinner than most epsilons. At any scale only the inner sphere is
+// visible through the glass.
 void verify_nested_spheres(VerifyRun *run)
 {
     static const double ratios[] = {1 + 4e-5, 1 + 0x1p-16}, scales[] = {1, 1000, 0.001};
@@ -41,7 +41,7 @@ void verify_nested_spheres(VerifyRun *run)
         size_t seen = 0;
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
             if (image.object[i] != 1) {
-                // at the rim the coat may be missed, but the sphere behind it may not be seen without it
+                // at the rim a ray may miss the coat, but it must not see the sphere without it
                 ReferenceHit exact = verify_pixel_hit(&coat, &image, i);
                 bool certain = exact.found && exact.margin > 1e-5 * coat.feature_radius;
                 run->result->wrong += image.object[i] != UINT32_MAX || certain;
@@ -76,7 +76,7 @@ static const char *const matched[] = {
     "  - sphere: {center: [0, 0, 0], radius: 1, material: glass}\n",
     "  - box: {min: [-0.9, -0.8, -0.7], max: [0.7, 0.8, 0.9], material: glass}\n"};
 
-// How far a pixel's tile is from the next, in pixels.
+// Returns the distance of a pixel's hit point from the nearest edge between tiles, in pixels.
 static double edge_distance(const Film *empty, size_t pixel)
 {
     const double *d = &empty->ray[3 * pixel];
@@ -88,7 +88,7 @@ static double edge_distance(const Film *empty, size_t pixel)
     return nearest;
 }
 
-// Rays into a closed body of index 1: they come out of it again, and keep their direction.
+// Checks that rays into a closed body of index 1 leave it and keep their direction.
 static void check_straight_rays(VerifyRun *run, const char *object, unsigned seed)
 {
     enum { COUNT = 20000 };
@@ -130,11 +130,11 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
         Quad3 refracted = quad3(verify_vector(second[i].refracted_direction));
         Vector3 off = quad3_rounded(quad3_subtract(refracted, d));
         double largest = fmax(fabs(off.x), fmax(fabs(off.y), fabs(off.z)));
-        // two cosines, roots each, and a unit vector, a root and a quotient
+        // an error of two cosines with a root each, and of a unit vector with a root and a quotient
         double bound = run->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
         verify_note(run, largest / verify_roundoff(run), bound, "u");
     }
-    // most of the places aimed at lie within the body
+    // most of the targets lie within the body
     run->result->wrong += entered < COUNT / 2;
     free(rays);
     free(inner);
@@ -142,7 +142,7 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     free(second);
 }
 
-// Glass of index 1 is not there.
+// Checks that glass of index 1 is invisible.
 void verify_matched_glass(VerifyRun *run)
 {
     Scene without = matched_scene("");

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 
-// Where on the unit sphere the highlight is seen.
+// Returns the point of the unit sphere where the highlight appears.
 static Vector3 highlight_middle(Vector3 eye, Vector3 to_light)
 {
     Vector3 middle = vector_normalize(vector_add(vector_normalize(eye), to_light));
@@ -30,7 +30,7 @@ void verify_highlights(VerifyRun *run)
                  "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
                  power);
         Scene scene = verify_scene(text);
-        // whole, lit from the side and partly behind; closely, lit from next to the eye
+        // the whole sphere is lit from the side and partly behind, the close-up from next to the eye
         Vector3 direction = vector_normalize(closely ? light_beside : light_behind);
         scene.lights.items[0].direction = direction;
         const Vector3 center = {0, 0, 0};
@@ -54,12 +54,12 @@ void verify_highlights(VerifyRun *run)
             Quad3 normal = quad3_unit(quad3(verify_vector(image.normal + 3 * i)));
             Quad3 ray = quad3_unit(quad3(verify_vector(image.ray + 3 * i)));
             Quad facing = quad3_dot(normal, to_light);
-            // whether light that grazes reaches the surface at all is the shadow's matter
+            // whether grazing light reaches the surface is for the shadow tests
             if (quad_absolute(facing) < 16 * verify_roundoff(run)) continue;
             Quad exact = reference_highlight(normal, to_light, quad3_scale(ray, -1), power);
             verify_note(run, (double)quad_absolute(value - exact), bound, "of 1");
         }
-        // closely, the highlight's middle lies in the image's
+        // in the close-up the highlight is in the middle of the image
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);
         film_free(&image);
         scene_free(&scene);

@@ -3,7 +3,7 @@
 #include "host/verify/checks.h"
 #include <math.h>
 
-// The first row, from the bottom, whose pixel of the column hits nothing; counts what is hit above it.
+// Returns the first row from the bottom whose pixel in the column hits nothing; counts hits above as wrong.
 static uint32_t column_horizon(VerifyRun *run, const Film *image, uint32_t column)
 {
     uint32_t row = image->height;
@@ -14,13 +14,13 @@ static uint32_t column_horizon(VerifyRun *run, const Film *image, uint32_t colum
     return row;
 }
 
-// From the bottom up to the horizon the ground's distance never falls, and the horizon is where it is
-// exactly.
+// Checks that the ground's distance never decreases from the bottom up to the horizon, and that the horizon
+// is where the exact one is.
 void verify_ground_horizon(VerifyRun *run)
 {
     static const struct {
         double fov;  // in degrees
-        double rise; // slope of the way ahead; the horizon's is -sqrt(2e-6)
+        double rise; // slope of the view direction; the horizon's is -sqrt(2e-6)
     } views[] = {{60, 0}, {0.5, 0}, {0.02, -0.0014142}};
     Scene scene = verify_scene("objects:\n  - sphere: {center: [0, -1e6, 0], radius: 1e6}\n");
     const Vector3 eye = {0, 1, 0};
@@ -46,8 +46,8 @@ void verify_ground_horizon(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Seen horizontally the plane ends in every column at the image's middle, whether that lies on a row of
-// pixels or between two.
+// Checks that a plane seen horizontally ends at the image's middle in every column, whether the middle lies
+// on a row of pixels or between two.
 void verify_plane_horizon(VerifyRun *run)
 {
     Scene scene = verify_scene("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");

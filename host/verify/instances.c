@@ -9,7 +9,7 @@
 
 enum { HALF_SIDE = 4, SIDE = 2 * HALF_SIDE, BALL_TRIANGLES = 6 * SIDE * SIDE * 2 };
 
-// A point of a cube's face, moved to the unit sphere. Edges have the same points in both faces.
+// Returns a point of a cube's face, moved to the unit sphere. Faces share the points of their common edge.
 static Vector3 ball_point(int face, int column, int row)
 {
     const double across = column - HALF_SIDE, along = row - HALF_SIDE,
@@ -18,7 +18,7 @@ static Vector3 ball_point(int face, int column, int row)
     return vector_normalize(points[face / 2]);
 }
 
-// A closed mesh around the origin, off the center of its box.
+// Returns a closed mesh around the origin, which is not the center of its box.
 static Mesh ball_make(void)
 {
     Mesh mesh = {.vertices = memory_allocate(3 * (size_t)BALL_TRIANGLES, sizeof *mesh.vertices),
@@ -40,7 +40,7 @@ static Mesh ball_make(void)
     return mesh;
 }
 
-// The distance of a point from the plane of an instance's triangle, positive on the ball's inside.
+// Returns the distance of a point from the plane of an instance's triangle, positive inside the ball.
 static double height_within(const Scene *scene, size_t part, Quad3 point)
 {
     const MeshTriangle triangle = mesh_triangle_at(scene->meshes.items, scene->objects.items, part);
@@ -62,7 +62,7 @@ static void check_hit(VerifyRun *run, const Scene *scene, const TraceRay *ray, c
     }
     const Vector3 origin = verify_vector(ray->origin), direction = verify_vector(ray->direction);
     const Quad3 at_t = quad3_add(quad3(origin), quad3_scale(quad3(direction), hit->t));
-    // 32 u of the numbers times the transform's condition, which is 3 at most here
+    // 32 u of the numbers times the transform's condition, at most 3 here
     const double bound = 96 * verify_roundoff(run) * (vector_length(origin) + hit->t + size);
     if (run->tier == TIER_A) return;
     run->result->off_surface +=
@@ -71,7 +71,7 @@ static void check_hit(VerifyRun *run, const Scene *scene, const TraceRay *ray, c
     run->result->leaks += height_within(scene, hit->object, quad3(verify_vector(hit->reflected_origin))) <= 0;
 }
 
-// From inside a ball that an instance places, no ray gets out, nor does any that is reflected there.
+// Checks that no ray from inside an instance of a ball leaves it, directly or after reflections.
 void verify_instances(VerifyRun *run)
 {
     enum { COUNT = 1 << 14 };

@@ -1,10 +1,10 @@
-// A scene of every shape, scaled, mirrored and turned: the image may change in the known way only.
+// A scene of every shape, scaled, mirrored and turned. The image may change only in the known way.
 #include "host/base/array.h"
 #include "host/compile/transform.h"
 #include "host/verify/run.h"
 #include <math.h>
 
-// The eye is the origin, so that rays can be given to the scene as it is.
+// The eye is the origin, so that rays can be traced in the scene unchanged.
 static const char every_shape[] =
     "background: [0.1, 0.15, 0.25]\nambient: [0.08, 0.07, 0.06]\n"
     "lights:\n"
@@ -51,7 +51,7 @@ static Scene every_shape_scene(void)
     return scene;
 }
 
-// Counts the objects of a scene that no pixel shows: two empty images would be alike.
+// Counts the objects that no pixel shows, because two empty images would agree.
 static void demand_every_object(VerifyRun *run, const Scene *scene, const Film *image)
 {
     for (size_t object = 0; object < scene->objects.count; object++) {
@@ -86,7 +86,7 @@ static bool pixels_agree(const Film *a, size_t i, const View *view, size_t k)
     return same;
 }
 
-// Counts the pixels of two images that are not each other's, bit for bit but for the sign of a zero.
+// Counts the pixels that differ between two images, bit for bit except for the sign of a zero.
 static void compare(VerifyRun *run, const Film *a, const View *view)
 {
     for (size_t i = 0; i < film_pixel_count(a); i++) {
@@ -114,13 +114,13 @@ void verify_scaled_scenes(VerifyRun *run)
     film_free(&image);
 }
 
-// Whether a ray, or one turned by a few roundings, meets the object.
+// Returns whether a ray, or one turned by a few roundings, hits the object.
 static bool meets_nearby(VerifyRun *run, Renderer *opened, const double direction[3], uint32_t object)
 {
     enum { COUNT = 27 };
-    // A tier leaves open 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 (is_open): as
-    // an angle 2 u whatever the distance, or up to 8 u. Either scene may be off by that, and each by as much
-    // for the rounding of its pixels' rays.
+    // A tier leaves 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 open (is_open). As an
+    // angle that is 2 u at any distance, or up to 8 u. Each of the two scenes may be off by that, and by as
+    // much again through the rounding of its pixels' rays.
     const double turn = 4 * 8 * verify_roundoff(run);
     TraceRay rays[COUNT];
     TraceHit hits[COUNT];
@@ -147,8 +147,8 @@ static bool shadow_edge_beside(const Film *image, size_t pixel, size_t light)
     return false;
 }
 
-// The scene with its axes exchanged. An object may differ where the other one is met within a few roundings
-// of the ray, a shadow at its edge; where neither does, colors are the same within 1e-5.
+// Compares the scene with its axes exchanged. The object may differ if a ray within a few roundings hits the
+// other one, and a shadow may differ at its edge. All other pixels must have the same colors within 1e-5.
 static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, const Film *turned)
 {
     for (size_t i = 0; i < film_pixel_count(image); i++) {
@@ -165,7 +165,7 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
     }
 }
 
-// Without checkers: the edge between two squares belongs to one of them, in the mirror to the other.
+// Returns the scene without checkers: an edge of squares belongs to one, and in the mirror to the other.
 static Scene unchecked_scene(void)
 {
     Scene scene = every_shape_scene();
@@ -174,8 +174,8 @@ static Scene unchecked_scene(void)
     return scene;
 }
 
-// Nor any mirrors and glass, which show a rounding enlarged, nor a cone's tip, around which the normal turns
-// by as much as the point is off, over how near the tip is.
+// Returns the scene without checkers, without mirrors and glass, which magnify roundings, and without the
+// tip of a cone, around which the normal turns by the point's error over its distance from the tip.
 static Scene plain_scene(void)
 {
     Scene scene = unchecked_scene();

@@ -1,4 +1,4 @@
-// Checks of triangles, and of the BVH, that no table holds.
+// Checks of triangles and of the BVH that are not in the tables.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// From inside a mesh where neighboring floats are 1/64 apart no ray gets out.
+// Checks that no ray leaves a mesh from inside, where adjacent floats are 1/64 apart.
 void verify_far_mesh(VerifyRun *run)
 {
     enum { COUNT = 1 << 16, BATCHES = 16 };
@@ -33,8 +33,8 @@ void verify_far_mesh(VerifyRun *run)
     free(hits);
 }
 
-// The same triangle at every power of two, all in one corner: through the middle of each the ray meets that
-// one first in the list, and the distances are each other's multiples, bit for bit.
+// Checks one triangle at every power of two, all at one corner. A ray through the middle of each hits that
+// one, the first in the list of those it crosses. The distances are each other's multiples, bit for bit.
 void verify_scale_ladder(VerifyRun *run)
 {
     enum { SMALLEST = -40, LARGEST = 40, COUNT = LARGEST - SMALLEST + 1 };
@@ -62,7 +62,7 @@ void verify_scale_ladder(VerifyRun *run)
     }
 }
 
-// Seen at half a degree the sliver is hit nowhere but between its own corners.
+// Checks that a sliver seen at half a degree is hit only between its corners.
 void verify_within_triangle(VerifyRun *run)
 {
     enum { COUNT = 100000 };
@@ -96,7 +96,7 @@ void verify_within_triangle(VerifyRun *run)
     free(hits);
 }
 
-// Seen face to face from near, a triangle's distance is its plane's, however far its corners.
+// Checks that a triangle seen face on from near has its plane's distance, however far its corners are.
 void verify_facing_triangle(VerifyRun *run)
 {
     enum { COUNT = 1000 };
@@ -137,14 +137,14 @@ static bool is_refused(const char *vertex)
     return verify_is_refused(text);
 }
 
-// Triangles without area are never hit and change nothing about the others; what is not a number is refused.
+// Checks that degenerate triangles are never hit or affect others, and that NaN and infinity are refused.
 void verify_degenerate_meshes(VerifyRun *run)
 {
     enum { SOUND = 200 };
     const size_t count = 4000;
     static const Vector3 degenerate[][3] = {
         {{0, 0, 0}, {0, 0, 0}, {1, 1, 1}},       // a vertex twice
-        {{0, 0, 0}, {0.5, 0.5, 0.5}, {1, 1, 1}}, // in one line
+        {{0, 0, 0}, {0.5, 0.5, 0.5}, {1, 1, 1}}, // collinear
         {{0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}, {0.25, 0.25, 0.25}},
         {{-1, 0.5, 0}, {1, 0.5, 0}, {0, 0.5, 0}},
     };
@@ -181,7 +181,7 @@ void verify_degenerate_meshes(VerifyRun *run)
 
 enum { M6_TRIANGLES = 10000, M6_OTHERS = 20, M6_RAYS = 1 << 16, M6_BATCHES = 16 };
 
-// Triangles, and some of every bounded form of every shape.
+// Returns a scene of triangles and several objects of every bounded form of every shape.
 static Scene m6_scene(void)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
@@ -198,7 +198,7 @@ static Scene m6_scene(void)
     return scene;
 }
 
-// A place far from a triangle in its plane, from which it is seen edge-on.
+// Returns a point far from a triangle, in its plane, from which it is seen edge-on.
 static Vector3 m6_point_in_plane(const Vector3 vertices[3], uint64_t index)
 {
     Vector3 ab = vector_subtract(vertices[1], vertices[0]), ac = vector_subtract(vertices[2], vertices[0]);
@@ -207,8 +207,8 @@ static Vector3 m6_point_in_plane(const Vector3 vertices[3], uint64_t index)
     return vector_add(vertices[0], vector_scale(vector_normalize(along), 3));
 }
 
-// A quarter of them at random, a quarter along an axis in the plane of a triangle's corner, a quarter at
-// corners, every other one of triangles seen edge-on, a quarter from where another ray was reflected.
+// Makes rays in turn: at random, along an axis through a triangle's corner, toward a corner (every other one
+// of a triangle seen edge-on) and from where another ray was reflected.
 static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, const TraceHit *reflected,
                     TraceRay *rays)
 {
@@ -236,8 +236,8 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
     }
 }
 
-// The BVH gives what every object in turn gives, and whether anything is hit before a distance says the
-// same as what is hit first: cut an ulp before it and an ulp behind it.
+// Checks that the BVH returns the same hits as a test of every object, and that occlusion before a distance
+// agrees with the closest hit when tmax is an ulp before the hit and an ulp behind it.
 void verify_bvh(VerifyRun *run)
 {
     TraceRay *rays = memory_allocate(M6_RAYS, sizeof *rays);

@@ -9,7 +9,7 @@
 
 enum { AROUND = 2048, STEEP = 24, ANGLES = 2 * AROUND + 1 + STEEP };
 
-// From inside glass of index 1.5 through the plane z = 0: sines around the critical angle's 2/3, and near 1.
+// Makes rays from inside glass of index 1.5 through z = 0, with sines around the critical 2/3 and near 1.
 static void angles_make(const VerifyRun *run, TraceRay *rays)
 {
     for (int i = 0; i < ANGLES; i++) {
@@ -20,7 +20,7 @@ static void angles_make(const VerifyRun *run, TraceRay *rays)
     }
 }
 
-// All is reflected where the squared cosine behind the surface is below 0, unless that is within 16 u.
+// Checks for total reflection where the squared cosine behind the surface is negative, except within 16 u.
 void verify_critical_angle(VerifyRun *run)
 {
     TraceRay *rays = memory_allocate(ANGLES, sizeof *rays);
@@ -76,7 +76,7 @@ static bool is_orthonormal(const Vector3 axes[3])
     return true;
 }
 
-// Cameras whose `up` says nothing get a frame all the same; those that see nothing are refused.
+// Checks that cameras with a useless `up` get a frame, and that cameras that see nothing are refused.
 void verify_camera_frames(VerifyRun *run)
 {
     static const char *const refused[] = {

@@ -1,5 +1,5 @@
-// Images of what is far, thin or pointed: each pixel's hit or miss against the exact one for the ray that
-// was traced.
+// Images of distant, thin or pointed objects. Each pixel's hit or miss is compared with the exact one for
+// the ray that was traced.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
@@ -21,7 +21,7 @@ static void check_radial_brightness(VerifyRun *run, const Film *image)
             int64_t column = (int64_t)floor(side / 2.0 + x * step),
                     row = (int64_t)floor(side / 2.0 + y * step);
             int64_t dx = 2 * column + 1 - side, dy = 2 * row + 1 - side;
-            // the pixels along the way are not quite on it: only those farther out than all before count
+            // pixels along the way are not quite on it, so only those farther out than all before count
             if (dx * dx + dy * dy <= farthest) continue;
             farthest = dx * dx + dy * dy;
             double value = image->color[3 * (size_t)(row * side + column)];
@@ -31,7 +31,7 @@ static void check_radial_brightness(VerifyRun *run, const Film *image)
     }
 }
 
-// Each pixel; and Lambert's cosine for light from the eye's side, of which the 99.9th percentile counts.
+// Checks each pixel, and the 99.9th percentile of errors of Lambert's cosine for light from the eye's side.
 static void check_fringe(VerifyRun *run, const Film *image, const VerifyTarget *sphere)
 {
     float *errors = memory_allocate(film_pixel_count(image), sizeof *errors);
@@ -42,7 +42,7 @@ static void check_fringe(VerifyRun *run, const Film *image, const VerifyTarget *
         double shade = fmax((double)exact.normal.z, 0);
         errors[count++] = (float)fabs(image->color[3 * i] - shade);
     }
-    bool near = sphere->distance <= 1e3; // farther away t's 8 ulp exceed the bound of B
+    bool near = sphere->distance <= 1e3; // farther away the 8 ulp of t exceed the bound of B
     if (count > 0 && (near || run->tier > TIER_B))
         verify_note(run, percentile_999(errors, count), run->tier == TIER_B ? 2e-3 : 1e-5, "of 1");
     free(errors);
@@ -74,7 +74,7 @@ static void check_pixels(VerifyRun *run, const Film *image, const Scene *scene)
         verify_check_pixel(run, &target, image, i);
 }
 
-// Every column has a stretch of pixels without a gap.
+// Checks that every column has one stretch of pixels without a gap.
 void verify_wire(VerifyRun *run)
 {
     Scene scene =
@@ -96,8 +96,8 @@ void verify_wire(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Seen along the axis, the light behind the eye, the tip is as bright as the side around it. From the side
-// only finite values are required.
+// Checks that, with the eye on the axis and the light behind it, the tip is as bright as the side around it.
+// From the side only finite values are required.
 void verify_apex(VerifyRun *run)
 {
     static const struct {
@@ -151,7 +151,7 @@ void verify_far_torus(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Along the tangents the distance says little; the point has to lie on the torus all the same.
+// Checks hits along tangents, where t has little meaning but the point must lie on the torus.
 void verify_tangent_circle(VerifyRun *run)
 {
     static const double heights[] = {0.25, 0.25 - 0x1p-26, 0.25 + 0x1p-25};
@@ -174,7 +174,7 @@ void verify_tangent_circle(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Pixels still to be looked at, and those that were.
+// Pixels that are pending and those that were visited.
 typedef struct {
     const Film *image;
     uint32_t (*pending)[2]; // column, row
@@ -205,7 +205,7 @@ static void flood_run(Flood *flood)
     }
 }
 
-// How many parts the hit pixels fall into, where those that touch at a corner belong together.
+// Returns the number of connected parts of the hit pixels. Pixels that touch at a corner are connected.
 static size_t count_parts(const Film *image)
 {
     size_t parts = 0, pixels = film_pixel_count(image);
@@ -222,8 +222,8 @@ static size_t count_parts(const Film *image)
     return parts;
 }
 
-// At 30 degrees the ring is half a pixel thick, so that the exact one also has gaps; the second image, where
-// it is 1.4 pixels thick, has none.
+// Checks a ring. At 30 degrees it is half a pixel thick, so the exact image has gaps. In the second image it
+// is 1.4 pixels thick and must have none.
 void verify_thin_ring(VerifyRun *run)
 {
     static const struct {

@@ -1,7 +1,7 @@
 #include "host/base/array.h"
 #include "host/verify/rays.h"
 
-// What a row does not name is 0.
+// Members that a row does not name are 0.
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 #define LIMITS(...)                                                                                          \
@@ -43,7 +43,7 @@ static const VerifyRay s3[] = {
     {{0}, {0.05986428373294903, 0.039896356690924686, 0.9974089172731171}},
     {{0}, {0.05986468126672301, 0.03989635573805019, 0.9974088934512548}},
 };
-// by slope; at B the eye's height may be off by 0.25
+// Limits by slope. At tier B the eye's height may be off by 0.25.
 #define S4_LIMITS(slope, strict) LIMITS(.ulps = {0, 0, strict, strict}, .within[TIER_B] = 0.25 / (slope))
 static const VerifyRay s4[] = {
     {{0, 1, 0}, {0, -1, 0}, .limits = S4_LIMITS(1, 8)},

@@ -29,7 +29,7 @@ static double nudged(const VerifyRun *run, double value, double toward)
     return verify_is_double(run) ? nextafter(value, toward) : (double)nextafterf((float)value, (float)toward);
 }
 
-// Adds the ray and its neighbors. A component of 0 has only subnormal neighbors, and stays.
+// Adds the ray and its neighbors. A component of 0 is not changed because its neighbors are subnormal.
 static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const VerifyRays *set,
                          const VerifyRay *given)
 {
@@ -72,7 +72,7 @@ static void check_surface(VerifyRun *run, const Object *objects, const TraceRay 
     if (verify_is_hit(hit)) verify_check_surface(run, &objects[hit->object], ray, hit);
 }
 
-// Rays by numbers: hits do not depend on the rays' order.
+// Checks a table of rays, including that hits do not depend on the order of the rays.
 static void run_numbers(VerifyRun *run, const VerifyRays *set, const Scene *scene)
 {
     VerifyTestRays tests = verify_test_rays(run, set);

@@ -7,7 +7,7 @@
 SHAPE_LIST(SHAPE_DECLARE)
 #undef SHAPE_DECLARE
 
-// By ShapeType, which follows SHAPE_LIST; a mesh is hit by its triangles.
+// Indexed by ShapeType, which follows SHAPE_LIST. A mesh is tested as its triangles.
 #define SHAPE_ROW(feature, Type, name, names) &reference_##name,
 static const ReferenceShape *const shapes[SHAPE_COUNT] = {SHAPE_LIST(SHAPE_ROW)};
 #undef SHAPE_ROW
@@ -99,8 +99,8 @@ ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
     const ReferenceHit hit = hit_from(object, ray);
     if (!hit.found || quad_absolute(hit.t) * quad3_length(ray->direction) <= 1024 * hit.curvature_radius)
         return hit;
-    // The relative error of the roots grows with the square of the distance over the radius, so a distant hit
-    // is computed again with itself as the ray's origin.
+    // The relative error of the roots grows with the square of the distance over the radius, so a distant
+    // hit is recomputed with the hit point as the ray's origin.
     const ReferenceRay nearby = {reference_point(ray, hit.t), ray->direction, ray->tmin - hit.t,
                                  ray->tmax - hit.t};
     ReferenceHit again = hit_from(object, &nearby);

@@ -5,8 +5,8 @@
 #include <float.h>
 #include <math.h>
 
-// How far a point of a surface may be off it, in parts of the numbers that it was computed from: far over the
-// rounding of quadruple precision, far under that of double.
+// The largest distance of a computed point from its surface, relative to the numbers it was computed from.
+// It is far above the rounding of quadruple precision and far below that of double.
 #define START_PART ((Quad)0x1p-90L)
 
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
@@ -30,11 +30,11 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
     return (ReferenceRay){quad3(camera->position), direction, 0, (Quad)FLT_MAX};
 }
 
-// A point of a surface, the unit normals that face the eye, of shading and of the geometry, and the unit
-// direction to the eye.
+// A point of a surface, its unit shading and geometric normals, which face the eye, and the unit direction
+// to the eye.
 typedef struct {
     Quad3 point, normal, geometric, to_eye;
-    Quad scale; // how far the point is from the ray's origin
+    Quad scale; // the point's distance from the ray's origin
     Quad start; // the surface is at most this far from the point
     Quad3 lift; // from the point to the start of rays to lights
     bool is_lifted;
@@ -52,8 +52,8 @@ static Quad square_of(Quad coordinate, double size, Quad *margin)
     return QUAD_CALL(floor)(place);
 }
 
-// Solids are cut from a checkered block of the world, the cube found a 1024th of its side behind the surface,
-// so that a face between two cubes has one color; planes and discs have separate squares.
+// Returns a checker's color. Solids are cut from a checkered block of the world, 1/1024 of a side behind the
+// surface so that a face between two cubes has one color. Planes and discs have separate squares.
 static Color checker_color(const Object *object, const Material *material, const ReferenceHit *hit,
                            Quad3 point, Quad *margin)
 {
@@ -74,7 +74,7 @@ static Color checker_color(const Object *object, const Material *material, const
     return material->checker_colors[QUAD_CALL(fmod)(squares, 2) != 0];
 }
 
-// Full within half_angle - penumbra, none beyond half_angle, the smooth step 3 x^2 - 2 x^3 of 1 - cos
+// Returns 1 within half_angle - penumbra, 0 beyond half_angle, and the smooth step 3 x^2 - 2 x^3 of 1 - cos
 // between.
 static Quad spot_factor(const Light *light, Quad3 from_light)
 {
@@ -89,8 +89,8 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
     return x * x * (3 - 2 * x);
 }
 
-// Sets the start of rays to lights above a smooth triangle whose normals are all on one side: it is moved, by
-// each vertex's weight, along its normal up to its tangent plane (kernels/shapes/triangle.h).
+// Sets the start of shadow rays above a smooth triangle whose normals are all on one side. The point moves,
+// by each vertex's weight, along that vertex's normal up to its tangent plane (kernels/shapes/triangle.h).
 static void surface_lift(ShadedPoint *surface)
 {
     const Object *object = surface->object;
@@ -180,7 +180,7 @@ static Quad3 random_offset(Random *random, double size)
     return quad3(vector_scale(random_in_sphere(random), size));
 }
 
-// The magnitude of the numbers that decide whether a hit's point is on its surface.
+// Returns the magnitude of the numbers that decide whether a hit point is on its surface.
 static Quad hit_magnitude(const ReferenceScene *world, const ReferenceHit *hit, Quad3 point, Quad distance)
 {
     const double radius = world->spheres ? world->spheres[hit->object].radius : INFINITY;
@@ -189,7 +189,7 @@ static Quad hit_magnitude(const ReferenceScene *world, const ReferenceHit *hit, 
     return isfinite(radius) ? magnitude + radius : magnitude;
 }
 
-// What a ray met; moved along the surface and turned by up to `blur`.
+// Returns the surface that a ray hit, moved along itself and turned by up to `blur`.
 static ShadedPoint surface_at(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit,
                               double blur, Random *random)
 {
@@ -222,7 +222,7 @@ static ShadedPoint surface_at(const ReferenceScene *world, const ReferenceRay *r
     return surface;
 }
 
-// `shadows`: see reference_pixel; or NULL.
+// Returns a surface's color. Sets `shadows`, unless NULL, to whether each light fails to reach the surface.
 static ReferenceColor surface_color(const ReferenceScene *world, const ShadedPoint *surface, double margin,
                                     bool *shadows)
 {
@@ -239,7 +239,7 @@ static ReferenceColor surface_color(const ReferenceScene *world, const ShadedPoi
     return sum;
 }
 
-// The color of a direction of any length.
+// Returns the background in a direction of any length.
 static Color background_color(const Scene *scene, Quad3 direction)
 {
     if (vector_is_zero(scene->sky.up)) return scene->background;
@@ -258,7 +258,7 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     return surface_color(&world, &surface, (double)hit.margin, NULL);
 }
 
-// Snell's law: with the sine behind the surface eta times that before it. False where that is more than 1.
+// Refracts by Snell's law: sine behind = eta * sine in front. Returns false if that exceeds 1.
 static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted, double *margin)
 {
     Quad cosine = -quad3_dot(direction, normal);
@@ -275,8 +275,8 @@ static Quad3 reflect(Quad3 direction, Quad3 normal)
     return quad3_subtract(direction, quad3_scale(normal, 2 * quad3_dot(direction, normal)));
 }
 
-// Whether a bounced ray keeps to its side of the surface, the normal's or the other. If not, as smooth
-// triangles' shading normals may have it, it is bent by the geometric normal instead.
+// Returns whether a bounced ray stays on its side of the surface, that of the normal or the other. If a
+// smooth triangle's shading normal sends it to the wrong side, the geometric normal is used instead.
 static bool is_on_side(Quad3 direction, Quad3 normal, int side, double *margin)
 {
     const Quad height = side * quad3_dot(quad3_unit(direction), normal);
@@ -306,7 +306,7 @@ static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray
     }
 }
 
-// What the rays of a tree have in common.
+// The state that all rays of a tree share.
 typedef struct {
     const ReferenceScene *world;
     double min_contribution;
@@ -314,12 +314,12 @@ typedef struct {
     Random random;
     Color sum;
     bool has_first;
-    uint32_t object;    // of the first hit
-    double distance;    // to it
+    uint32_t object;    // the object of the first hit
+    double distance;    // to the first hit
     uint32_t signature; // see kernels/types.h
     double margin;
     bool has_texture;
-    bool *shadows; // of the first surface; or NULL
+    bool *shadows; // at the first surface, or NULL
 } PathTree;
 
 static void signature_add(PathTree *tree, uint32_t object, uint32_t events)
@@ -338,8 +338,9 @@ static Quad reflectance(Quad cosine, Quad ior, bool entering)
     return (across * across + along * along) / 2;
 }
 
-// Returns the same of a conductor, from the complex amplitudes. With the index m and its square M, across the
-// plane of incidence that is (c - q) / (c + q) with q^2 = M - sine^2, along it (M c - q) / (M c + q).
+// Returns the part of unpolarized light that a conductor of index m reflects. The amplitude, with M = m^2
+// and q^2 = M - sine^2, is (c - q) / (c + q) across the plane of incidence and (M c - q) / (M c + q) along
+// it.
 static double conductor_reflectance(Quad cosine, double n, double k)
 {
     const Quad real = (Quad)n * n - (Quad)k * k, imaginary = 2 * (Quad)n * k;
@@ -356,7 +357,7 @@ static double conductor_reflectance(Quad cosine, double n, double k)
     return (double)(sum / 2);
 }
 
-// What a ray travels in: how strongly the body around it absorbs light, and the one around that.
+// The medium of a ray: how strongly the body around it, and the one around that, absorb light.
 typedef struct {
     Color density, outer;
 } Medium;
@@ -371,7 +372,7 @@ static double part_of_weight(double weight, double part)
     return weight > 0 && part > 0 ? fmax(weight * part, DBL_MIN) : 0;
 }
 
-// Returns the product of two weights, whose channels no underflow makes 0: paths do not end by it.
+// Returns the product of two weights. Underflow does not make a channel 0, so it does not end a path.
 static Color weights_multiply(Color a, Color b)
 {
     return (Color){part_of_weight(a.x, b.x), part_of_weight(a.y, b.y), part_of_weight(a.z, b.z)};
@@ -417,7 +418,7 @@ static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Col
     tree->has_first = true;
     ShadedPoint surface = surface_at(tree->world, ray, &hit, tree->blur, &tree->random);
     const Material *material = surface.material;
-    // a surface that is reached from within tells the medium
+    // a surface that is reached from within defines the medium
     if (material->transmission > 0 && !surface.entering) medium.density = material->absorption;
     weight = weight_left(weight, medium.density, (double)surface.scale);
     const ReferenceColor own = surface_color(tree->world, &surface, (double)hit.margin, tree->shadows);

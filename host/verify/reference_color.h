@@ -1,29 +1,29 @@
-// What an image should show along a ray, in quadruple precision: shading, shadows, reflections and
-// refractions over the closest hits of host/verify/reference.h. `glint certify` and tests compare with it.
+// Computes the exact color along a ray in quadruple precision: shading, shadows, reflections and refractions
+// over the closest hits of host/verify/reference.h. `glint certify` and tests compare images with it.
 #pragma once
 
 #include "host/verify/reference_scene.h"
 #include <stdbool.h>
 
-// The ray through the center of a pixel, row 0 at the top (docs/scene-format.md), exactly that of the
-// camera's vectors in double.
+// Returns the ray through the center of a pixel, exactly that of the camera's vectors in double. Row 0 is at
+// the top (docs/scene-format.md).
 ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
                                   unsigned row);
 
 typedef struct {
     Color color;
-    double margin; // as of a hit, over the eye's ray, the shadow rays and the edges of a checker
+    double margin; // the least of the eye's ray, the shadow rays and a checker's edges
 } ReferenceColor;
 
-// What the eye sees along a ray: background, or ambient and Phong with shadows. Transparent objects pass
-// their part of the light unbent, once for each object. Neither reflection nor refraction.
+// Returns the color seen along a ray: background, or ambient and Phong with shadows, without reflection and
+// refraction. A transparent object passes its part of the light undeflected, once per object.
 ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray);
 
-// With reflections and refractions, `bounce_count` of them in a row.
+// Settings for reflections and refractions, with `bounce_count` of them in a row.
 //
-// Where `blur` is not 0, the start and direction of each ray are changed at random by up to this part of the
-// size of the numbers there. How far colors differ from those without blur shows what errors of that size
-// come to along the path.
+// If `blur` is not 0, the start and direction of each ray are perturbed by up to this part of the size of
+// the numbers there. The difference from the colors without blur shows the effect of such errors along the
+// path.
 typedef struct {
     unsigned bounce_count;
     double min_contribution; // rays whose weight is below it in all channels do not count
@@ -31,19 +31,19 @@ typedef struct {
     uint64_t seed;
 } ReferencePath;
 
-// What the AOVs of the same names hold.
+// The contents of the AOVs of the same names.
 typedef struct {
     uint32_t object, path;
     Color color;
-    double margin;    // the least of all decisions, in parts of the distance from the eye
-    bool has_texture; // somewhere along the path, where the color is undefined: textures are filtered, not
+    double margin;    // the least of all decisions, relative to the distance from the eye
+    bool has_texture; // on the path, whose color is then undefined because textures are filtered
                       // exact
 } ReferencePixel;
 
-// A decision of such a pixel is within 2^-80 of the distance to it: the reference may err in it itself.
+// Returns whether a decision is within 2^-80 of the distance to it, where the reference itself may be wrong.
 bool reference_is_uncertain(const ReferencePixel *pixel);
 
-// `shadows`: of each light, true where it does not reach the surface; undefined without one. Or NULL.
+// Computes a pixel. Sets `shadows`, unless NULL, to whether each light fails to reach its surface, if any.
 ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *ray,
                                const ReferencePath *path, bool *shadows);
 Color reference_path_color(const Scene *scene, const ReferenceRay *ray, const ReferencePath *path);

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// One with a vertex without a normal is flat.
+// Returns a triangle of a mesh, flat if a vertex has no normal.
 static Object mesh_triangle(const Mesh *mesh, const Object *whole, size_t part)
 {
     const MeshTriangle triangle = mesh_triangle_at(mesh, whole, part);
@@ -56,8 +56,8 @@ void reference_scene_close(ReferenceScene *scene)
     *scene = (ReferenceScene){0};
 }
 
-// Whether the ray certainly misses a sphere, or reaches it only outside its interval. The slack is far over
-// what rounding to double leaves.
+// Returns whether the ray certainly misses a sphere or reaches it only outside its interval. The slack is
+// far above the rounding errors of double.
 static bool sphere_is_missed(const BoundingSphere *sphere, const ReferenceRay *ray)
 {
     if (!isfinite(sphere->radius)) return false;

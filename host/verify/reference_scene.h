@@ -1,22 +1,22 @@
-// A scene made ready for many rays of the reference: the triangles of its meshes as objects, so that an
-// object's index is its id, and a bounding sphere of each object, outside of which it is not intersected.
+// A scene prepared for many rays of the reference. Its meshes are expanded to triangles, so that an object's
+// index is its id, and each object has a bounding sphere, outside of which it is not intersected.
 #pragma once
 
 #include "host/compile/shapes.h"
 #include "host/verify/reference.h"
 
 typedef struct {
-    Scene scene;             // its lights, materials and textures are those of the scene it was made of
-    BoundingSphere *spheres; // NULL: none, of a scene without meshes that few rays meet
+    Scene scene;             // shares the lights, materials and textures of the scene it was made of
+    BoundingSphere *spheres; // NULL: none, for a scene without meshes and with few rays
 } ReferenceScene;
 
-ReferenceScene reference_scene_open(const Scene *scene); // which must outlive it
+ReferenceScene reference_scene_open(const Scene *scene); // the scene must outlive it
 void reference_scene_close(ReferenceScene *scene);
 
-// Returns the hit of one object, a miss where its bounding sphere is missed. `left`: the object on whose
-// surface the ray starts, UINT32_MAX for the eye. A start on a surface does not hit it, nor another one that
-// coincides: the start's height over a hit's tangent plane must exceed ray->tmin times the direction's
-// length. The margin of the object that is left, 0 although nothing is open, does not count.
+// Returns the hit of one object, or a miss if its bounding sphere is missed. `left` is the object on whose
+// surface the ray starts, UINT32_MAX for the eye. A start on a surface does not hit that surface or one that
+// coincides with it: the start's height over a hit's tangent plane must exceed ray->tmin times the
+// direction's length. The margin of `left`, which is 0 although nothing is uncertain, is ignored.
 ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t index, const ReferenceRay *ray,
                                         uint32_t left);
 // Returns the nearest hit of all objects.

@@ -6,14 +6,14 @@ void hit_reduce_margin(ReferenceHit *hit, Quad margin)
     hit->margin = quad_minimum(hit->margin, quad_absolute(margin));
 }
 
-// A hit begins and ceases to count where the ray's start or end lies on the surface: the margin is twice
-// their height over the tangent plane of the hit.
+// A hit starts or ceases to count when the ray's start or end crosses the surface. The margin is twice the
+// height of these over the tangent plane of the hit.
 void hit_offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius)
 {
     if (hit->found && t >= hit->t) return;
     Quad inverse = 1 / quad3_length(normal), approach = -quad3_dot(normal, ray->direction) * inverse;
     hit_reduce_margin(hit, 2 * (t - ray->tmin) * approach);
-    hit_reduce_margin(hit, 2 * approach * (t - ray->tmax)); // of an unbounded ray it may overflow
+    hit_reduce_margin(hit, 2 * approach * (t - ray->tmax)); // may overflow for an unbounded ray
     if (!(t > ray->tmin && t < ray->tmax)) return;
     hit->found = true;
     hit->object = 0;

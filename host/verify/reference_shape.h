@@ -1,45 +1,44 @@
-// What the reference knows of each shape: one row per shape, in one file of shapes/. Not for others than
-// these and reference.c.
+// The reference's row for each shape, one per file of shapes/. Only these files and reference.c use it.
 #pragma once
 
 #include "host/verify/reference.h"
 
 typedef struct {
-    // Offers every crossing, and reduces the margin by the distance to each edge where the answer changes.
+    // Pushes every crossing, and reduces the margin to the distance from each edge where the answer changes.
     void (*hit)(const Object *object, const ReferenceRay *ray, ReferenceHit *hit);
     // Measures the surface and adds its sheets.
     void (*surface)(const Object *object, Quad3 point, ReferenceSurface *surface);
-    // The shape's members in Object: doubles in a row, points first, then flags.
+    // The layout of the shape's members in Object: consecutive doubles, points first, then flags.
     unsigned point_count, number_count;
 } ReferenceShape;
 
 #define UNBOUNDED ((Quad)LDBL_MAX)
 
-// Takes the crossing at `t` if it is the nearest so far. `normal` points outward; it need not be unit.
+// Records the crossing at `t` if it is the nearest so far. `normal` points outward; it need not be unit.
 void hit_offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius);
-// To the magnitude of `margin`, if that is smaller.
+// Reduces the hit's margin to the magnitude of `margin` if that is smaller.
 void hit_reduce_margin(ReferenceHit *hit, Quad margin);
-// Offers the crossing of a disc, such as a cap; margins are those of its rim.
+// Pushes the crossing of a disc, such as a cap. Margins are those of its rim.
 void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ray, ReferenceHit *hit);
 
-// Sets the surface's members of these names; the center is that of its bounds.
+// Sets the surface's members of these names. The center is that of its bounds.
 void surface_measure(ReferenceSurface *surface, Vector3 center, double bounding_radius,
                      double feature_radius);
 void surface_add(ReferenceSurface *surface, Quad distance, Quad3 normal, Quad curvature_radius);
 
-// Where a ray crosses the plane through `point`; false if it is parallel.
+// Sets *t to where a ray crosses the plane through `point`. Returns false for a parallel ray.
 bool plane_crossing(const ReferenceRay *ray, Quad3 point, Quad3 normal, Quad *t);
 Quad plane_cosine(const ReferenceRay *ray, Quad3 normal);
 
 Quad point_line_distance(Quad3 point, Quad3 on_line, Quad3 direction);
-// Between the ray's line and another, both infinite.
+// Returns the distance between the ray's line and another line, both infinite.
 Quad line_distance(const ReferenceRay *ray, Quad3 on_line, Quad3 direction);
 
-// Solves A t^2 + 2 B t + C = 0; returns how many roots there are. A root that far away is what roundings left
-// of an A that is 0.
+// Solves A t^2 + 2 B t + C = 0 and returns the number of roots. A very distant root is dropped because it
+// stems from an A that is 0 but for roundings.
 int quadratic_roots(Quad a, Quad b, Quad c, Quad roots[2]);
 
-// How far a number is outside an interval.
+// Returns how far a number is outside an interval.
 static inline Quad quad_outside(Quad value, Quad low, Quad high)
 {
     return value < low ? low - value : value > high ? value - high : 0;

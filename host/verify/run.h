@@ -1,4 +1,4 @@
-// Inside a run of the hard cases: what its parts share.
+// The state and the functions that the hard cases share.
 #pragma once
 
 #include "host/verify/verify.h"
@@ -7,15 +7,15 @@ typedef struct {
     Compute *compute;
     const VerifySettings *settings;
     VerifyTier tier;
-    bool inexact; // quotients and roots are as wrong as OpenCL C allows, by up to 2 and 3 ulp
+    bool inexact; // quotients and roots are off by as much as OpenCL C allows, up to 2 and 3 ulp
     VerifyResult *result;
     VerifyKernels *kernels;
-    // The renderers of the last scene of verify_trace and of verify_render, or NULL. The next scene takes
-    // them over with their kernels, as loading them for each scene would take longer than most scenes.
+    // The renderers of the last scenes of verify_trace and verify_render, or NULL. The next scene reuses
+    // them with their kernels, because loading kernels takes longer than most scenes.
     Renderer **tracer, **painter;
 } VerifyRun;
 
-// What of a case is not in the tables. Counts what is wrong in the run's result.
+// The checks of a case that are not in the tables. Each counts its faults in the run's result.
 typedef void VerifyCheck(VerifyRun *run);
 
 VerifyCheck verify_scaled_directions; // S6
@@ -34,7 +34,7 @@ VerifyCheck verify_camera_frames;     // R8
 
 VerifyCheck verify_far_fringe;       // S2
 VerifyCheck verify_ground_horizon;   // S4
-VerifyCheck verify_sizes;            // S7, P8, C8, T7, Q4, M7: those of the case
+VerifyCheck verify_sizes;            // S7, P8, C8, T7, Q4, M7: the shapes of the case
 VerifyCheck verify_plane_horizon;    // P1
 VerifyCheck verify_plane_acne;       // P2
 VerifyCheck verify_thin_plate;       // P6
@@ -56,46 +56,46 @@ static inline bool verify_is_double(const VerifyRun *run)
     return run->tier == TIER_D;
 }
 
-// Returns how many of `count` random rays or pixels the run takes: a sixteenth if it is quick.
+// Returns how many of `count` random rays or pixels to use: all, or a sixteenth in a quick run.
 size_t verify_part(const VerifyRun *run, size_t count);
 
 double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1
 double verify_ulp(const VerifyRun *run, double value);
 double verify_rounded(const VerifyRun *run, double value); // to the precision at work
-// Rounds the ray's numbers as the renderer will, so that exact answers are of the same ray; a tmax beyond the
-// precision's range becomes the largest number in it.
+// Rounds the ray's numbers as the renderer does, so that exact answers are for the same ray. A tmax beyond
+// the precision's range becomes the largest number in it.
 void verify_round_ray(const VerifyRun *run, TraceRay *ray);
-TraceRay verify_ray(const VerifyRun *run, Vector3 origin, Vector3 direction); // of that, without a tmax
+TraceRay verify_ray(const VerifyRun *run, Vector3 origin, Vector3 direction); // rounded, without a tmax
 
 static inline bool verify_is_hit(const TraceHit *hit)
 {
     return hit->object != UINT32_MAX;
 }
 
-// A scene ready for rays, as it is, with or without a BVH; renderer_close closes it. NULL: the device failed.
+// Opens a scene as it is, with or without a BVH, until renderer_close. Returns NULL if the device failed.
 Renderer *verify_open(VerifyRun *run, const Scene *scene, bool bvh);
-// Hits of rays in an open scene; counts the unsound ones. They are zeros once the device has failed, when no
-// result is reported.
+// Traces rays in an open scene and counts the unsound hits. After the device has failed, hits are zeros and
+// no result is reported.
 void verify_trace_opened(VerifyRun *run, Renderer *opened, const TraceRay *rays, size_t count,
                          TraceHit *hits);
-// The same in a scene that is opened for these rays alone.
+// Opens a scene, traces rays and counts the unsound hits. Hits are zeros after the device has failed.
 void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *rays, size_t count,
                   TraceHit *hits);
-bool verify_same_bits(const TraceHit *a, const TraceHit *b); // object, distance and normal
+bool verify_same_bits(const TraceHit *a, const TraceHit *b); // compares object, distance and normal
 
-// Notes an error of t, in ulp of it, and counts it as wrong where it is beyond the bound.
+// Records an error of t, in ulp of t, and counts it as wrong if it exceeds the bound.
 void verify_note_error(VerifyRun *run, double error, double bound);
-// The same for an error in another unit.
+// Records an error in the given unit, and counts it as wrong if it exceeds the bound.
 void verify_note(VerifyRun *run, double error, double bound, const char *unit);
 
-// Reads a scene that the program itself carries: native YAML, all but the camera. A text that cannot be read
-// is a program's fault. Caller frees it with scene_free.
+// Reads a built-in scene: native YAML without the camera. A text that cannot be read is a bug. The caller
+// frees the scene with scene_free.
 Scene verify_scene(const char *objects);
 bool verify_is_refused(const char *text); // whether the YAML reader rejects a scene with an error
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
-// Renders all layers of a film and counts the unsound pixels; film_free frees it. Zeros once the device
-// failed.
+// Renders all layers of a film and counts the unsound pixels. After the device has failed, they are zeros.
+// Free the film with film_free.
 Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width, uint32_t height);
 
 static inline bool verify_pixel_found(const Film *image, size_t pixel)

@@ -1,10 +1,10 @@
-// Images of shadows: none where nothing stands in the light, and none missing.
+// Images of shadows: lit surfaces must have none, and no shadow may be missing.
 #include "host/base/array.h"
 #include "host/verify/checks.h"
 #include <math.h>
 
-// A plane alone in light from just above it to steeply above it, near and far from the origin, small and
-// large: no pixel lies in shadow, and all have one color, the light's cosine with the normal.
+// Checks a plane alone in light from barely to steeply above it, near and far from the origin, small and
+// large. No pixel may lie in shadow, and all must have one color, the light's cosine with the normal.
 void verify_plane_acne(VerifyRun *run)
 {
     static const double sizes_places[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
@@ -49,7 +49,7 @@ void verify_plane_acne(VerifyRun *run)
     }
 }
 
-// A plate a millionth as thick as wide, lit from one side: the other is dark, and the lit one is lit.
+// Checks a plate a millionth as thick as wide, lit from one side. That side is lit and the other is dark.
 void verify_thin_plate(VerifyRun *run)
 {
     Scene scene = verify_scene("lights:\n  - point: {position: [0.5, 0.5, -2]}\n"
@@ -78,8 +78,8 @@ void verify_thin_plate(VerifyRun *run)
     scene_free(&scene);
 }
 
-// Counts a pixel that does not show the nearest of plane 0 and sphere 1. The sphere's rim, and where the two
-// are equally far, are open.
+// Counts a pixel that does not show the nearer of plane 0 and sphere 1. Skips the sphere's rim and places
+// where the two are equally far.
 static void check_nearest(VerifyRun *run, uint32_t object, const ReferenceHit *plane,
                           const ReferenceHit *sphere)
 {
@@ -92,8 +92,8 @@ static void check_nearest(VerifyRun *run, uint32_t object, const ReferenceHit *p
     run->result->wrong += object != UINT32_MAX && object != nearest;
 }
 
-// A sphere on a plane, lit from above: its shadow is a disc with a radius known exactly, up to the point
-// where they touch.
+// Checks a sphere on a plane, lit from above. Its shadow is a disc with an exactly known radius, up to the
+// point where they touch.
 void verify_contact_shadow(VerifyRun *run)
 {
     static const struct {

@@ -1,4 +1,4 @@
-// Shapes far larger, or smaller, than their distance from the eye: what rounding moves of them.
+// Shapes far larger or smaller than their distance from the eye, which test the rounding of their numbers.
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/verify/checks.h"
@@ -11,9 +11,9 @@ static const Vector3 eye = {0.3, 1.75, 0.2};
 typedef struct {
     const char *case_name;
     const char *text; // of the object
-    // Sets its numbers for a size. All are exact in double, but not in float.
+    // Sets the object's numbers for a size. All are exact in double, but not in float.
     void (*resize)(Object *object, double size);
-    // A flat shape leaves the directions along it open, others those around the tangents.
+    // Hit or miss of a flat shape is uncertain along the shape, of another shape around its tangents.
     bool is_flat;
 } SizedShape;
 
@@ -52,7 +52,7 @@ static void cylinder_resize(Object *object, double size)
     object->as.cylinder.radius = size;
 }
 
-// Seen from above one of its ends.
+// Places an end of the cylinder below the eye.
 static void end_resize(Object *object, double size)
 {
     object->as.cylinder.from = (Vector3){size / 2, 0, size / 4};
@@ -60,7 +60,7 @@ static void end_resize(Object *object, double size)
     object->as.cylinder.radius = size;
 }
 
-// The eye is above the side's middle.
+// Places the middle of the side below the eye.
 static void tilted_cylinder_resize(Object *object, double size)
 {
     object->as.cylinder.from = (Vector3){-3 * size, -size, -4 * size};
@@ -82,7 +82,7 @@ static void infinite_cone_resize(Object *object, double size)
     object->as.cone.slope = 0.5;
 }
 
-// Flat, and seen from beyond its tip.
+// Makes a flat cone, with the eye beyond its tip.
 static void flat_cone_resize(Object *object, double size)
 {
     object->as.cone.from = (Vector3){0.1, 0, 0.1};
@@ -91,7 +91,7 @@ static void flat_cone_resize(Object *object, double size)
     object->as.cone.radius[1] = 7 * size;
 }
 
-// The eye is above its plane, and both ends are rounded to one point if it is large.
+// Places the plate's plane below the eye. If the plate is large, both ends are rounded to one point.
 static void plate_resize(Object *object, double size)
 {
     object->as.cylinder.from = (Vector3){1.5 * size, size / 2, 0};
@@ -106,7 +106,7 @@ static void paraboloid_resize(Object *object, double size)
     object->as.paraboloid.height = 4 * size;
 }
 
-// The eye is above the outside of the tube.
+// Places the outside of the tube below the eye.
 static void torus_resize(Object *object, double size)
 {
     object->as.torus.center = (Vector3){0.1, -3 * size, 0.1};
@@ -121,9 +121,8 @@ static void triangle_resize(Object *object, double size)
     object->as.triangle.vertices[2] = (Vector3){size, size, -size};
 }
 
-// What the pixel's ray hits, against the object as the scene has it, whose numbers need not be those of the
-// precision at work: hit or miss, how far the hit is off the surface, and that light from above reaches the
-// ground.
+// Checks a pixel against the object as the scene has it, whose numbers need not fit the precision at work:
+// hit or miss, the hit's distance from the surface, and that light from above reaches the ground.
 static void check_pixel(VerifyRun *run, const Object *object, double band, bool is_ground, const Film *image,
                         size_t pixel)
 {

@@ -1,4 +1,4 @@
-// Checks of spheres and boxes that no table holds.
+// Checks of spheres and boxes that are not in the tables.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/verify/checks.h"
@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A direction 2^20 times as long, or as short, gives the same hits at distances exactly as many times
-// shorter, or longer.
+// Checks that a direction 2^20 times as long or as short gives the same hits, at distances exactly as many
+// times shorter or longer.
 void verify_scaled_directions(VerifyRun *run)
 {
     enum { COUNT = 100 };
@@ -38,7 +38,7 @@ void verify_scaled_directions(VerifyRun *run)
 
 enum { SPHERES = 50, GROUPS = 20, DIRECTIONS = 500 };
 
-// Radii and centers over eight powers of ten.
+// Returns spheres whose radii and centers span eight powers of ten.
 static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
 {
     Scene scene = scene_empty();
@@ -57,7 +57,7 @@ static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
     return scene;
 }
 
-// The far crossing of a ray that starts inside; NAN where it starts outside or runs along the surface.
+// Returns the far crossing of a ray from inside, or NAN if it starts outside or runs along the surface.
 static double sphere_exit(const Object *sphere, const TraceRay *ray)
 {
     const ReferenceRay reference_ray = verify_reference_ray(ray);
@@ -66,7 +66,7 @@ static double sphere_exit(const Object *sphere, const TraceRay *ray)
     return (double)hit.t;
 }
 
-// A ray to each sphere from outside.
+// Makes a ray to each sphere from outside.
 static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned group, TraceRay rays[SPHERES])
 {
     for (uint64_t i = 0; i < SPHERES; i++) {
@@ -81,8 +81,8 @@ static void rays_at_spheres(const VerifyRun *run, const Scene *scene, unsigned g
     }
 }
 
-// From where the first ray met the sphere: half of the rays leave it, none may meet it again; half run into
-// it, and come to its other side.
+// Traces rays from where the first ray hit the sphere. Half of them leave it and must not hit it again. The
+// others enter it and must reach its far side.
 static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, size_t sphere,
                          const TraceHit *first)
 {
@@ -126,7 +126,7 @@ void verify_leaving_spheres(VerifyRun *run)
     }
 }
 
-// The hit lies on the very face that the normal is of.
+// Checks that each hit point lies exactly on the face whose normal is reported.
 void verify_points_on_faces(VerifyRun *run)
 {
     enum { COUNT = 30000 };
@@ -161,8 +161,8 @@ static const char *const coincident[] = {
 };
 enum { COINCIDENT = COUNT_OF(coincident) };
 
-// The first in the list is seen of objects that are hit at the same distance, which does not depend on the
-// list's order. A scene of each object alone gives it.
+// Checks that among objects at the same distance the first in the list is hit, and that the distance does
+// not depend on the list's order. A scene of each object alone gives that distance.
 void verify_coincident_faces(VerifyRun *run)
 {
     enum { COUNT = 1200 };

@@ -12,7 +12,7 @@
 
 enum { CHECKS_MAX = 3 };
 
-// Each has the tables of its name, and its own checks.
+// Each case has the tables of its name and separate checks.
 static const struct {
     const char *name, *title;
     VerifyCheck *checks[CHECKS_MAX];
@@ -139,7 +139,7 @@ static bool is_sound(const VerifyRun *run, const TraceRay *ray, const TraceHit *
     return run->tier == TIER_A || is_unit(run, hit->normal);
 }
 
-// FNV-1a (Fowler, Noll, Vo) by words of 64 bits, with the upper half folded into the lower.
+// Extends the hash by FNV-1a (Fowler, Noll, Vo) on 64-bit words, with the upper half folded into the lower.
 static void hash_word(VerifyRun *run, uint64_t word)
 {
     uint64_t hash = (run->result->hash ^ word) * 0x100000001b3u;
@@ -177,8 +177,8 @@ static void hash_hit(VerifyRun *run, const TraceHit *hit)
     hash_numbers(run, &hit->transmission, 1);
 }
 
-// With every feature built in, so that one program serves all scenes; lean, with what an image of the scene
-// needs, and, of rays, what becomes of them there. Width 0: for rays.
+// Returns settings with every feature built in, so that one program serves all scenes. Lean settings build
+// what an image of the scene needs and, for rays, reflection and transmission. A width of 0 is for rays.
 static RenderSettings scene_settings(const VerifyRun *run, bool bvh, uint32_t width, uint32_t height)
 {
     const bool image = width > 0;
@@ -194,7 +194,7 @@ static RenderSettings scene_settings(const VerifyRun *run, bool bvh, uint32_t wi
     return settings;
 }
 
-// Opens *renderer, or gives it another scene; NULL where the device fails.
+// Opens *renderer, or moves it to another scene. Sets it to NULL if the device fails.
 static void scene_assign(const VerifyRun *run, Renderer **renderer, const Scene *scene,
                          const RenderSettings *settings)
 {
@@ -350,7 +350,7 @@ static bool is_chosen(const VerifyChoice *choice, const char *name)
     return !choice;
 }
 
-// Whether quotients and roots err as OpenCL C allows.
+// Returns whether quotients and roots err as much as OpenCL C allows.
 static bool is_inexact(const RenderSettings *settings)
 {
     return settings->perturb_seed > 0 && settings->precision < PRECISION_STRICT;

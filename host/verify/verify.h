@@ -1,5 +1,5 @@
-// The hard cases: scenes and rays on which ray tracers go wrong, run through the renderer that ships, each
-// within a bound. Expected hits are exact (tests/oracle). docs/verify.md says what each case is.
+// The hard cases are scenes and rays on which ray tracers fail. They run through the renderer that ships,
+// and each has a bound. Expected hits are exact (tests/oracle). docs/verify.md describes each case.
 #pragma once
 
 #include "host/render/renderer.h"
@@ -7,21 +7,21 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// What is required: A is hygiene, at every precision; B, C and D are A and accuracy at `single`, `strict` and
+// The requirements. Tier A is hygiene at every precision; B, C and D add accuracy at `single`, `strict` and
 // `double`.
 typedef enum { TIER_A, TIER_B, TIER_C, TIER_D, TIER_COUNT } VerifyTier;
 
-// How the scenes are rendered.
+// The settings of all scenes.
 typedef struct {
     RenderSettings render; // precision, lanes, bounce_count, no_cache and perturb_…; each scene sets the rest
-    bool lean;             // build kernels of what each scene needs alone, not one for all scenes
+    bool lean;             // build kernels for each scene's needs, not one for all scenes
     bool quick;            // a sixteenth of the random rays, and fewer pixels
-    // Gets the scene and settings of each image, for checks of one's own; or NULL.
+    // Receives the scene and settings of each image, for further checks; or NULL.
     void (*picture)(void *context, const Scene *scene, const RenderSettings *settings);
     void *context;
 } VerifySettings;
 
-// `single` need not meet tier B on a device that is perturbed; `strict` corrects the perturbation.
+// Returns a precision's tier. A perturbed device need not reach B at `single`; `strict` corrects for it.
 VerifyTier verify_tier(const RenderSettings *settings);
 
 // The last kernels that ran.
@@ -30,46 +30,46 @@ typedef struct {
     uint64_t trace_hash, render_hash;
 } VerifyKernels;
 
-// How one case went.
+// The result of one case.
 typedef struct {
     const char *name, *title;
-    size_t ray_count; // and pixels
-    size_t wrong;     // hits that should be misses, misses that should be hits, the wrong object, t or place
-    size_t leaks;     // misses of what is closed
-    size_t unsound;   // no numbers, hits behind the ray's start, normals that are not unit
-    size_t off_surface;   // hits whose point is farther from the surface than it may be
+    size_t ray_count;   // rays and pixels
+    size_t wrong;       // false hits, false misses, and wrong objects, t or points
+    size_t leaks;       // misses of closed objects
+    size_t unsound;     // NaN or infinity, hits behind the ray's start, and normals that are not unit vectors
+    size_t off_surface; // hits whose point is too far from the surface
     size_t wrong_normals; // normals that are not the surface's
-    size_t differing;     // answers whose bits depend on what they must not depend on
-    double worst, bound;  // the error that is the largest part of its bound; 0, 0: none
+    size_t differing;     // answers whose bits depend on something irrelevant
+    double worst, bound;  // the error with the largest ratio to its bound; 0, 0: none
     const char *unit;     // of both
     double worst_position_ratio,
         worst_normal_ratio; // the largest errors of points and normals over their bounds
-    uint64_t hash;          // of every answer's bits, in order
+    uint64_t hash;          // of the bits of all answers, in order
 } VerifyResult;
 
 bool verify_holds(const VerifyResult *result);
 
 typedef struct {
-    // Returns whether to run a case, of which the name and the title are known; NULL: all are run.
+    // Returns whether to run a case, whose name and title are set; NULL: run all.
     bool (*start)(void *context, const VerifyResult *result);
     // Returns whether to continue with the next case.
     bool (*take)(void *context, const VerifyResult *result);
     void *context;
 } VerifySink;
 
-// Which cases to run, by name; NULL: all.
+// The names of the cases to run; NULL: all.
 typedef struct {
     char *const *names;
     size_t count;
 } VerifyChoice;
 
 enum { VERIFY_CASES_MAX = 64 };
-// In the order in which they run; NULL past the last.
+// Returns the names in the order in which the cases run, and NULL past the last.
 const char *verify_case_name(size_t i);
 
-// The bits of the reference's numbers: 113, or those of a long double where the compiler has no more.
+// Returns the bits of the reference's numbers: 113, or those of long double if the compiler has no more.
 int verify_reference_bits(void);
 
-// Runs the cases in turn, until the sink ends it. Keeps *kernels up to date.
+// Runs the cases in turn until the sink stops it, and keeps *kernels up to date.
 void verify_run(Compute *compute, const VerifySettings *settings, const VerifyChoice *choice,
                 const VerifySink *sink, VerifyKernels *kernels);

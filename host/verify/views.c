@@ -1,4 +1,4 @@
-// Images by cameras whose numbers are extreme or say too little.
+// Images by cameras with extreme or incomplete numbers.
 #include "host/base/array.h"
 #include "host/verify/run.h"
 #include <math.h>
@@ -38,7 +38,7 @@ static void compare(VerifyRun *run, const Film *a, const Film *b)
     }
 }
 
-// Where `up` says nothing the world axis least aligned with the view stands in for it.
+// Checks that the world axis least aligned with the view replaces an `up` that is zero or parallel to it.
 static void check_views_without_up(VerifyRun *run)
 {
     static const struct {
@@ -55,7 +55,7 @@ static void check_views_without_up(VerifyRun *run)
             film_free(&image);
         }
         if (k == 0) {
-            // nearly along the view is not along it
+            // an `up` that is nearly parallel to the view is valid
             Film image = view(run, here, views[k].eye, views[k].look_at, (Vector3){1e-7, 1, 0}, 40);
             compare(run, &image, &expected);
             film_free(&image);
@@ -64,7 +64,7 @@ static void check_views_without_up(VerifyRun *run)
     }
 }
 
-// Straight down on the tiles: each pixel has the color of the tile that it sees.
+// Checks a view straight down on the tiles, where each pixel must have the color of its tile.
 static void check_tiles(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, eye = {0.3, 5, 0.4}, below = {0.3, 0, 0.4}, up = {0, 1, 0};
@@ -76,7 +76,7 @@ static void check_tiles(VerifyRun *run)
         double x = eye.x - eye.y * d[0] / d[1], z = eye.z - eye.y * d[2] / d[1];
         if (fmin(fabs(x - round(x)), fabs(z - round(z))) < 1e-5) continue;
         bool even = fmod(floor(x) + floor(z), 2) == 0, white = image.color[3 * i] > 0.75;
-        // which of the colors comes first is the plane's own affair
+        // which color comes first is up to the plane
         counts[white == even]++;
     }
     run->result->wrong += counts[0] < counts[1] ? counts[0] : counts[1];
@@ -84,7 +84,7 @@ static void check_tiles(VerifyRun *run)
     film_free(&image);
 }
 
-// From nearly no field of view to nearly all there is, far from the origin, and a single pixel.
+// Checks fields of view from nearly 0 to nearly 180 degrees, a view far from the origin, and a single pixel.
 static void check_extremes(VerifyRun *run)
 {
     const Vector3 here = {0, 0, 0}, far = {1e7, -1e7, 2e7}, up = {0, 1, 0}, eye = {2, 4, 6};

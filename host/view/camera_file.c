@@ -10,7 +10,7 @@
 
 typedef struct {
     YamlReader reader;
-    Scene scene; // its camera alone
+    Scene scene; // only its camera is used
     const YamlNode *camera;
 } CameraFile;
 
@@ -103,7 +103,7 @@ static void copy_until(Copy *copy, size_t offset)
     copy->next = offset;
 }
 
-// Spaces in front of a place where a key starts; other bytes, such as those of `camera: {`, count as spaces.
+// Returns the spaces in front of a key's place. Other bytes, as in `camera: {`, count as spaces.
 static size_t indentation(const Source *source, size_t offset)
 {
     size_t start = offset;
@@ -112,7 +112,7 @@ static size_t indentation(const Source *source, size_t offset)
     return offset - start;
 }
 
-// A quoted key's offset is behind its quote.
+// Returns whether a key is quoted. The offset of a quoted key is behind its quote.
 static bool is_quoted(const Source *source, const YamlNode *key)
 {
     const char before = source->bytes[key->offset - 1];
@@ -133,7 +133,7 @@ static void pair_insert(Copy *copy, const YamlNode *mapping, const YamlNode *nex
         text_appendf(copy->text, "\n%*s", (int)indentation(copy->source, offset), "");
 }
 
-// Adds a key behind the last one of a mapping: in a block on a new line, behind a comment.
+// Adds a key behind the last one of a mapping. In a block it is on a new line, behind a comment.
 static void pair_append(Copy *copy, const YamlNode *mapping, const YamlNode *last, size_t end,
                         const char *key, const Text *value)
 {
@@ -160,7 +160,7 @@ static void value_replace(Copy *copy, const YamlNode *key, const YamlNode *value
     copy->next = value->end;
 }
 
-// Records the new value of an animated one, or of one that becomes animated.
+// Records the new value of an animated key, or of one that becomes animated.
 static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, const YamlNode *animated,
                          uint32_t frame, const Text *value)
 {
@@ -192,8 +192,8 @@ static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, con
     }
 }
 
-// Writes the new value of a key. Returns false if it has not changed and is not recorded. Where the camera
-// turned, the new position has turned.
+// Writes the new value of a key. Returns false if it has not changed and is not recorded. After a move the
+// key `turn` becomes 0, because the new position includes it.
 static bool value_write(Text *text, const char *key, const Camera *old, const Camera *camera, bool has_turn,
                         bool is_recorded)
 {
@@ -224,8 +224,8 @@ static bool value_write(Text *text, const char *key, const Camera *old, const Ca
     return true;
 }
 
-// Returns whether a value gets a key when one of the camera is recorded. Without keys `up` stays, which moves
-// only make upright.
+// Returns whether a value gets a key when one of the camera is recorded. An `up` without keys does not,
+// because moves only make it upright.
 static bool gets_key(const YamlReader *reader, const char *key, const YamlNode *value)
 {
     return strcmp(key, "position") == 0 || strcmp(key, "look_at") == 0 || strcmp(key, "height") == 0 ||

@@ -3,7 +3,7 @@
 #include "host/compile/camera_basis.h"
 #include "host/scene/portable.h"
 
-static const double POLE_ANGLE = M_PI / 180; // between the view and `up`, at least
+static const double POLE_ANGLE = M_PI / 180; // the smallest between the view and `up`
 
 bool cameras_equal(const Camera *a, const Camera *b)
 {
@@ -48,7 +48,7 @@ static void camera_rotate(Camera *camera, Vector3 pivot, Vector3 axis, double an
     camera->look_at = vector_add(pivot, vector_rotated(look_at, axis, angle));
 }
 
-// A camera without a usable `up` gets the one that its image has.
+// Replaces an unusable `up` of a camera by that of its image.
 static void camera_set_upright(Camera *camera)
 {
     CameraBasis basis = camera_basis(camera, 1, 1);

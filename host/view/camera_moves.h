@@ -1,4 +1,4 @@
-// How mouse and keys move a camera. Angles are in radians; pixels are counted from the image's top left.
+// Moves a camera by mouse and keys. Angles are in radians; pixels are counted from the image's top left.
 #pragma once
 
 #include "host/scene/scene.h"
@@ -32,5 +32,5 @@ void camera_dolly(Camera *camera, Vector3 pivot, double factor);
 // Moves along the view, to the right and up.
 void camera_fly(Camera *camera, double forward, double right, double up);
 
-// Turns towards a point; a point at the eye changes nothing.
+// Turns towards a point. A point at the eye has no effect.
 void camera_look_at(Camera *camera, Vector3 point);

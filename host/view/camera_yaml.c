@@ -4,7 +4,7 @@
 
 #include <stdlib.h>
 
-// The fewest digits that read back as the same number.
+// Uses the fewest digits that read back as the same number.
 void number_write_yaml(Text *text, double value)
 {
     char word[32];
@@ -33,13 +33,13 @@ static void vector_write(Text *text, const char *name, Vector3 v)
     text_appendf(text, ", ");
 }
 
-// As the reader computes it.
+// Returns the half tangent of an angle of view, computed as the reader does.
 static double half_tangent_of(double degrees)
 {
     return portable_tangent(degrees * (M_PI / 360));
 }
 
-// The fewest digits that give the same half_tangent; rounded to 17 digits, a neighbor may.
+// Returns the shortest number of degrees that gives the same half_tangent, or the nearest if none does.
 static double field_of_view(double half_tangent)
 {
     double near = 360 / M_PI * atan(half_tangent);

@@ -1,4 +1,4 @@
-// A camera as a scene file in YAML has it.
+// Writes a camera in the form of a YAML scene file.
 #pragma once
 
 #include "host/base/text.h"
@@ -9,7 +9,7 @@ void number_write_yaml(Text *text, double value);
 // Writes a list of three such numbers.
 void vector_write_yaml(Text *text, Vector3 v);
 
-// One line, `camera: {…}`, from which the reader gets the same camera bit for bit; but for an angle of view
-// that no number of degrees gives, which other formats may have: the nearest. `aspect`: width over height of
-// the image.
+// Writes one line, `camera: {…}`, from which the reader gets the same camera bit for bit. Only an angle of
+// view that no number of degrees gives, which other formats may have, is replaced by the nearest. `aspect`
+// is the image's width over its height.
 void camera_write_yaml(Text *text, const Camera *camera, double aspect);

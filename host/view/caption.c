@@ -12,11 +12,11 @@ struct Caption {
     SDL_Renderer *target;
     TTF_Font *font;
     float scale;
-    int size;     // of the font, in pixels
+    int size;     // font size in pixels
     int reserved; // rows at the bottom
 };
 
-// The file of the font that the user has chosen for fixed-width text. Caller frees; NULL: none.
+// Returns the file of the user's font for fixed-width text, or NULL. The caller frees it.
 static char *font_path(void)
 {
     FcConfig *config = FcInitLoadConfigAndFonts();
@@ -75,7 +75,7 @@ SDL_Point caption_room(const Caption *caption)
     return room;
 }
 
-// Characters of the longest line, and number of lines.
+// Returns the number of characters of the longest line, and the number of lines.
 static SDL_Point extent_of(const char *text)
 {
     SDL_Point extent = {0, 1};
@@ -89,7 +89,7 @@ static SDL_Point extent_of(const char *text)
     return extent;
 }
 
-// In the font's current size.
+// Returns the size of a character in the font's current size.
 static SDL_Point character_size(const Caption *caption)
 {
     SDL_Point size = {0, TTF_FontLineSkip(caption->font)};
@@ -104,7 +104,7 @@ SDL_Point caption_character(Caption *caption)
     return character_size(caption);
 }
 
-// The largest font that the extent fits in, down to the smallest. Returns the text's width, at most `room.x`.
+// Sets the largest font in which the extent fits. Returns the text's width, at most `room.x`.
 static int size_fit(Caption *caption, SDL_Point extent, SDL_Point room)
 {
     int size = (int)(FONT_SIZE * caption->scale);

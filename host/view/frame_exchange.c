@@ -1,4 +1,4 @@
-// What the thread of the window and that of the loop pass to each other, all of it under the mutex.
+// Passes data between the thread of the window and that of the loop. All of it is under the mutex.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/file.h"
@@ -172,7 +172,7 @@ void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
     pthread_mutex_unlock(&loop->mutex);
 }
 
-// The text, one of the loop's; NULL takes its place.
+// Moves a text of the loop to the caller and sets it to NULL.
 static char *text_take(FrameLoop *loop, char **text)
 {
     pthread_mutex_lock(&loop->mutex);

@@ -1,4 +1,4 @@
-// The frame of a film: its display values, its distances and the report on its rendering.
+// Fills the frame of a film: its display values, its distances and the report on its rendering.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/memory.h"

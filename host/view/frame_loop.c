@@ -1,4 +1,4 @@
-// The thread of the loop.
+// Runs the thread of the loop.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/fault.h"

@@ -1,6 +1,6 @@
 // Renders what the window shows on a separate thread: coarse frames while the camera moves, and at rest the
-// image in passes, until it has all samples. A new request ends the work on the last one. When the scene's
-// files change they are read again, and so they are for another frame of an animation.
+// image in passes until it has all samples. A new request ends the work on the previous one. The scene is
+// re-read when its files change and for another frame of an animation.
 #pragma once
 
 #include "host/image/image.h"
@@ -13,11 +13,11 @@ typedef struct {
     const Device *device;
     const char *scene_path;
     SceneOptions scene_options;
-    RenderSettings settings; // all but the size
+    RenderSettings settings; // of everything but the size
     // Called on the loop's thread when there is something to take.
     void (*notify)(void *context);
     void *notify_context;
-    // Writes a complete image: its color, in the precision that it was rendered in. False with a message if
+    // Writes the color of a complete image in the precision of its render. Returns false with a message if
     // it cannot.
     bool (*save)(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
                  Renderer *renderer, const Film *film, MessageList *messages);
@@ -37,7 +37,7 @@ typedef struct {
     // Distance from the eye to each pixel's hit point, infinite where nothing is hit; NULL: not known yet.
     float *distances;
     uint32_t samples;     // per pixel; 0: a coarse frame
-    double largest_error; // of a heat map of errors; of other frames negative
+    double largest_error; // of a heat map of errors; negative for other frames
     char *summary;        // lines of text: device, precision, samples, times
 } Frame;
 
@@ -45,17 +45,17 @@ void frame_free(Frame *frame); // and zeroes
 
 typedef struct FrameLoop FrameLoop;
 
-// Starts to read the scene.
+// Opens a loop, which starts to read the scene.
 FrameLoop *frame_loop_open(const FrameLoopOptions *options);
 // Ends the work and waits for it.
 void frame_loop_close(FrameLoop *loop);
 
 // Appends the stage of the work that the next frame waits for, such as "reading bunny.obj 41%", and sets the
-// seconds since that work began. False: there is none.
+// seconds since that work began. Returns false if there is none.
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds);
 
-// LOADED once the scene was read; `size` is then its image's. REFUSED: its file has a mistake, which the
-// message says, and no scene was read before.
+// LOADED: the scene was read, and `size` is its image's. REFUSED: its file has a mistake, which the message
+// states, and no scene was read before.
 typedef enum { SCENE_LOADING, SCENE_LOADED, SCENE_REFUSED } SceneState;
 SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size);
 
@@ -71,31 +71,31 @@ typedef struct {
 
 // Asks for an image of the scene that was loaded. Returns the request's number, from 1.
 unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
-// Asks for the image of the last request to be saved when it is complete: its color.
+// Asks for the color of the last request's image to be saved when it is complete.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
-// Asks what a pixel of the last request's image sees; pixel_facts says it.
+// Asks what a pixel of the last request's image sees. frame_loop_take_facts returns the answer.
 void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y);
-// The answer to the last question. Caller frees; NULL: none since the last call.
+// Returns the answer to the last question, or NULL if none came since the last call. The caller frees it.
 char *frame_loop_take_facts(FrameLoop *loop);
 
-// Writes the camera into the scene's file, which then is not read again for that; with a `frame`, as keys
-// there. False with messages if it cannot.
+// Writes the camera into the scene's file, which is not re-read because of that. With a `frame`, writes keys
+// there. Returns false with messages if it cannot.
 bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32_t *frame,
                              MessageList *messages);
 
-// Exchanges `frame` for the newest one. False: there is none that was not taken before.
+// Exchanges `frame` for the newest one. Returns false if that was already taken.
 bool frame_loop_take(FrameLoop *loop, Frame *frame);
 // The scene that was read last.
 typedef struct {
-    Camera camera;        // its own
-    bool has_new_camera;  // other than before at the same frame, or the first
+    Camera camera;        // the scene's own
+    bool has_new_camera;  // differs from the previous one of the same frame, or is the first
     uint32_t frame;       // of the animation
     uint32_t frame_count; // 0: not given, or the file cannot be read again, as standard input
     double frame_rate;    // 0: not given
 } SceneUpdate;
 // Returns false if none was read since the last call.
 bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update);
-// What went wrong, or was saved, since the last call; empty: what was wrong is fixed. Caller frees; NULL:
-// nothing.
+// Returns what went wrong, or was saved, since the last call, "" if a mistake was fixed, or NULL. The caller
+// frees it.
 char *frame_loop_take_message(FrameLoop *loop);

@@ -1,4 +1,4 @@
-// The state of a FrameLoop, and what the files that work on it have from one another.
+// The state of a FrameLoop, and the functions that its files share.
 #pragma once
 
 #include "host/view/frame_loop.h"
@@ -45,7 +45,7 @@ struct FrameLoop {
     FrameRequest current;
     unsigned current_number;
     double move_seconds, render_start;
-    double expected_move; // to another eye, in seconds; slow moves are forgotten little by little
+    double expected_move; // to another eye, in seconds; decays after a slow move
     Film film; // of the image or the coarse frame; its color is a sum of samples, at the end their mean
     Frame frame;
     Preview preview;
@@ -53,7 +53,7 @@ struct FrameLoop {
 
 // frame_exchange.c
 
-// Returns whether the current render should end; the renderers' `stop`, whose context is the loop.
+// Returns whether the current render should end. It is the renderers' `stop`, whose context is the loop.
 bool render_stops(void *context);
 
 // Called by the thread that watches the scene's files.
@@ -61,21 +61,21 @@ void files_changed(void *context);
 
 typedef enum { WORK_RENDER, WORK_SAVE, WORK_PROBE, WORK_RELOAD, WORK_END } Work;
 
-// Waits for the next work and takes it. WORK_SAVE sets the path, which the caller frees.
+// Waits for the next work and returns it. WORK_SAVE sets the path, which the caller frees.
 Work work_wait(FrameLoop *loop, bool can_save, char **save_path);
-// Takes the pixel of a question that has no answer yet. False: there is none.
+// Sets the pixel of a question that has no answer yet. Returns false if there is none.
 bool probe_take(FrameLoop *loop, uint32_t pixel[2]);
 // Takes ownership of the facts.
 void facts_publish(FrameLoop *loop, char *facts);
-// Takes ownership of the message. "" removes the last one; others follow those that the window has not taken.
+// Takes ownership of the message. "" removes the last one; others are appended to those not yet taken.
 void message_publish(FrameLoop *loop, char *message);
 // Takes ownership of the messages.
 void messages_publish(FrameLoop *loop, MessageList *messages);
 void frame_publish(FrameLoop *loop, uint32_t samples);
-// The view gets the scene's camera if it follows that. A camera that was changed in the file becomes the
-// view's: the window asks for its image.
+// Publishes the scene. A view that follows the scene's camera gets it. A camera that was changed in the file
+// becomes the view's, and the window asks for its image.
 void scene_publish(FrameLoop *loop);
-// The scene cannot be read or rendered.
+// Publishes that the scene cannot be read or rendered.
 void refusal_publish(FrameLoop *loop);
 
 // frame_fill.c
@@ -87,7 +87,7 @@ void distances_fill(FrameLoop *loop);
 
 // frame_render.c
 
-// Renders the current request, until another comes. True: its image is complete.
+// Renders the current request until another comes. Returns true if its image is complete.
 bool request_render(FrameLoop *loop);
 // Answers the question about a pixel, if there is one.
 void probe_answer(FrameLoop *loop);
@@ -99,8 +99,8 @@ double move_guess(const Renderer *renderer);
 
 // scene_reload.c
 
-// Whether the scene's file is what was written into it here.
+// Returns whether the scene's file is what was written into it here.
 bool is_own_write(FrameLoop *loop);
-// Reads the scene at the current request's frame, for the first time or again. False, with a message
-// published, where it has a mistake: the last one stays.
+// Reads the scene at the current request's frame, for the first time or again. Returns false with a message
+// published if it has a mistake, and keeps the previous scene.
 bool scene_reload(FrameLoop *loop);

@@ -1,4 +1,4 @@
-// Renders requests: while the camera moves a coarse frame, then the image in passes.
+// Renders requests: a coarse frame while the camera moves, then the image in passes.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/clock.h"
@@ -86,13 +86,13 @@ void failure_publish(FrameLoop *loop)
     compute_close(&loop->compute);
 }
 
-// It runs on several threads, compiling on one.
+// Halves the compile time, because a move uses several threads and compiling uses one.
 double move_guess(const Renderer *renderer)
 {
     return renderer_report(renderer)->flatten_seconds / 2;
 }
 
-// Opens or moves the renderer for an image of the divisor. False, with a message published, if it cannot.
+// Opens or moves the renderer for an image of the divisor. Returns false with a message if it cannot.
 static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples, bool is_preview)
 {
     double start = clock_seconds();
@@ -125,8 +125,8 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
     return prepared;
 }
 
-// Moving a large scene to another eye takes long: waits until no request has come for a while. False: one
-// came.
+// Waits until no request has come for a while, because moving a large scene to another eye takes long.
+// Returns false if one came.
 static bool camera_rests(FrameLoop *loop)
 {
     if (loop->expected_move > PREVIEW_SECONDS) {
@@ -172,7 +172,7 @@ static bool reference_take(void *context, const Film *band, double fraction_done
     return true;
 }
 
-// Replaces the image by the heat map of its errors. False: stopped, or failed.
+// Replaces the image by the heat map of its errors. Returns false if it was stopped or failed.
 static bool errors_render(FrameLoop *loop)
 {
     RenderSettings settings = loop->settings;

@@ -1,4 +1,4 @@
-// What mouse and keys do, for glint view --help, its manual page and the window's help.
+// The effects of mouse and keys, for glint view --help, its manual page and the window's help.
 #pragma once
 
 // KEY(input, effect)

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <stdio.h>
 
-// In characters.
+// Sizes in characters.
 enum { LABEL_WIDTH = 6, BAR_WIDTH = 2, LEGEND_WIDTH = 17 };
 
 static void bar_draw(SDL_Renderer *target, SDL_Rect place)

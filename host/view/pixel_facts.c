@@ -34,9 +34,9 @@ static TraceRay ray_from(const double origin[3], const double direction[3])
 
 static void branch_write(PathText *tree, const Branch *branch);
 
-// The secondary rays of a hit (kernels/shading/bounce.h). The reflected one carries what is not transmitted,
-// at total internal reflection or by Fresnel's equations. Without transmission the latter leave its part
-// unknown.
+// Writes the secondary rays of a hit (kernels/shading/bounce.h). At total internal reflection or by
+// Fresnel's equations, the reflected one carries what is not transmitted. Without transmission, Fresnel's
+// equations leave its part unknown.
 static void branches_write(PathText *tree, const Branch *branch, const Material *material,
                            const TraceHit *hit)
 {

@@ -1,4 +1,4 @@
-// What a pixel sees, in words.
+// Describes in words what a pixel sees.
 #pragma once
 
 #include "host/render/renderer.h"
@@ -13,7 +13,7 @@ typedef struct {
     double min_contribution;
 } PixelView;
 
-// Traces the ray through the center of a pixel and its tree of reflected and refracted rays. A line per ray:
-// the object, its place in the scene's file, its material and t; for the first ray also hit point and normal.
-// A failure of the device ends the text. Caller frees.
+// Traces the ray through the center of a pixel and its tree of reflected and refracted rays. Returns a line
+// per ray: the object, its place in the scene's file, its material and t; for the first ray also hit point
+// and normal. A failure of the device ends the text. The caller frees it.
 char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y);

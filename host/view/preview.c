@@ -5,7 +5,7 @@
 
 enum { DIVISOR_MAX = 16, DIVISOR_FIRST = 4 };
 
-// A finer frame must fit well: where it just does, the divisor would change with every frame.
+// A finer frame must fit with this margin. Otherwise the divisor would change with every frame.
 static const double MARGIN = 0.75;
 
 static double median_of_3(const double values[3])

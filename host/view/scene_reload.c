@@ -1,4 +1,4 @@
-// Reads the scene, for the first time and when its files change, and writes the camera into it.
+// Reads the scene initially and when its files change, and writes the camera into it.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/memory.h"
@@ -7,16 +7,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The scene's file is watched before it is read, and so are those that it names: no change is missed. They
-// stay watched where the scene has a mistake, which may lie in one of them.
+// Watches a file of the scene before it is read, so that no change is missed. Files stay watched if the
+// scene has a mistake, which may lie in any of them.
 static void file_watch(void *context, const char *path)
 {
     const FrameLoop *loop = context;
     watch_add(loop->watch, path);
 }
 
-// Replaces the renderer by one of the scene, which keeps the kernels that suit. False: the scene cannot be
-// rendered, and the last one stays.
+// Replaces the renderer by one of the scene, which keeps the kernels that suit. Returns false, and keeps the
+// previous one, if the scene cannot be rendered.
 static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *messages)
 {
     if (loop->current_number == 0) return true; // no image was asked for
@@ -38,7 +38,7 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
         message_list_free(&known);
         return false;
     } else {
-        compute_close(&loop->compute); // the image, which is due, opens it again or says why not
+        compute_close(&loop->compute); // the image, which is due, reopens it or reports why not
     }
     return true;
 }
@@ -110,7 +110,7 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
         output_abandon(&output);
         return false;
     }
-    // before the change can be seen, which the loop must know as its own
+    // before the change is visible, so that the loop recognizes it as its own
     pthread_mutex_lock(&loop->mutex);
     text_free(&loop->written);
     loop->written = text;

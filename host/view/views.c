@@ -64,7 +64,7 @@ static double pixel_error(const Film *film, const Film *reference, size_t pixel)
 {
     double error = 0;
     for (size_t i = 3 * pixel; i < 3 * pixel + 3; i++) {
-        if (film->color[i] == reference->color[i]) continue; // also infinite ones
+        if (film->color[i] == reference->color[i]) continue; // equal, even if infinite
         double difference = fabs(film->color[i] - reference->color[i]);
         error = isnan(difference) ? INFINITY : fmax(error, difference);
     }

@@ -1,4 +1,4 @@
-// What the window shows of an image.
+// Converts an image to what the window shows.
 #pragma once
 
 #include "host/image/image.h"
@@ -19,16 +19,16 @@ typedef enum { VIEW_LIST(VIEW_NUMBER) VIEW_COUNT } View;
 extern const char *const view_names[VIEW_COUNT];
 extern const unsigned view_aovs[VIEW_COUNT];
 
-// Display values (RGB) of a film's color, which is the sum of `sample_count` samples.
+// Sets display values (RGB) from a film's color, which is the sum of `sample_count` samples.
 void view_color(uint8_t *pixels, const Film *film, uint32_t sample_count, Transfer transfer);
 
-// Display values of the view's AOVs: depth as 1 / (1 + (t / distance_half)^2); normals from -1..1 to 0..1
-// per axis; a random color for each object; the share of lights that are not occluded. Nothing hit is black.
+// Sets display values of the view's AOVs: depth as 1 / (1 + (t / distance_half)^2); normals from -1..1 to
+// 0..1 per axis; a random color for each object; the share of lights that are not occluded. A miss is black.
 void view_aov(uint8_t *pixels, const Film *film, View view, double distance_half);
 
 // The error that is white in the heat map of errors.
 #define VIEW_ERROR_WHITE 1e-3
 
-// A heat map of each pixel's largest difference of a channel, on a logarithmic scale: black up to
-// HEATMAP_DECADES powers of ten below white. Returns the largest of the image.
+// Sets a heat map of each pixel's largest difference of a channel, on a logarithmic scale, which is black up
+// to HEATMAP_DECADES powers of ten below white. Returns the largest difference of the image.
 double view_error(uint8_t *pixels, const Film *film, const Film *reference);

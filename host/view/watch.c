@@ -1,5 +1,5 @@
-// Folders are watched, not files: a file that is replaced by renaming is another one, and its watch would
-// stay with the old.
+// Watches folders, not files, because a file that is replaced by renaming is another one, and its watch
+// would stay with the old one.
 #include "host/view/watch.h"
 
 #include "host/base/array.h"
@@ -26,7 +26,7 @@ struct Watch {
     void *context;
     int notify, end; // inotify; an event that ends the thread
     pthread_t thread;
-    pthread_mutex_t mutex; // of what follows
+    pthread_mutex_t mutex; // guards what follows
     bool has_failed;       // a folder cannot be watched, which is reported once
     struct {
         WatchedFile *items;
@@ -46,7 +46,7 @@ static bool is_watched(Watch *watch, const struct inotify_event *event)
     return found;
 }
 
-// Reads all events that are there. Whether one is of a watched file.
+// Reads all pending events. Returns whether one is of a watched file.
 static bool events_read(Watch *watch)
 {
     _Alignas(struct inotify_event) char events[4096];
@@ -129,7 +129,7 @@ static void file_add(Watch *watch, const char *path)
     const int error = errno;
     free(folder);
     if (descriptor < 0) {
-        // who reads a file says that it is missing
+        // the reader of a missing file reports it
         if (error != ENOENT && !watch->has_failed) failure_print(path, " and perhaps of others", error);
         watch->has_failed |= error != ENOENT;
         return;
@@ -146,7 +146,7 @@ void watch_add(Watch *watch, const char *path)
     pthread_mutex_unlock(&watch->mutex);
 }
 
-// Folders are watched until the end: what happens to their other files is ignored.
+// Folders stay watched until the end. Events of their other files are ignored.
 void watch_only(Watch *watch, const char *path)
 {
     if (!watch) return;

@@ -1,4 +1,4 @@
-// Reports when one of some files changes: is written, or replaced by another of its name, as many editors do.
+// Reports when a watched file is written or replaced by another of its name, as many editors do.
 #pragma once
 
 #include <stddef.h>
@@ -8,7 +8,7 @@ typedef struct Watch Watch;
 // Calls `changed` on a separate thread. Returns NULL and prints a warning if the system cannot watch files.
 Watch *watch_open(void (*changed)(void *context), void *context);
 void watch_close(Watch *watch); // accepts NULL
-// watch_only watches this file alone, watch_add also this one. It need not exist. Both accept NULL, and print
-// a warning if the system cannot watch it.
+// watch_only watches this file alone, watch_add in addition to others. It need not exist. Both accept NULL,
+// and print a warning if the system cannot watch it.
 void watch_only(Watch *watch, const char *path);
 void watch_add(Watch *watch, const char *path);

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// In milliseconds: how often interrupts are noticed, and the camera flies or frames play.
+// Milliseconds between checks for interrupts, and between steps while the camera flies or frames play.
 enum { WAIT_AT_REST = 100, WAIT_IN_FLIGHT = 4 };
 
 static void frame_notify(void *context)
@@ -62,7 +62,7 @@ static void facts_exchange(Window *window)
     window->redraws = true;
 }
 
-// Called again and again: as the event of a new size comes, SDL 2 on SDL 3 still has the old one.
+// Reads the size. Called repeatedly, since at the event of a new size SDL 2 on SDL 3 still has the old one.
 static void size_read(Window *window)
 {
     int width = 1, height = 1;
@@ -74,7 +74,7 @@ static void size_read(Window *window)
     window->image_changed = true;
 }
 
-// Events about a scene and its camera, which are not there until the scene is loaded.
+// Returns whether an event is about a scene and its camera, which do not exist until the scene is loaded.
 static bool needs_scene(const SDL_Event *event)
 {
     switch (event->type) {
@@ -132,7 +132,7 @@ static void message_take(Window *window)
     message_show(window, message);
 }
 
-// The window's size in points, at most what the display has room for.
+// Returns the window's size in points, at most what fits the display.
 static ImageSize size_fit(ImageSize size)
 {
     SDL_Rect room;
@@ -141,7 +141,7 @@ static ImageSize size_fit(ImageSize size)
     return (ImageSize){(uint32_t)fmax(1, size.width * factor), (uint32_t)fmax(1, size.height * factor)};
 }
 
-// The size is the scene's own unless another was asked for.
+// Receives the loaded scene. The size is the scene's own unless another was asked for.
 static void scene_receive(Window *window)
 {
     ImageSize size;
@@ -226,8 +226,8 @@ static void window_close(Window *window)
     caption_close(window->caption);
     if (window->texture) SDL_DestroyTexture(window->texture);
     if (window->target) SDL_DestroyRenderer(window->target);
-    // X11's window stays until the process ends: the loop's last event to it may still be on its way, on a
-    // separate connection, and Xlib ends the process with status 1 where it finds no window.
+    // X11's window stays until the process ends. The loop's last event to it may still be on its way, on a
+    // separate connection, and Xlib ends the process with status 1 if it finds no window.
     const char *driver = SDL_GetCurrentVideoDriver();
     if (driver && strcmp(driver, "x11") == 0) return;
     if (window->window) SDL_DestroyWindow(window->window);
@@ -240,7 +240,7 @@ static bool is_set(const char *variable)
     return value && value[0];
 }
 
-// Without a display SDL 2 takes a driver that shows nothing, and SDL 3 takes none.
+// Returns whether a display exists. Without one, SDL 2 uses a driver that shows nothing, SDL 3 none.
 static bool display_exists(void)
 {
     const char *driver = SDL_GetCurrentVideoDriver();
@@ -249,8 +249,8 @@ static bool display_exists(void)
     return strcmp(driver, "offscreen") != 0 && strcmp(driver, "dummy") != 0;
 }
 
-// Returns the scale of text: the pixels of a point of the window; where that has one, as X11's, more on a
-// display of many pixels per inch.
+// Returns the scale of text: the pixels per point of the window or, if that is 1, as on X11, a larger one on
+// a display of many pixels per inch.
 static float text_scale(const Window *window, ImageSize size)
 {
     const float pixels = (float)window->size.width / (float)size.width, usual_dpi = 96;

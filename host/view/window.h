@@ -1,17 +1,17 @@
-// The window of glint view: shows what a FrameLoop renders, and turns mouse and keys into requests.
+// The window of glint view. It shows what a FrameLoop renders, and turns mouse and keys into requests.
 #pragma once
 
 #include "host/view/frame_loop.h"
 
 typedef struct {
-    FrameLoopOptions frames; // but for notify
+    FrameLoopOptions frames; // all but notify
     ImageSize size;          // of the window, reduced to fit the display; 0: the scene's own
-    bool writes_camera;      // into the scene's file, not only to standard output
-    bool (*stop)(void);      // true ends it: an interrupt
+    bool writes_camera;      // writes it to the scene's file, not only to standard output
+    bool (*stop)(void);      // returns true to end it, at an interrupt
 } WindowOptions;
 
 typedef enum { WINDOW_CLOSED, WINDOW_STOPPED, WINDOW_ABSENT, WINDOW_REFUSED } WindowEnd;
 
-// Opens the window and returns when it is closed. WINDOW_ABSENT: it cannot be opened; WINDOW_REFUSED: the
-// scene's file has a mistake. The reason was printed.
+// Opens the window and returns when it is closed. WINDOW_ABSENT: it cannot be opened. WINDOW_REFUSED: the
+// scene's file has a mistake. In both cases the reason was printed.
 WindowEnd window_run(const WindowOptions *options);

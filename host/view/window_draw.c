@@ -5,7 +5,7 @@
 #include "host/view/keys.h"
 #include "host/view/legend.h"
 
-static const double STAGE_SECONDS = 0.3; // what takes less is not shown
+static const double STAGE_SECONDS = 0.3; // shorter stages are not shown
 
 #define HELP_ROW(input, effect) {input, effect},
 static const struct {
@@ -69,7 +69,7 @@ static void help_draw(const Window *window)
     text_free(&help);
 }
 
-// The times, and what the pixel under the cursor sees.
+// Draws the times and what the pixel under the cursor sees.
 static void facts_draw(const Window *window)
 {
     Text text = {0};
@@ -82,7 +82,7 @@ static void facts_draw(const Window *window)
     text_free(&text);
 }
 
-// The message, and what keeps the next frame waiting.
+// Draws the message and what keeps the next frame waiting.
 static void message_draw(const Window *window)
 {
     Text text = {0};

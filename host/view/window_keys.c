@@ -1,4 +1,4 @@
-// What the keys do.
+// Handles the keys.
 #include "host/view/window_state.h"
 
 #include "host/base/memory.h"
@@ -17,7 +17,7 @@ static void arrow_turn(Window *window, double yaw, double pitch)
     window->camera_changed = true;
 }
 
-// With a `frame`, writes keys there.
+// Writes the camera. With a `frame`, writes keys there.
 static void camera_write(Window *window, const uint32_t *frame)
 {
     MessageList messages = {0};
@@ -78,7 +78,7 @@ static void image_save(Window *window, const char *ending)
         text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
     } while (access(text_c(&path), F_OK) == 0);
     window->plays = false;
-    request_send(window); // what is saved is what was asked for before
+    request_send(window); // saves what was asked for before
     frame_loop_save(window->frames, text_c(&path));
     text_free(&path);
 }

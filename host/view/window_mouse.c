@@ -1,4 +1,4 @@
-// What the mouse does with the camera, and the keys that fly while it looks around.
+// Moves the camera by the mouse, and by the keys that fly while it looks around.
 #include "host/view/window_state.h"
 
 #include "host/base/clock.h"
@@ -20,7 +20,7 @@ static double target_distance(const Window *window)
     return vector_length(vector_subtract(window->camera.look_at, window->camera.position));
 }
 
-// The distance to what is seen in a pixel, where the shown image is of this camera and knows it; else 0.
+// Returns the distance of what a pixel shows, or 0 if the shown image lacks it or has another camera.
 static double distance_known(const Window *window, const double at[2])
 {
     const Frame *frame = &window->frame;
@@ -32,8 +32,8 @@ static double distance_known(const Window *window, const double at[2])
     return distance < INFINITY ? (double)distance : 0;
 }
 
-// The point seen in a pixel: where that is not known, the point that was last picked there, or one as far
-// away as the point looked at.
+// Sets the pivot to the point seen in a pixel. If that is not known, uses the point that was last picked
+// there, or one as far away as the point looked at.
 static void pivot_pick(Window *window, const double at[2])
 {
     double distance = distance_known(window, at);

@@ -1,4 +1,4 @@
-// The state of the window, and what the files that work on it have from one another.
+// The state of the window, and the functions that its files share.
 #pragma once
 
 #include "host/view/caption.h"
@@ -20,7 +20,7 @@ typedef struct {
     ImageSize size; // in pixels, which a point of the window may have several of
     Camera camera;  // follows the scene's own unless it was moved
     SceneUpdate scene;
-    uint32_t scene_frame; // of the animation, which the last request was for or the next will be
+    uint32_t scene_frame; // the animation's frame of the last or the next request
     View view;
     Precision precision;
     bool camera_changed, scene_frame_changed, image_changed;
@@ -44,7 +44,7 @@ typedef struct {
     double hover[2]; // the cursor, in pixels
     char *facts;     // of the pixel there; NULL: not shown, or not known yet
     bool shows_facts, facts_are_due, prints_facts;
-    unsigned facts_request; // whose image they are of
+    unsigned facts_request; // the request whose image they describe
     bool shows_help, shows_times, redraws, closes;
 } Window;
 
@@ -56,18 +56,17 @@ void message_show(Window *window, char *message);
 void request_send(Window *window);
 
 // window_mouse.c
-// Pixels of a position in the window's points.
+// Converts a position in the window's points to pixels.
 void position_set(const Window *window, double position[2], int x, int y);
 void drag_begin(Window *window, const SDL_MouseButtonEvent *event);
 void drag_move(Window *window, const SDL_MouseMotionEvent *event);
 void wheel_turn(Window *window, const SDL_MouseWheelEvent *event);
-// Moves the camera as the keys have been held since the last call.
+// Moves the camera by the keys that were held since the last call.
 void fly(Window *window);
 
 // window_time.c
 bool has_time_line(const Window *window);
-// Shows a frame of the animation. Frames before the first are the last ones, and those behind the last the
-// first.
+// Shows a frame of the animation. Numbers before the first frame and behind the last wrap around.
 void scene_frame_show(Window *window, int64_t frame);
 void play_toggle(Window *window);
 // Shows the frame that is due, once the last one is shown.
@@ -80,12 +79,12 @@ void time_line_follow(Window *window, const double at[2]);
 void time_line_draw(const Window *window);
 
 // window_keys.c
-// Records the camera at this frame of the animation, if it is asked for and the scene of the frame was read.
+// Records the camera at this frame of the animation if asked to and once the scene of the frame was read.
 void key_record(Window *window);
 void key_press(Window *window, const SDL_KeyboardEvent *event);
 
 // window_draw.c
 void frame_show(Window *window); // from the next drawing on
-// Takes what the loop is doing, if it takes long.
+// Sets the text of the loop's current stage if that takes long.
 void stage_show(Window *window);
 void window_draw(Window *window);

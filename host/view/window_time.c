@@ -1,4 +1,4 @@
-// The time line of an animation along the lower edge of the window, and how its frames play.
+// Draws the time line of an animation along the lower edge of the window, and plays its frames.
 #include "host/view/window_state.h"
 
 #include "host/base/clock.h"

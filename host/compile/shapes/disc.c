@@ -8,8 +8,8 @@ static bool disc_bounds(const Scene *scene, const Object *object, Bounds *bounds
     return true;
 }
 
-// Where the center's rounding would move the disc, or its rim, by more than 4 roundings of the distance from
-// the eye, it is where its plane meets a sphere that is defined by the eye's power.
+// Sets the eye's power if the center's rounding would move the disc, or its rim, by more than 4 roundings of
+// its distance from the eye. The disc is then where its plane intersects a sphere that the power defines.
 static void disc_take_power(Disc *disc, Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
@@ -47,7 +47,7 @@ static BoundingSphere disc_bounding_sphere(const void *primitive)
     return (BoundingSphere){vector3_of(&disc->center_radius), disc->center_radius.w};
 }
 
-// Those of its bounding sphere: where the ray lies nearly in its plane, t is uncertain by as much.
+// Sets the bounding sphere's bounds, because t is uncertain by as much for rays nearly in the disc's plane.
 static bool disc_primitive_bounds(const void *primitive, Bounds *bounds)
 {
     const Disc *disc = primitive;

@@ -2,8 +2,8 @@
 #include "host/compile/instances.h"
 #include "host/compile/shapes.h"
 
-// Returns half the size of the box around the oval: a ball in its space, a disc across z and a line along it,
-// added, contain the unit shape.
+// Returns half the size of the box around the oval. In its space, the sum of a ball, a disc across z and a
+// line along z contains the unit shape.
 static Vector3 oval_half_extents(const Object *object)
 {
     const double *radii = object->as.oval.radii;
@@ -92,7 +92,7 @@ static double oval_largest_coordinate(const void *primitive)
     return vector_largest((Vector3){oval->rows[0].w, oval->rows[1].w, oval->rows[2].w}) + oval->sizes.x;
 }
 
-// Not among the random shapes: tests/test_ovals.c transforms those.
+// Lacks random shapes; tests/test_ovals.c transforms others.
 const ShapeOps oval_ops = {
     .type = TYPE_OVALS,
     .vectors = {offsetof(Object, as.oval.center), offsetof(Object, as.oval.axes[0]),

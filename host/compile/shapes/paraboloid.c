@@ -18,7 +18,7 @@ static ParaboloidFromEye paraboloid_from_eye(Quad3 apex, Quad3 unit_axis, Quad f
     return relative;
 }
 
-// Whether rounding moves the side, or the end, by more than 2 roundings of its distance from the eye.
+// Returns whether rounding moves the side or the end by more than 2 roundings of its distance from the eye.
 static bool paraboloid_moves(const Rounding *rounding, const Object *object, const Paraboloid *stored,
                              const ParaboloidFromEye *exact)
 {
@@ -31,7 +31,7 @@ static bool paraboloid_moves(const Rounding *rounding, const Object *object, con
     const double beyond = object->as.paraboloid.finite ? fmax(-below, 0) : 0;
     const double side = fabs((double)(stored_from_eye.outside - exact->outside));
     if (!(side <= tolerance * hypotenuse((double)exact->outside, beyond)))
-        return true; // nor if it is not a number
+        return true; // or it is not a number
     if (!object->as.paraboloid.finite) return false;
     const double rim = 2 * sqrt(object->as.paraboloid.focal_length * object->as.paraboloid.height),
                  from_rim = (double)quad3_length(exact->foot) - rim;
@@ -40,7 +40,7 @@ static bool paraboloid_moves(const Rounding *rounding, const Object *object, con
            tolerance * hypotenuse(below, across);
 }
 
-// Where rounding matters, the eye's power defines it.
+// Lets the eye's power define the paraboloid if rounding matters.
 static void paraboloid_take_power(Paraboloid *shape, Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
@@ -76,8 +76,8 @@ static void paraboloid_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_PARABOLOIDS, &paraboloid, object->material);
 }
 
-// How far the shape reaches from its apex in a direction with the part `along` the unit axis and `across` it:
-// to the rim, or to where the side is square to the direction, at the height focal_length across^2 / along^2.
+// Returns how far the shape reaches in a direction with the parts `along` and `across` the unit axis: to the
+// rim, or to where the side is square to the direction, at the height focal_length across^2 / along^2.
 static double paraboloid_extent(double along, double across, double focal_length, double height)
 {
     const double square = along < 0 ? focal_length * (across / along) * (across / along) : height;
@@ -126,7 +126,7 @@ static double paraboloid_largest_coordinate(const void *primitive)
 
 enum { PARABOLOID_CAPPED, PARABOLOID_OPEN, PARABOLOID_INFINITE };
 
-// A rim from a fifth to twice as wide as the paraboloid is high.
+// Makes a random paraboloid whose rim is from a fifth to twice as wide as it is high.
 static void paraboloid_randomize(RandomShape *made, unsigned form, Random *random)
 {
     double height = made->radius * random_between(random, 0.5, 3);

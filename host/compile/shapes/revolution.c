@@ -8,8 +8,8 @@ typedef struct {
     bool finite, caps, only_inside;
 } RevolutionGiven;
 
-// Both ends are rounded as points, so that they stay where the points of other objects are rounded to; unless
-// that turns the axis of a short shape far away, or leaves none: then its base alone is, and it keeps its
+// Rounds both ends as points, so that they stay where the points of other objects are rounded to. If that
+// turns the axis of a short shape far away, or leaves none, rounds only its base, and the shape keeps its
 // form.
 static Vector3 axis_between_rounded_ends(const Rounding *rounding, const RevolutionGiven *given, Vector3 base)
 {
@@ -69,7 +69,7 @@ static RevolutionFromEye revolution_from_eye_exact(const Rounding *rounding, con
                                given->base_radius, slope, height);
 }
 
-// As the kernel receives it without a power.
+// Returns the shape that the kernel receives without a power.
 static RevolutionFromEye revolution_from_eye_stored(const Rounding *rounding, const Revolution *stored)
 {
     const Quad3 axis = quad3(vector3_of(&stored->axis_slope));
@@ -85,7 +85,7 @@ static double difference(Quad a, Quad b)
     return fabs((double)(a - b));
 }
 
-// Most cylinders and cones are so far away, for their size, that roundings of their numbers do not matter.
+// Returns whether a shape is too far away, for its size, for rounding to matter. Most are.
 static bool revolution_is_far(const Rounding *rounding, const RevolutionGiven *given)
 {
     const Vector3 from = vector_subtract(given->from, rounding->eye), to = vector_add(from, given->axis);
@@ -95,8 +95,8 @@ static bool revolution_is_far(const Rounding *rounding, const RevolutionGiven *g
     return given->finite && 2 * distance > fmax(vector_length(from), vector_length(to)) + radius;
 }
 
-// Whether rounding moves the side, or an end, by more than the tolerance times its distance from the eye, or
-// leaves no shape at all, such as one whose ends are the same point: then differences are not numbers.
+// Returns whether rounding moves the side or an end by more than the tolerance times its distance from the
+// eye, or leaves no shape, for example one whose ends coincide. In that case differences are NaN.
 static bool revolution_moves(const RevolutionGiven *given, const RevolutionFromEye *exact,
                              const RevolutionFromEye *stored, double tolerance)
 {
@@ -117,7 +117,7 @@ static bool revolution_moves(const RevolutionGiven *given, const RevolutionFromE
     return false;
 }
 
-// Where rounding matters, everything is relative to the eye.
+// Makes everything relative to the eye if rounding matters.
 static void revolution_take_power(Revolution *shape, Flattening *flattening, const RevolutionGiven *given)
 {
     const Rounding *rounding = &flattening->rounding;
@@ -177,7 +177,7 @@ static void cone_flatten(Flattening *flattening, const Object *object)
     revolution_flatten(flattening, TYPE_CONES, object, &given);
 }
 
-// Sides without caps reach as far as the discs that end them.
+// Returns the bounds of the discs at the ends, which sides without caps reach.
 static Bounds frustum_bounds(Vector3 from, Vector3 axis, double radius_from, double radius_to)
 {
     return bounds_join(bounds_of_disc(from, axis, radius_from),
@@ -225,7 +225,7 @@ static double revolution_largest_coordinate(const void *primitive)
     return vector_largest(vector3_of(&shape->base_radius)) + fabs(shape->base_radius.w) / shape->range.y;
 }
 
-// A random axis and the two radii at its ends. Returns where it starts.
+// Chooses a random axis and the two radii at its ends. Returns where the axis starts.
 static Vector3 random_axis(RandomShape *made, double radii[2], Random *random)
 {
     double size = made->radius, length = size * random_between(random, 0.5, 3);

@@ -7,9 +7,9 @@ static bool sphere_bounds(const Scene *scene, const Object *object, Bounds *boun
     return true;
 }
 
-// The eye's power |center - eye|^2 - radius^2, in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot
-// product, 2005): its terms cancel to 2^-60 of them where the eye is 2^-60 radii from the surface; and how
-// far the rounding of center and radius moves the surface.
+// The eye's power |center - eye|^2 - radius^2 in pairs of doubles (Ogita, Rump, Oishi, Accurate sum and dot
+// product, 2005), whose terms cancel to 2^-60 of them if the eye is 2^-60 radii from the surface, and the
+// distance that the rounding of center and radius moves the surface.
 typedef struct {
     double power, moved;
 } EyePower;
@@ -34,7 +34,7 @@ static EyePower eye_power(const Rounding *rounding, const Object *object, Vector
     return (EyePower){sum + rest, sqrt(moved_square) + fabs(radius - rounded(rounding, radius))};
 }
 
-// Most spheres do not need their power: their surface moves by less than 4 roundings of its distance.
+// Sets the sphere's power if needed. The surface of most moves by less than 4 roundings of its distance.
 static void sphere_take_power(Sphere *sphere, Flattening *flattening, const Object *object, Vector3 center)
 {
     const Rounding *rounding = &flattening->rounding;

@@ -33,9 +33,9 @@ static Quad torus_gap(const TorusFromEye *relative, Quad minor)
     return (squared - minor * minor) / (quad_root(squared) + minor);
 }
 
-// Next to the eye, compared with the torus, the eye's power defines it: the ray's closest approach to the
-// center, from where the other form starts, is off by some roundings of its size, whether or not these move
-// the torus itself.
+// Lets the eye's power define a torus that is near the eye for its size. The ray's closest approach to the
+// center, where the other form starts, is off by some roundings of that size, whether or not they move the
+// torus itself.
 static void torus_take_power(Torus *torus, Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
@@ -84,8 +84,8 @@ static BoundingSphere torus_bounding_sphere(const void *primitive)
 
 enum { TORUS, TORUS_THIN, TORUS_FAT, TORUS_SPINDLE };
 
-// The tube of a spindle torus is wider than its circle: it has no hole. Half of them are aligned with a world
-// axis.
+// Makes a random torus, aligned with a world axis in half of the cases. The tube of a spindle torus is wider
+// than its circle, so it has no hole.
 static void torus_randomize(RandomShape *made, unsigned form, Random *random)
 {
     const double major = made->radius;

@@ -9,8 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-// a b - c d to 1.5 ulp (Kahan's; Jeannerod, Louvet, Muller, Further analysis of Kahan's algorithm for the
-// accurate computation of 2x2 determinants, Mathematics of Computation 82, 2013).
+// Returns a b - c d to 1.5 ulp (Kahan's; Jeannerod, Louvet, Muller, Further analysis of Kahan's algorithm
+// for the accurate computation of 2x2 determinants, Mathematics of Computation 82, 2013).
 static inline __attribute__((always_inline)) double product_difference(double a, double b, double c, double d)
 {
     double cd = c * d;
@@ -23,7 +23,7 @@ static inline __attribute__((always_inline)) Vector3 cross_product(Vector3 a, Ve
                      product_difference(a.x, b.y, a.y, b.x)};
 }
 
-// The normal of the corners before they are rounded, or 0 where the sine of the angle at `a` is below
+// Returns the normal of the corners before they are rounded, or 0 if the sine of the angle at `a` is below
 // `least_sine`.
 static Vector3 needle_normal(Vector3 a, Vector3 b, Vector3 c, double least_sine)
 {
@@ -50,8 +50,9 @@ static Vector3 certified_normal(const Rounding *rounding, Vector3 a, Vector3 b, 
     return vector_dot(across, across) >= least_squared ? across : needle_normal(a, b, c, least_in_quad);
 }
 
-// One without area shrinks to a point, which no ray meets: the kernels rotate vertices, and what was a line
-// could then have an area. One that loses its area in rounding stays: it fills what its neighbors leave open.
+// Returns a rounded triangle. One without area becomes a point, which no ray hits, since kernels rotate
+// vertices and a line could gain an area. One that rounding leaves without area stays, to fill what
+// neighbors leave open.
 static inline __attribute__((always_inline)) Triangle triangle_of(const Rounding *rounding, Vector3 a,
                                                                   Vector3 b, Vector3 c)
 {
@@ -71,7 +72,7 @@ static inline __attribute__((always_inline)) Triangle triangle_of(const Rounding
         scalar4_of(seen_a, normal.x), scalar4_of(seen_b, normal.y), scalar4_of(seen_c, normal.z), {0}};
 }
 
-// The same with instructions for fma, where the processor has them: a call takes as long as the rest.
+// A copy with fma instructions, for processors that have them, since a call takes as long as the rest.
 #ifdef __x86_64__
 __attribute__((target("fma"))) static Triangle triangle_of_fma(const Rounding *rounding, Vector3 a, Vector3 b,
                                                                Vector3 c)
@@ -88,7 +89,7 @@ static Triangle triangle_rounded(const Rounding *rounding, Vector3 a, Vector3 b,
     return triangle_of(rounding, a, b, c);
 }
 
-// Whether a triangle is so far away, for its size, that roundings of its numbers do not matter: most are.
+// Returns whether a triangle is too far away, for its size, for rounding to matter. Most are.
 static inline bool triangle_is_far(const Triangle *triangle)
 {
     const Vector3 a = vector3_of(&triangle->a);
@@ -97,8 +98,8 @@ static inline bool triangle_is_far(const Triangle *triangle)
     return 4 * vector_dot(outside, outside) > vector_dot(a, a);
 }
 
-// Where rounding moves the plane by more than 4 roundings of its distance from the eye, the eye's height
-// defines it, with the normal of the vertices before they are rounded.
+// Lets the eye's height define the plane, with the normal of the vertices before they are rounded, if
+// rounding moves the plane by more than 4 roundings of its distance from the eye.
 static void triangle_take_height(Triangle *triangle, Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
 {
     const Rounding *rounding = &flattening->rounding;
@@ -114,7 +115,7 @@ static void triangle_take_height(Triangle *triangle, Flattening *flattening, Vec
     const double above = fabs((double)(height / length)),
                  moved = fabs((double)(stored_height / stored_length - height / length));
     if (!(moved > 4 * roundoff_of(rounding) * above)) return;
-    // the normal takes the height's rounding to float: the plane stays where it is, also in double
+    // the height's rounding to float scales the normal, so that the plane stays, also in double
     const float eye_height = height == 0 ? -0.0f : (float)height;
     if (!isfinite(eye_height) || (eye_height == 0 && height != 0)) return;
     const Quad scale = height == 0 ? 1 : eye_height / height;
@@ -134,14 +135,14 @@ static Triangle triangle_make(Flattening *flattening, Vector3 a, Vector3 b, Vect
     return triangle;
 }
 
-// The attributes of a triangle that another eye saw stay.
+// Copies the attributes, which do not depend on the eye.
 static void triangle_keep_attributes(Triangle *triangle, const Triangle *moved)
 {
     triangle->id.y = moved->id.y;
     triangle->id.z = moved->id.z;
 }
 
-// What a triangle's id.y holds; a triangle with a vertex without a normal is flat. If the normals lie on
+// Returns a triangle's id.y. A triangle with a vertex without a normal is flat. If the normals lie on
 // different sides of the triangle, no nearby smooth surface has them, and shadow rays start on the triangle.
 static uint32_t normals_add(Flattening *flattening, const Vector3 vertices[3], Vector3 a, Vector3 b,
                             Vector3 c)
@@ -157,7 +158,7 @@ static uint32_t normals_add(Flattening *flattening, const Vector3 vertices[3], V
     return (uint32_t)flattening->normals_count;
 }
 
-// What a triangle's id.z holds.
+// Returns a triangle's id.z.
 static uint32_t uvs_add(Flattening *flattening, const Mesh *mesh, const MeshTriangle *triangle,
                         const uint32_t *corners, uint32_t material)
 {
@@ -181,7 +182,7 @@ static void triangle_flatten(Flattening *flattening, const Object *object)
     primitive_add(flattening, TYPE_TRIANGLES, &triangle, object->material);
 }
 
-// Corners of the triangle in the order of mesh_triangle_at.
+// Sets the corners of the triangle in the order of mesh_triangle_at.
 static void corners_ordered(const Mesh *mesh, const Object *object, size_t part, uint32_t corners[3])
 {
     memcpy(corners, mesh->triangles[part], 3 * sizeof *corners);

@@ -5,7 +5,7 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
     Vector3 corners[2] = {object->as.box.min, object->as.box.max};
     const Quad low[3] = {corners[0].x, corners[0].y, corners[0].z};
     const Quad high[3] = {corners[1].x, corners[1].y, corners[1].z};
-    // along an axis a hit is a comparison of given numbers, and nothing is open
+    // along an axis a hit is a comparison of given numbers, so nothing is uncertain
     bool along_axis = (ray->direction.x == 0) + (ray->direction.y == 0) + (ray->direction.z == 0) == 2;
     for (int axis = 0; axis < 3; axis++) {
         Quad3 along = {axis == 0, axis == 1, axis == 2};

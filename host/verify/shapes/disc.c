@@ -17,7 +17,7 @@ void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ra
 static void hit_disc(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad3 center = quad3(object->as.disc.center), normal = quad3(object->as.disc.normal);
-    // Seen edge on, a disc is there or not by the sign of the height of the eye over it.
+    // A disc that is seen edge on is hit or missed by the sign of the eye's height over it.
     hit_reduce_margin(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(center, ray->origin)));
     hit_disc_at(center, normal, object->as.disc.radius, ray, hit);
 }

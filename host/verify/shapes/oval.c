@@ -46,7 +46,7 @@ static Quad3 mapped_normal(const Inverse *inverse, Quad3 normal, Quad *length)
     return quad3_scale(along, 1 / *length);
 }
 
-// A surface bends at most |inverse|^2 / length times as much as the unit shape's.
+// Returns a radius of curvature. A surface bends at most |inverse|^2 / length times as much as the unit's.
 static Quad mapped_radius(const Inverse *inverse, Quad radius, Quad length)
 {
     return radius == UNBOUNDED ? radius : radius * length / (inverse->norm * inverse->norm);
@@ -68,7 +68,7 @@ static void hit_oval(const Object *object, const ReferenceRay *ray, ReferenceHit
     hit->curvature_radius = mapped_radius(&inverse, hit->curvature_radius, length);
 }
 
-// To first order: exact for points that are nearer to it than it is curved.
+// Measures the surface to first order, which suffices for points nearer to it than its radius of curvature.
 static void surface_oval(const Object *object, Quad3 point, ReferenceSurface *surface)
 {
     const Inverse inverse = inverse_of(object);

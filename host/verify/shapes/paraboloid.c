@@ -9,8 +9,8 @@ static void hit_paraboloid(const Object *object, const ReferenceRay *ray, Refere
     Quad a = quad3_dot(q, q), b = quad3_dot(m, q) - 2 * focal_length * quad3_dot(ray->direction, axis);
     Quad c = quad3_dot(m, m) - 4 * focal_length * quad3_dot(from, axis);
 
-    // How far the line is from one that only touches: the discriminant over its gradient, or less where it
-    // bends away from that.
+    // The distance of the line from a tangent is the discriminant over its gradient, or less where it bends
+    // away.
     Quad discriminant = b * b - a * c;
     Quad3 gradient = quad3_add(quad3_scale(quad3_cross(ray->direction, q), 4 * focal_length),
                                quad3_scale(q, 2 * quad3_dot(from, q)));
@@ -35,7 +35,7 @@ static void hit_paraboloid(const Object *object, const ReferenceRay *ray, Refere
                     ray, hit);
 }
 
-// To first order: exact for points that are nearer to it than it is curved.
+// Measures the surface to first order, which suffices for points nearer to it than its radius of curvature.
 static void surface_paraboloid(const Object *object, Quad3 point, ReferenceSurface *surface)
 {
     Quad focal_length = object->as.paraboloid.focal_length, height = object->as.paraboloid.height;

@@ -6,7 +6,7 @@ static void hit_plane(const Object *object, const ReferenceRay *ray, ReferenceHi
     // The ray has to turn by this angle to be parallel, which moves it by this margin at the distance of
     // `point`.
     hit_reduce_margin(hit, plane_cosine(ray, normal) * quad3_length(quad3_subtract(point, ray->origin)));
-    // Twice the height of the ray's start: on the plane itself the hit ends.
+    // Twice the height of the ray's start, because the hit ends on the plane itself.
     hit_reduce_margin(hit, 2 * quad3_dot(quad3_unit(normal), quad3_subtract(point, ray->origin)));
     Quad t;
     if (plane_crossing(ray, point, normal, &t)) hit_offer(hit, ray, t, normal, UNBOUNDED);

@@ -94,7 +94,7 @@ static void hit_revolution(const Object *object, const ReferenceRay *ray, Refere
                 body.base + body.slope * body.height, ray, hit);
 }
 
-// In the half-plane through the axis that holds the point: `along` the axis from the base, `off` it.
+// Measures in the half-plane of the axis and the point, `along` the axis from the base and `off` it.
 static void surface_revolution(const Object *object, Quad3 point, ReferenceSurface *surface)
 {
     Revolution body = revolution_of(object);

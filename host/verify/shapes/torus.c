@@ -10,8 +10,8 @@ static Quad polynomial_value(const Quad *coefficients, int degree, Quad x)
     return value;
 }
 
-// The zero between two places around which the polynomial only rises or only falls: Newton's method, and
-// halving where that leaves the bracket.
+// Returns the zero in an interval on which the polynomial is monotonic, by Newton's method, and by bisection
+// where that leaves the bracket.
 static Quad polynomial_zero(const Quad *coefficients, const Quad *derivative, int degree, Quad before,
                             Quad after)
 {
@@ -30,8 +30,8 @@ static Quad polynomial_zero(const Quad *coefficients, const Quad *derivative, in
     return x;
 }
 
-// Where a polynomial of degree 1..4 changes its sign between two places, ascending; returns how often. From
-// one such place of its derivative to the next it only rises or only falls.
+// Finds where a polynomial of degree 1..4 changes its sign in an interval, ascending, and returns how often.
+// It is monotonic between two such places of its derivative.
 static int polynomial_zeros(const Quad *coefficients, int degree, Quad low, Quad high, Quad zeros[])
 {
     Quad derivative[4], places[5] = {low};
@@ -48,8 +48,8 @@ static int polynomial_zeros(const Quad *coefficients, int degree, Quad low, Quad
     return count;
 }
 
-// Whether the ray's line certainly stays away from a torus' tube by an eighth of its radius: nothing of the
-// tube is nearer to a place than its own distance from it. In double, for rays from not too far.
+// Returns whether the ray's line certainly stays an eighth of the tube's radius away from a torus. It steps
+// by the distance of the tube, in double, for rays from not too far.
 static bool torus_is_clear(const Object *object, const ReferenceRay *ray)
 {
     const double major = object->as.torus.major, minor = object->as.torus.minor;
@@ -69,10 +69,10 @@ static bool torus_is_clear(const Object *object, const ReferenceRay *ray)
     return true;
 }
 
-// In the frame of the axis, from the ray's closest approach to the center on: the zeros of
-// (|p|^2 + R^2 - r^2)^2 - 4 R^2 (x^2 + y^2), and where it turns. Where r > R some have |p|^2 + R^2 - r^2
-// below 0, at r from the circle's far side: they lie within the solid. On the axis itself they coincide with
-// others, and the polynomial touches 0 only, which leaves the hit open.
+// Finds the zeros of (|p|^2 + R^2 - r^2)^2 - 4 R^2 (x^2 + y^2), and where it turns, in the frame of the axis
+// from the ray's closest approach to the center on. If r > R, some zeros have |p|^2 + R^2 - r^2 below 0, at
+// r from the circle's far side, and lie within the solid. On the axis itself they coincide with others, and
+// the polynomial only touches 0, which leaves the hit uncertain.
 static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)
 {
     Quad major = object->as.torus.major, minor = object->as.torus.minor;

@@ -2,8 +2,8 @@
 
 #include <math.h>
 
-// How far the ray's line passes outside a bounding sphere, at least; in double, so at most 0 where it is
-// near.
+// Returns a lower bound, in double, on how far the ray's line passes outside a bounding sphere; 0 or less
+// near it.
 static double sphere_clearance(const ReferenceRay *ray, Vector3 center, double radius)
 {
     Vector3 toward = vector_subtract(center, quad3_rounded(ray->origin));
