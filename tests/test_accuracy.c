@@ -275,7 +275,7 @@ TEST(test_judgement)
     }
     scene.variants[4].status = ACCURACY_REFERENCE;
     const AccuracyBudgets budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3};
-    accuracy_judge(&scene, &budgets);
+    accuracy_classify(&scene, &budgets);
     assert_int_equal(scene.recommendation_count, 3);
     const unsigned shading = 1u << ACCURACY_SHADING;
     assert_int_equal(scene.variants[0].disqualified, DISQUALIFIED_OBJECT);
@@ -307,7 +307,7 @@ TEST(test_judgement)
             series_add(&rows[i].times.frame, (i == 3 ? 2.01 + 0.02 * (double)(round % 2) : given[i].seconds) *
                                                  (double)(1 + round % 5));
     }
-    accuracy_judge(&scene, &budgets);
+    accuracy_classify(&scene, &budgets);
     assert_int_equal(scene.recommendations[0].variant, 1);
     assert_true(accuracy_ties(&scene.recommendations[0], 3));
     assert_false(accuracy_ties(&scene.recommendations[0], 2) || accuracy_ties(&scene.recommendations[0], 4));
@@ -320,13 +320,13 @@ TEST(test_judgement)
 
     // a reference that is faster than all leaves nothing to pick but itself
     rows[4].times.frame.items[0] = 0.5;
-    accuracy_judge(&scene, &budgets);
+    accuracy_classify(&scene, &budgets);
     assert_int_equal(scene.recommendations[0].variant, 4);
     assert_int_equal(scene.variants[1].pareto | scene.variants[2].pareto, 0);
 
     // no reference among them, and none exact enough
     scene.variants[4].status = ACCURACY_UNAVAILABLE;
-    accuracy_judge(&scene, &budgets);
+    accuracy_classify(&scene, &budgets);
     assert_true(scene.recommendations[2].variant == SIZE_MAX);
     for (size_t i = 0; i < VARIANTS; i++)
         bench_times_free(&rows[i].times);

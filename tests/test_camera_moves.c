@@ -286,7 +286,7 @@ static void check_pace(double move_seconds, double seconds_of_pixel, uint32_t ex
         divisor = preview_divisor(&preview, size.width, size.height);
         double pixels = (double)size.width / divisor * size.height / divisor;
         double seconds = pixels * seconds_of_pixel;
-        preview_note(&preview, divisor, move_seconds, seconds, pixels);
+        preview_record(&preview, divisor, move_seconds, seconds, pixels);
         if (frame >= 1 && divisor < 16) assert_true(move_seconds + seconds <= PREVIEW_SECONDS);
         if (frame >= 2) assert_int_equal(divisor, before);
     }
@@ -310,11 +310,11 @@ TEST(one_slow_frame_changes_nothing)
     const double pixels = (double)size.width / divisor * size.height / divisor;
     for (int frame = 0; frame < 6; frame++) {
         const double times_slower = frame == 3 ? 20 : 1;
-        preview_note(&preview, divisor, times_slower * 0.001, times_slower * pixels * 1e-7, pixels);
+        preview_record(&preview, divisor, times_slower * 0.001, times_slower * pixels * 1e-7, pixels);
         assert_int_equal(preview_divisor(&preview, size.width, size.height), divisor);
     }
-    preview_note(&preview, divisor, 0.001, 20 * pixels * 1e-7, pixels);
-    preview_note(&preview, divisor, 0.001, 20 * pixels * 1e-7, pixels);
+    preview_record(&preview, divisor, 0.001, 20 * pixels * 1e-7, pixels);
+    preview_record(&preview, divisor, 0.001, 20 * pixels * 1e-7, pixels);
     assert_true(preview_divisor(&preview, size.width, size.height) > divisor);
 }
 

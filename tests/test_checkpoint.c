@@ -366,12 +366,12 @@ TEST(test_a_render_resumes)
                                                                    .sink = band_sink,
                                                                    .context = &sink,
                                                                    .checkpoint = checkpoint});
-        for (BandRows rows; (rows = scheduler_take(scheduler, 0, BAND_ROWS, 1)).row_count > 0;) {
+        for (BandRows rows; (rows = scheduler_acquire(scheduler, 0, BAND_ROWS, 1)).row_count > 0;) {
             Values values;
             const Film band = band_make(&values, rows.first_row);
             assert_int_equal(rows.row_count, BAND_ROWS);
             assert_false(done >> rows.first_row / BAND_ROWS & 1);
-            assert_true(scheduler_give(scheduler, 0, &band));
+            assert_true(scheduler_deliver(scheduler, 0, &band));
         }
         WorkerShare share;
         assert_true(scheduler_close(scheduler, &share));

@@ -22,10 +22,10 @@ static const char kernel_text[] =
     "    Vector origin = {line[0], line[1], line[2]}, direction = {line[3], line[4], line[5]};\n"
     "    Ray ray = ray_make(origin, direction, 0, 1, mask_all());\n"
     "    ray_set_common_origin(&ray, common_origin, mask_none());\n"
-    "    missed[i] = !lanes_any(ray_meets_cull_sphere(&ray, &cull_spheres[i]));\n"
+    "    missed[i] = !lanes_any(ray_hits_cull_sphere(&ray, &cull_spheres[i]));\n"
     "    DirectionBounds bounds;\n"
     "    missed_by_bounds[i] = rays_bound_directions(&ray, 1, &bounds) &&\n"
-    "                          directions_meet_cull_spheres(&bounds, &cull_spheres[i]) == 0;\n"
+    "                          directions_hit_cull_spheres(&bounds, &cull_spheres[i]) == 0;\n"
     "}\n";
 
 typedef struct {

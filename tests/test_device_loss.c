@@ -55,7 +55,7 @@ static bool pair_work(Compute computes[2], Answer *answer)
     const RenderJob job = {.renderers = renderers,
                            .count = 2,
                            .aovs = AOVS_ALL,
-                           .sink = work_take_band,
+                           .sink = work_receive_band,
                            .dropped = pair_dropped,
                            .context = answer};
     bool whole = render_job_run(&job);

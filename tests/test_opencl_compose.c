@@ -69,7 +69,8 @@ TEST(test_event_times)
         {2000, 1002000, 0.98e-3, 1e-4, 1e-3, true}, // the same with a coarse timer
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        LaunchTime time = launch_time_judge(cases[i].start, cases[i].end, cases[i].host, cases[i].resolution);
+        LaunchTime time =
+            launch_time_classify(cases[i].start, cases[i].end, cases[i].host, cases[i].resolution);
         assert_float_equal(time.event_seconds, cases[i].seconds, 1e-12);
         assert_int_equal(time.trusted, cases[i].trusted);
         assert_true(time.host_seconds == cases[i].host);

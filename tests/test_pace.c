@@ -36,7 +36,7 @@ static void pass_run(Run *run, Pace *pace, uint32_t first_row, uint32_t rows, ui
         run->launches++;
         run->samples += launched;
         if (seconds > run->longest) run->longest = seconds;
-        pace_note_launch(pace, launched, seconds);
+        pace_record_launch(pace, launched, seconds);
     }
 }
 
@@ -80,15 +80,15 @@ TEST(rows_shrink_after_a_slow_band)
 {
     Pace pace = {.target_seconds = target};
     pace_begin_band(&pace);
-    pace_note_launch(&pace, 100000, 100000 * cheap);
+    pace_record_launch(&pace, 100000, 100000 * cheap);
     assert_true(pace_band_samples(&pace) >= 399999 && pace_band_samples(&pace) <= 400000);
     pace_begin_band(&pace);
-    pace_note_launch(&pace, 100000, 100000 * dear);
+    pace_record_launch(&pace, 100000, 100000 * dear);
     assert_true(pace_band_samples(&pace) >= 4999 && pace_band_samples(&pace) <= 5000);
     // however few of a band's samples its last launch had
     pace_begin_band(&pace);
-    pace_note_launch(&pace, 80000, 80000 * cheap);
-    pace_note_launch(&pace, 5000, 5000 * cheap);
+    pace_record_launch(&pace, 80000, 80000 * cheap);
+    pace_record_launch(&pace, 5000, 5000 * cheap);
     assert_true(pace_band_samples(&pace) >= 339999 && pace_band_samples(&pace) <= 340000);
 }
 
@@ -103,18 +103,18 @@ TEST(launches_begin_small)
     // a first pass of one sample per pixel, then four times as many per pass, up to the target
     static const uint32_t expected[] = {1, 4, 16, 50, 29};
     for (int band = 0; band < 3; band++) {
-        pace_note_launch(&pace, 1900000, 19e5 * cheap);
+        pace_record_launch(&pace, 1900000, 19e5 * cheap);
         pace_begin_band(&pace);
         for (uint32_t i = 0, left = 100; i < 5; i++) {
             const uint32_t samples = pace_begin_pass(&pace, 100000, left);
             assert_int_equal(samples, expected[i]);
-            pace_note_launch(&pace, (uint64_t)100000 * samples, 100000 * cheap * samples);
+            pace_record_launch(&pace, (uint64_t)100000 * samples, 100000 * cheap * samples);
             left -= samples;
         }
     }
     // however cheap the band before was
     pace_begin_band(&pace);
-    pace_note_launch(&pace, 6400000, 64e5 * 1e-12);
+    pace_record_launch(&pace, 6400000, 64e5 * 1e-12);
     pace_begin_band(&pace);
     assert_int_equal(pace_begin_pass(&pace, 100, 64), 1);
 }
@@ -127,10 +127,10 @@ TEST(busy_device_grows_by_four)
     static const uint64_t expected[] = {4096, 16384, 50000, 50000};
     for (size_t i = 0; i < COUNT_OF(expected); i++) {
         assert_int_equal(pace_launch_samples(&pace), expected[i]);
-        pace_note_launch(&pace, expected[i], (double)expected[i] * dear);
+        pace_record_launch(&pace, expected[i], (double)expected[i] * dear);
     }
     // a launch that is smaller than the first does not reduce the next start
-    pace_note_launch(&pace, 1, 1e-9);
+    pace_record_launch(&pace, 1, 1e-9);
     assert_int_equal(pace_launch_samples(&pace), FIRST_LAUNCH);
 }
 

@@ -107,42 +107,42 @@ TEST(verdicts_of_a_sample)
     ErrorBudget budget = {0.2, ERROR_RMSE};
     Sampling sampling = {.drawn = COUNT, .drawn_share = 1, .color_max = 3, .risk = 0.05};
     assert_true(fabs(sample_rmse_floor(&sampling) - 3 * floor_of_none) < 1e-9);
-    SampleVerdict verdict = sample_judge(&budget, &reference, &equal, &sampling);
+    SampleVerdict verdict = sample_classify(&budget, &reference, &equal, &sampling);
     assert_true(verdict.error == 0 && verdict.keeps);
     assert_true(fabs(verdict.bound - 3 * floor_of_none) < 1e-9);
     budget.limit = 0.15;
-    assert_false(sample_judge(&budget, &reference, &equal, &sampling).keeps);
+    assert_false(sample_classify(&budget, &reference, &equal, &sampling).keeps);
     budget = (ErrorBudget){1e-9, ERROR_MAX};
-    verdict = sample_judge(&budget, &reference, &equal, &sampling);
+    verdict = sample_classify(&budget, &reference, &equal, &sampling);
     assert_true(verdict.keeps && fabs(verdict.bound - floor_of_none * floor_of_none) < 1e-9);
     wrong[0] += 0.5;
     Film off = film_of(wrong, COUNT);
-    verdict = sample_judge(&budget, &reference, &off, &sampling);
+    verdict = sample_classify(&budget, &reference, &off, &sampling);
     assert_true(!verdict.keeps && verdict.error == 0.5 && verdict.bound > 2 * floor_of_none * floor_of_none);
     budget = (ErrorBudget){0.5, ERROR_FLIP};
-    verdict = sample_judge(&budget, &reference, &off, &sampling);
+    verdict = sample_classify(&budget, &reference, &off, &sampling);
     assert_true(verdict.keeps && verdict.error > 0 && verdict.error < 1e-3 && verdict.bound > 0.07);
 
     // pixels outside the sample count in full: an error of 0.5 in a channel of the only one
     Film turned = film_of(wrong + 3, COUNT - 1), turned_reference = film_of(colors + 3, COUNT - 1);
     const Sampling most = {.drawn = COUNT - 1, .drawn_share = 0.999, .color_max = 3, .risk = 0.05};
     const double drawn_bound =
-        sample_judge(&(ErrorBudget){1, ERROR_RMSE}, &turned_reference, &turned, &most).bound;
+        sample_classify(&(ErrorBudget){1, ERROR_RMSE}, &turned_reference, &turned, &most).bound;
     memmove(reference.color, reference.color + 3, 3 * (COUNT - 1) * sizeof *colors);
     memmove(off.color, off.color + 3, 3 * (COUNT - 1) * sizeof *colors);
     for (size_t i = 0; i < 3; i++) {
         reference.color[3 * (COUNT - 1) + i] = colors[i];
         off.color[3 * (COUNT - 1) + i] = wrong[i];
     }
-    verdict = sample_judge(&(ErrorBudget){1, ERROR_RMSE}, &reference, &off, &most);
+    verdict = sample_classify(&(ErrorBudget){1, ERROR_RMSE}, &reference, &off, &most);
     assert_true(fabs(verdict.bound * verdict.bound - drawn_bound * drawn_bound - 0.001 * 0.25 / 3) < 1e-9);
 
     off.color[5] = NAN;
-    assert_true(isinf(sample_judge(&budget, &reference, &off, &sampling).bound));
-    assert_false(sample_judge(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &off, &sampling).keeps);
+    assert_true(isinf(sample_classify(&budget, &reference, &off, &sampling).bound));
+    assert_false(sample_classify(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &off, &sampling).keeps);
     sampling.color_max = INFINITY;
-    assert_false(sample_judge(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &equal, &sampling).keeps);
-    assert_true(sample_judge(&(ErrorBudget){10, ERROR_MAX}, &reference, &equal, &sampling).keeps);
+    assert_false(sample_classify(&(ErrorBudget){1e9, ERROR_RMSE}, &reference, &equal, &sampling).keeps);
+    assert_true(sample_classify(&(ErrorBudget){10, ERROR_MAX}, &reference, &equal, &sampling).keeps);
     film_free(&reference);
     film_free(&equal);
     film_free(&off);

@@ -61,7 +61,7 @@ static Scheduler *start(Sink *sink, size_t worker_count)
 
 static BandRows take(Scheduler *scheduler, size_t worker)
 {
-    return scheduler_take(scheduler, worker, ROWS_MAX, STEP);
+    return scheduler_acquire(scheduler, worker, ROWS_MAX, STEP);
 }
 
 static bool give(Scheduler *scheduler, size_t worker, BandRows rows)
@@ -73,7 +73,7 @@ static bool give(Scheduler *scheduler, size_t worker, BandRows rows)
     Film band = {
         .width = WIDTH, .height = rows.row_count, .first_row = rows.first_row, .real_size = sizeof(float)};
     band.layers[LAYER_COLOR] = values;
-    bool continues = scheduler_give(scheduler, worker, &band);
+    bool continues = scheduler_deliver(scheduler, worker, &band);
     memset(values, 0, sizeof values); // the renderer's memory is for its next band
     return continues;
 }
@@ -164,8 +164,8 @@ TEST(test_bands_follow_the_pace)
     Sink sink;
     Scheduler *scheduler = start(&sink, 2);
     set_paces(scheduler, 2, (const unsigned[]){1, 4});
-    assert_int_equal(scheduler_take(scheduler, 0, ROWS, 1).row_count, 5);  // half of a fifth of 56
-    assert_int_equal(scheduler_take(scheduler, 1, ROWS, 1).row_count, 20); // half of four fifths of 51
+    assert_int_equal(scheduler_acquire(scheduler, 0, ROWS, 1).row_count, 5);  // half of a fifth of 56
+    assert_int_equal(scheduler_acquire(scheduler, 1, ROWS, 1).row_count, 20); // half of four fifths of 51
     scheduler_end(scheduler);
     assert_false(scheduler_close(scheduler, NULL));
 }

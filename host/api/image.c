@@ -40,7 +40,7 @@ static void positions_move(const Rendering *rendering, const Film *band)
     }
 }
 
-static bool band_take(void *context, const Film *band, double fraction_done)
+static bool band_receive(void *context, const Film *band, double fraction_done)
 {
     Rendering *rendering = context;
     film_copy_band(&rendering->film, band);
@@ -104,7 +104,7 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
     }
     pthread_mutex_lock(&device->mutex);
     Renderer *renderer = device_renderer(device, &scene->scene, &own, &list);
-    if (renderer) renderer_render(renderer, aovs, band_take, &rendering);
+    if (renderer) renderer_render(renderer, aovs, band_receive, &rendering);
     const GlintStatus status = !renderer              ? GLINT_WRONG_INPUT
                                : rendering.is_stopped ? GLINT_STOPPED
                                                       : GLINT_DONE;

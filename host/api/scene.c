@@ -7,8 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static GlintStatus scene_give(GlintScene **scene, Scene *read, bool is_read, MessageList *list,
-                              char **messages)
+static GlintStatus scene_return(GlintScene **scene, Scene *read, bool is_read, MessageList *list,
+                                char **messages)
 {
     *scene = NULL;
     if (is_read) {
@@ -43,7 +43,7 @@ GlintStatus glint_scene_load(const char *path, const GlintSceneOptions *options,
     Scene read = {0};
     SceneOptions own;
     const bool is_read = options_read(&own, options, &list) && scene_load(&read, path, &own, &list);
-    return scene_give(scene, &read, is_read, &list, messages);
+    return scene_return(scene, &read, is_read, &list, messages);
 }
 
 GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
@@ -57,7 +57,7 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
     if (is_read && own.camera)
         is_read = message_error(&list, "only glint_scene_load takes the camera of another scene");
     is_read = is_read && scene_read_yaml(&read, &source, &own, &list);
-    return scene_give(scene, &read, is_read, &list, messages);
+    return scene_return(scene, &read, is_read, &list, messages);
 }
 
 // Copies vectors. Returns false with a message if one is not finite or is too far away.
@@ -111,7 +111,7 @@ GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char 
         else
             mesh_free(&own);
     }
-    return scene_give(scene, &read, is_read, &list, messages);
+    return scene_return(scene, &read, is_read, &list, messages);
 }
 
 void glint_scene_free(GlintScene *scene)

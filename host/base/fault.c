@@ -34,14 +34,14 @@ _Noreturn void fault(const char *format, ...)
     exit(is_complete ? complete_status : EXIT_MACHINE);
 }
 
-void fault_note_call(const char *call)
+void fault_record_call(const char *call)
 {
     calling_threads += (call != NULL) - (noted_call != NULL);
     noted_call = call;
     if (call) last_call = call;
 }
 
-void fault_note_kernel(const char *name)
+void fault_record_kernel(const char *name)
 {
     noted_kernel = name;
 }

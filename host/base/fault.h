@@ -18,9 +18,9 @@ _Noreturn void fault(const char *format, ...) __attribute__((format(printf, 1, 2
 // glint and ends the process by the signal. Sanitizers handle crashes themselves.
 void fault_catch_crashes(void);
 // Records the OpenCL call that follows, a text up to a parenthesis, or NULL for none.
-void fault_note_call(const char *call);
+void fault_record_call(const char *call);
 // Records the kernel that the following calls build or run, which a crash's message names, or NULL for none.
-void fault_note_kernel(const char *name);
+void fault_record_kernel(const char *name);
 // Makes a crash within a call write its description to `text` instead of stderr.
 enum { CRASH_TEXT_SIZE = 160 };
 void fault_record_crashes(char text[CRASH_TEXT_SIZE]);

@@ -226,7 +226,7 @@ static int scene_compare(Accuracy *accuracy, size_t scene_index, const VariantSe
         status = variant_compare(accuracy, scene_index, &scene->variants[i], &variants[i]);
     }
     film_free(&accuracy->reference);
-    if (status == EXIT_DONE) accuracy_judge(scene, &accuracy->options.budgets);
+    if (status == EXIT_DONE) accuracy_classify(scene, &accuracy->options.budgets);
     return status;
 }
 

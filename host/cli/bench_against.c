@@ -238,7 +238,7 @@ static int pair_run(Against *against, size_t pair)
     return progress_interrupted() ? EXIT_INTERRUPTED : status;
 }
 
-static bool rows_judge(Against *against, size_t look)
+static bool rows_classify(Against *against, size_t look)
 {
     bool decided = true;
     for (size_t i = 0; i < against->set->count; i++) {
@@ -266,7 +266,7 @@ static int pairs_run(Against *against, Progress *progress)
             spent = clock_seconds() - start;
             progress_show(progress, fmin(spent / against->options->seconds, 1));
         }
-        if (rows_judge(against, look) || spent >= against->options->seconds) return EXIT_DONE;
+        if (rows_classify(against, look) || spent >= against->options->seconds) return EXIT_DONE;
     }
 }
 

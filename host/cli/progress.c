@@ -14,7 +14,7 @@ static volatile sig_atomic_t interrupted, is_flag_read, is_held;
 
 // Two signals often arrive together, one for the process and one for its group. A third means that the user
 // insists.
-static void interrupt_note(int signal_number)
+static void interrupt_record(int signal_number)
 {
     if (!is_flag_read && !is_held) {
         static const char text[] = "glint: interrupted\n";
@@ -29,7 +29,7 @@ static void interrupt_note(int signal_number)
 void progress_catch_signals(void)
 {
     static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
-    const struct sigaction action = {.sa_handler = interrupt_note};
+    const struct sigaction action = {.sa_handler = interrupt_record};
     for (size_t i = 0; i < COUNT_OF(signals); i++) {
         struct sigaction before;
         if (sigaction(signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)

@@ -113,7 +113,7 @@ bool render_command_spares_scenes(RenderCommand *command)
     for (size_t i = 0; i < options->scene_count && image_exists; i++) {
         const bool can_read_twice = strcmp(options->scenes[i], "-") != 0;
         if (!can_read_twice || !scene_is_overwritten(*options, options->scenes[i], command->paths)) continue;
-        render_command_note(command, EXIT_USER);
+        render_command_record(command, EXIT_USER);
         return false;
     }
     return true;
@@ -186,7 +186,7 @@ bool render_command_is_unfit(const RenderCommand *command)
     return command->open.is_unfit;
 }
 
-void render_command_note(RenderCommand *command, int status)
+void render_command_record(RenderCommand *command, int status)
 {
     if (status != EXIT_DONE) command->status = status;
 }
@@ -202,7 +202,7 @@ void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
     bool continues = continues_after(command->status);
     for (size_t i = first; i < command->count && continues; i++) {
         const int status = render_command_run(command, i, ranks);
-        render_command_note(command, status);
+        render_command_record(command, status);
         continues = continues_after(status);
     }
     if (command->status == EXIT_DONE) fault_output_is_complete(EXIT_DONE);

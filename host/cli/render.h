@@ -28,7 +28,7 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);
 // devices are alike.
 bool render_command_is_unfit(const RenderCommand *command);
 // Merges a scene's status into the command's.
-void render_command_note(RenderCommand *command, int status);
+void render_command_record(RenderCommand *command, int status);
 // Renders the scenes from `first` on until the command ends, and merges their statuses. This must be the
 // command's last call before the ones below.
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks);

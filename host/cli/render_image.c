@@ -39,7 +39,7 @@ static void estimate_print(ImageRender *render, double fraction_done)
             bytes > 0 ? text_size(bytes).text : "");
 }
 
-static bool band_take(void *context, const Film *band, double fraction_done)
+static bool band_receive(void *context, const Film *band, double fraction_done)
 {
     ImageRender *render = context;
     Shutter *shutter = &render->shutter;
@@ -154,7 +154,7 @@ static int image_render(ImageRender *render)
     const RenderJob job = {.renderers = renderers,
                            .count = devices->count,
                            .aovs = aovs,
-                           .sink = band_take,
+                           .sink = band_receive,
                            .dropped = device_drop,
                            .context = render,
                            .checkpoint = render->checkpoint,

@@ -211,7 +211,7 @@ static bool case_start(void *context, const VerifyResult *result)
     return true;
 }
 
-static bool case_take(void *context, const VerifyResult *result)
+static bool case_receive(void *context, const VerifyResult *result)
 {
     Verification *verification = context;
     if (!compute_ok(verification->compute)) return false;
@@ -258,7 +258,7 @@ static void precision_verify(Verification *verification, Compute *compute)
         record->is_started = true;
     }
     const VerifyChoice *choice = options->cases.count > 0 ? &options->cases : NULL;
-    const VerifySink sink = {case_start, case_take, verification};
+    const VerifySink sink = {case_start, case_receive, verification};
     verify_run(compute, &settings, choice, &sink, &record->kernels);
     record->seconds = clock_seconds() - record->start_seconds;
     if (!compute_ok(compute)) return;
@@ -399,7 +399,7 @@ static void builder_start(const VerifyOptions *options)
     static char name[] = "P6";
     char *const names[] = {name};
     const VerifyChoice choice = {names, 1};
-    const VerifySink sink = {.take = result_discard};
+    const VerifySink sink = {.receive = result_discard};
     const pid_t parent = getpid();
     fflush(stdout); // otherwise each process would print the contents of the buffer
     if (fork() != 0) return;

@@ -123,7 +123,7 @@ static void sides_build(Builder *builder, const PrimitiveRange sides[2], unsigne
     node->children[1] = range_build(builder, &sides[1], depth);
 }
 
-static void depth_note(Builder *builder, unsigned depth)
+static void depth_record(Builder *builder, unsigned depth)
 {
     unsigned deepest = atomic_load(&builder->depth);
     while (depth > deepest && !atomic_compare_exchange_weak(&builder->depth, &deepest, depth)) {
@@ -155,7 +155,7 @@ static BvhChild range_build(Builder *builder, const PrimitiveRange *range, unsig
     PrimitiveRange sides[2];
     if (!range_divide(builder, range, depth, sides)) return leaf_make(builder, range);
     const size_t index = atomic_fetch_add(&builder->node_count, 1);
-    depth_note(builder, depth + 1);
+    depth_record(builder, depth + 1);
     BvhBinaryNode *node = &builder->nodes[index];
     sides_build(builder, sides, depth + 1, node);
     return (BvhChild){bvh_node_bounds(node), (uint32_t)index, 0};

@@ -85,7 +85,7 @@ RangeBounds range_bounds_empty(void)
     return (RangeBounds){empty_box, empty_box};
 }
 
-static inline RangeBounds bounds_take(RangeBounds bounds, const PrimitiveReference *reference)
+static inline RangeBounds bounds_include(RangeBounds bounds, const PrimitiveReference *reference)
 {
     const Float4 center = reference_center(reference);
     return (RangeBounds){box_join(bounds.boxes, reference->box),
@@ -101,7 +101,7 @@ RangeBounds range_bounds_of(const PrimitiveReference *references, size_t count)
 {
     RangeBounds bounds = {empty_box, empty_box};
     for (size_t i = 0; i < count; i++)
-        bounds = bounds_take(bounds, &references[i]);
+        bounds = bounds_include(bounds, &references[i]);
     return bounds;
 }
 
@@ -280,10 +280,10 @@ static size_t range_partition(PrimitiveReference *references, size_t count, cons
     while (left < right) {
         const PrimitiveReference reference = references[left];
         if (bins_of(map, &reference)[split->axis] <= split->bin) {
-            left_bounds = bounds_take(left_bounds, &reference);
+            left_bounds = bounds_include(left_bounds, &reference);
             left++;
         } else {
-            right_bounds = bounds_take(right_bounds, &reference);
+            right_bounds = bounds_include(right_bounds, &reference);
             references[left] = references[--right];
             references[right] = reference;
         }

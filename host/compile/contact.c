@@ -89,7 +89,7 @@ static Bounds bounds_near_plane(Bounds box, const ContactRegion *flat, double ma
 
 // Returns a box around the places where two may touch. Two unbounded ones may touch anywhere, since their
 // error grows with the distance.
-static Bounds regions_meet(const ContactRegion *a, const ContactRegion *b, double margin)
+static Bounds regions_overlap(const ContactRegion *a, const ContactRegion *b, double margin)
 {
     if (!region_is_bounded(a) && !region_is_bounded(b)) return everywhere();
     Bounds both = bounds_intersect(bounds_grow(a->box, margin), b->box);
@@ -164,7 +164,7 @@ static void regions_keep_near(ContactRegionList *list, const ContactRegionList *
     list->count = count;
 }
 
-static Bounds lists_meet(ContactRegionList *transparent, ContactRegionList *opaque, double margin)
+static Bounds lists_overlap(ContactRegionList *transparent, ContactRegionList *opaque, double margin)
 {
     regions_keep_near(opaque, transparent, margin);
     regions_keep_near(transparent, opaque, margin);
@@ -174,7 +174,7 @@ static Bounds lists_meet(ContactRegionList *transparent, ContactRegionList *opaq
     Bounds all = bounds_empty();
     for (size_t i = 0; i < transparent->count; i++)
         for (size_t k = 0; k < opaque->count; k++)
-            all = bounds_join(all, regions_meet(&transparent->items[i], &opaque->items[k], margin));
+            all = bounds_join(all, regions_overlap(&transparent->items[i], &opaque->items[k], margin));
     return all;
 }
 
@@ -193,7 +193,7 @@ Bounds contact_find(const CompiledScene *compiled)
     double coordinate = regions_collect(&transparent, compiled, true);
     coordinate = fmax(coordinate, regions_collect(&opaque, compiled, false));
     const double condition = conditions_largest(compiled);
-    Bounds contact = lists_meet(&transparent, &opaque, NEARNESS * (1 + condition / 5) * coordinate);
+    Bounds contact = lists_overlap(&transparent, &opaque, NEARNESS * (1 + condition / 5) * coordinate);
     free(transparent.items);
     free(opaque.items);
     return contact;

@@ -16,7 +16,7 @@ typedef struct {
 } Flattening;
 
 // Sets HAS_POWER and the eye's power, which then defines the primitive. Returns false if it overflows.
-bool primitive_take_power(Flattening *flattening, double power, uint4 *id);
+bool primitive_set_power(Flattening *flattening, double power, uint4 *id);
 
 // Appends a flat struct with the next id, in id.x, to its type's array, or replaces the one that is moved.
 void primitive_add(Flattening *flattening, int type, const void *primitive, uint32_t material);

@@ -23,7 +23,7 @@ void primitive_add(Flattening *flattening, int type, const void *primitive, uint
     *flat_id(array, target) = id;
 }
 
-bool primitive_take_power(Flattening *flattening, double power, uint4 *id)
+bool primitive_set_power(Flattening *flattening, double power, uint4 *id)
 {
     const double value = rounded(&flattening->rounding, power);
     if (!isfinite(value)) return false;

@@ -9,11 +9,11 @@
 #include <string.h>
 
 static const Range range_radians = {0, M_PI_2, true, "greater than 0 and less than pi/2"};
-// A color above 255 is cut to it, as that program does.
+// Colors above 255 are clamped to it, as in that program.
 static const Range range_color = {0, INFINITY, false, "from 0 to 255"};
 static const double COLOR_MAX = 255;
 
-// The values of any block.
+// Holds the values of any block.
 typedef struct {
     Vector3 position, look_at, center, normal, color, diffuse, intensity;
     double radius, angle, specular;
@@ -266,7 +266,7 @@ static void blocks_read(CfgReader *reader)
             block_open(reader);
         else
             report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
-        places_note(&places, reader->scene, word.offset);
+        places_record(&places, reader->scene, word.offset);
     }
     places_close(&places);
     if (!reader->has_camera && !report_is_full(&reader->report))

@@ -1,6 +1,6 @@
 // `.dat`, the scenes of the Tachyon ray tracer (John E. Stone, Tachyon documentation, "Scene description
-// files"): keywords in any case and their values, separated by whitespace. docs/scene-format.md lists what is
-// read and how it maps to glint.
+// files"): case-insensitive keywords and their values, separated by whitespace. docs/scene-format.md lists
+// what is read and how it maps to glint.
 #include "host/import/dat.h"
 #include "host/base/array.h"
 #include "host/import/place.h"
@@ -163,8 +163,8 @@ static bool nothing_read(DatReader *reader)
     return true;
 }
 
-// Each `read` reads what follows its keyword, reports the first error and returns false. Without one the
-// statement is not shown, and some words after its keyword could be taken for another statement.
+// Each `read` reads the words after its keyword. Reports the first error and returns false. Keywords with a
+// NULL `read` are not shown, and words after them could look like another statement.
 static const struct {
     const char *keyword;
     bool (*read)(DatReader *reader);
@@ -215,7 +215,7 @@ static size_t statement_find(Word word)
     return index;
 }
 
-// Skips what belongs to a statement, up to the next one.
+// Skips the rest of a statement, up to the next one.
 static void statement_skip(DatReader *reader)
 {
     for (Word word = dat_peek(reader); word.length; word = dat_peek(reader)) {
@@ -251,7 +251,7 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
         while (!report_is_full(&reader.report) && !reader.is_at_end && dat_peek(&reader).length) {
             const size_t offset = dat_peek(&reader).offset;
             statement_read(&reader);
-            places_note(&places, scene, offset);
+            places_record(&places, scene, offset);
         }
         places_close(&places);
         if (!reader.has_camera && !report_is_full(&reader.report))

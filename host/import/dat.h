@@ -1,4 +1,4 @@
-// A Tachyon scene being read: words, textures and what glint does not show.
+// Reads a Tachyon scene: its words, its textures and the statements that glint does not show.
 #pragma once
 
 #include "host/import/line.h"
@@ -24,29 +24,31 @@ typedef struct {
     size_t slot_count;
 } DatReader;
 
-// Return the next word, on this or a later line, and leave it or move behind it. It is empty at the end of
-// the source.
+// Return the next word, on this or a later line. dat_peek leaves it unread and dat_word moves past it. The
+// word is empty at the end of the source.
 Word dat_peek(DatReader *reader);
 Word dat_word(DatReader *reader);
-// Returns whether the word is the keyword, in any case.
+// Returns whether the word is the keyword, ignoring case.
 bool dat_is(Word word, const char *keyword);
 // Skips the next word if it is the keyword, and returns whether it is.
 bool dat_skip(DatReader *reader, const char *keyword);
-// Warns of something that the source may have many times, once.
+// Adds a warning once, however often the source repeats its cause.
 void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-// These read the keyword and what follows it. Each reports an error and returns false if either is missing.
+// Each of these reads the keyword and the value after it. Reports an error and returns false if either is
+// missing.
 bool dat_expect(DatReader *reader, const char *keyword);
 bool dat_number(DatReader *reader, const char *keyword, double *value);
 // Reads a vector. Tachyon's coordinates are left-handed: z is negated.
 bool dat_vector(DatReader *reader, const char *keyword, Vector3 *vector);
-// These read values alone; `name` is for errors. A word that is not a number may start the next statement, so
-// it stays.
+// Each of these reads a value without a keyword; `name` is for errors. A word that is not a number stays
+// unread, since it may start the next statement.
 bool dat_value(DatReader *reader, const char *name, double *value);
 bool dat_value_in_range(DatReader *reader, const char *name, const Range *range, double *value);
 bool dat_whole_number(DatReader *reader, const char *name, const Range *range, unsigned *value);
-// Reads a vector whose z is negated, or the three numbers of a vector or a color as they are.
+// dat_coordinates reads a vector and negates its z. dat_components reads three numbers of a vector or a
+// color unchanged.
 bool dat_coordinates(DatReader *reader, const char *name, Vector3 *vector);
 bool dat_components(DatReader *reader, const char *name, Vector3 *vector);
 
@@ -55,7 +57,7 @@ bool dat_components(DatReader *reader, const char *name, Vector3 *vector);
 Material dat_texture_default(void);
 // Reads the definition of a texture, from its first keyword to its last, `texfunc` or `vcst`.
 bool dat_texture_body(DatReader *reader, Material *material);
-// Reads an object's texture, defined there or by its name, and sets *material to its index in the scene.
+// Reads an object's texture, either inline or by name, and sets *material to its index in the scene.
 bool dat_texture(DatReader *reader, uint32_t *material);
 bool dat_texture_definition(DatReader *reader);
 bool dat_texture_alias(DatReader *reader);

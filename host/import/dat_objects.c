@@ -1,4 +1,4 @@
-// Tachyon's objects.
+// Reads Tachyon's objects.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/dat.h"
@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Reads the number of things that follow.
+// Reads a count of the items that follow.
 static bool count_read(DatReader *reader, const char *name, unsigned *count)
 {
     static const Range range_count = {0, INT32_MAX, false, "from 0 to 2147483647"};
@@ -112,7 +112,8 @@ static void mesh_add(DatReader *reader, Mesh *mesh, uint32_t material)
     array_push(reader->scene->objects, object);
 }
 
-// Adds a ring with a hole as triangles: the circles deviate by less than a ten-thousandth of their radius.
+// Returns a triangle mesh of a ring with a hole. Its circles deviate by less than a ten-thousandth of their
+// radius.
 static Mesh ring_mesh(Vector3 center, Vector3 normal, double inner, double outer)
 {
     enum { SEGMENTS = 256 };
@@ -208,7 +209,7 @@ static Color mean_color(DatReader *reader, size_t offset, const Color *a, const 
     return vector_max(vectors_equal(*a, *b) && vectors_equal(*a, *c) ? *a : mean, vector_all(0));
 }
 
-// Adds a material of that color unless the last one has it.
+// Adds a material of the given color unless the last material has it. Returns its index.
 static uint32_t material_of_color(DatReader *reader, Material material, Color color)
 {
     Scene *scene = reader->scene;
@@ -236,7 +237,7 @@ bool dat_colored_triangle(DatReader *reader)
     return true;
 }
 
-// A vertex array being read.
+// Holds a vertex array while it is read.
 typedef struct {
     Mesh mesh;
     Color *colors; // one for each vertex, or NULL
@@ -252,7 +253,7 @@ typedef struct {
     } materials;
 } VertexArray;
 
-// Reads a vector for each vertex. Returns NULL with an error.
+// Reads one vector per vertex. Reports an error and returns NULL on failure.
 static Vector3 *vectors_read(DatReader *reader, const char *name, unsigned count, bool are_colors)
 {
     struct {
@@ -284,7 +285,8 @@ static void array_triangle_add(DatReader *reader, VertexArray *array, const uint
     array_push(array->materials, material);
 }
 
-// Reads the vertices of a strip, in which each one after the second ends a triangle, or of `count` triangles.
+// Reads the vertices of a strip, where each vertex after the second ends a triangle, or of `count`
+// triangles.
 static bool faces_read(DatReader *reader, VertexArray *array, bool is_strip)
 {
     const size_t offset = reader->line.start;

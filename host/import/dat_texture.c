@@ -1,4 +1,4 @@
-// Tachyon's textures, which are materials, and their names.
+// Reads Tachyon's textures, which are materials, and their names.
 #include "host/base/array.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
@@ -18,14 +18,14 @@ Material dat_texture_default(void)
     return material;
 }
 
-// A texture being read.
+// Holds a texture while it is read.
 typedef struct {
     double ambient, diffuse, specular, opacity, phong, phong_size;
     Color color;
     bool is_metal;
 } Texture;
 
-// Reads a number, which stays the default, with a warning, where it is out of range.
+// Reads a number. Warns and keeps the default if the number is out of range.
 static bool factor_read(DatReader *reader, const char *name, const Range *range, double *factor)
 {
     double number;
@@ -96,8 +96,8 @@ static bool function_read(DatReader *reader)
     return true;
 }
 
-// The highlight is Blinn's, of the angle between the normal and the vector halfway between light and viewer,
-// which is half as large as Phong's: cos(a / 2)^n is about cos(a)^(n / 4).
+// Converts a texture to a material. Tachyon's highlight is Blinn's, whose angle between the normal and the
+// halfway vector is half of Phong's, and cos(a / 2)^n is about cos(a)^(n / 4).
 static Material material_of(const DatReader *reader, const Texture *texture)
 {
     Material material = dat_texture_default();
@@ -113,7 +113,7 @@ static Material material_of(const DatReader *reader, const Texture *texture)
     return material;
 }
 
-// Reads what follows a keyword. Reports an error and returns false if that is invalid.
+// Reads the value after a keyword. Reports an error and returns false if it is invalid.
 static bool key_read(DatReader *reader, Word word, Texture *texture)
 {
     const struct {
@@ -171,7 +171,7 @@ static void slots_grow(DatReader *reader)
     }
 }
 
-// The last texture of a name counts.
+// Adds a texture, which replaces any earlier texture of the same name.
 static void texture_add(DatReader *reader, Word name, uint32_t material)
 {
     if (2 * reader->textures.count >= reader->slot_count) slots_grow(reader);

@@ -1,4 +1,4 @@
-// Tachyon's cameras and lights.
+// Reads Tachyon's cameras and lights.
 #include "host/base/array.h"
 #include "host/import/dat.h"
 
@@ -11,7 +11,7 @@ bool dat_resolution(DatReader *reader)
            dat_whole_number(reader, "height", &range_pixels, &reader->scene->height);
 }
 
-// The values of a camera's block.
+// Holds the values of a camera's block.
 typedef struct {
     double zoom, aspect, frustum[4]; // frustum: left, right, bottom, top at a distance of 1
     bool has_frustum;
@@ -37,7 +37,7 @@ static bool projection_read(DatReader *reader)
     return true;
 }
 
-// glint takes the rays per pixel and their depth from the command line.
+// Reads a camera's block. Skips the rays per pixel and their depth, which glint's command line sets.
 static bool camera_block_read(DatReader *reader, CameraBlock *block)
 {
     double unused;

@@ -1,4 +1,4 @@
-// Lines and words, shared by the readers of line-based formats.
+// Splits text into lines and words for the readers of line-based formats.
 #pragma once
 
 #include "host/import/number.h"
@@ -30,15 +30,15 @@ Word line_peek_vector(const Line *line); // as line_comma_vector reads it
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
 bool words_equal(Word a, Word b);
-bool word_is_number(Word word); // also one out of range
-int word_shown(Word word);      // bytes of it that a message shows
+bool word_is_number(Word word); // accepts numbers that are out of range
+int word_shown(Word word);      // number of its bytes that a message shows
 
 // Reads the next word as a number. Reports an error and returns false if it is missing or invalid.
 bool line_number(Line *line, const char *name, const Range *range, double *value);
 // Reads the next word as an integer, whose range lies within that of unsigned. Reports an error and returns
 // false if it is missing or invalid.
 bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value);
-// Reads three numbers: one word with commas, or three words.
+// Reads three numbers from one word with commas or from three words.
 bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value);
 bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value);
 // Reports an error and returns false if anything is left on the line.

@@ -44,7 +44,7 @@ static bool scene_read(Scene *scene, const Source *source, const SceneOptions *o
     return scene_read_dat(scene, source, messages);
 }
 
-// Returns whether the file's first word behind comments begins a Tachyon scene, which may have any name.
+// Returns whether the first word after comments begins a Tachyon scene, whose file may have any name.
 static bool begins_dat(const char *path)
 {
     static const char begin[] = "begin_scene";
@@ -106,8 +106,8 @@ static bool file_load(Scene *scene, const char *path, const SceneOptions *option
     return read;
 }
 
-// Replaces the camera by that of another scene. That scene's file counts as included. Its warnings, nearly
-// all about what is not rendered, are left out.
+// Replaces the camera with that of another scene, whose file counts as included. Drops that scene's
+// warnings, nearly all of which concern content that is not rendered.
 static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *messages)
 {
     for (size_t i = 0; i < options->override_count; i++)

@@ -11,7 +11,7 @@ typedef struct {
     // camera.fov=60.
     const char *const *overrides;
     size_t override_count;
-    const char *override_name; // of their source in messages
+    const char *override_name; // names their source in messages
     double frame;              // of an animated YAML scene
     const char *camera;        // the path of another scene, whose camera replaces the scene's; NULL: none
     // Called with each mesh, image and scene that the file names, before it is read; NULL: not wanted.
@@ -19,35 +19,35 @@ typedef struct {
     void *context;
     Stage *stage; // shows what is being read; NULL: not wanted
     // The program that assimp_process_main serves, looked for in PATH: it reads the formats of assimp. NULL:
-    // this process's own.
+    // this process's program.
     const char *mesh_program;
 } SceneOptions;
 
 // Returns whether the name's ending is that of a scene or a mesh that glint reads.
 bool scene_is_known(const char *path);
-// Returns whether it is that of a YAML scene.
+// Returns whether the name's ending is that of a YAML scene.
 bool scene_is_yaml(const char *path);
 
-// Reads a scene. Its ending gives the format (.yaml .yml .json .rt .cfg .nff .dat, or one of a mesh), or its
-// first word that of .dat. On a mistake in the file or in that of the camera, which is read without the
-// overrides, returns false with errors in `messages` and an empty
-// scene. Warnings may be added in either case.
+// Reads a scene. The file's ending determines the format (.yaml .yml .json .rt .cfg .nff .dat, or a mesh
+// format); a .dat scene is also recognized by its first word. The camera's file is read without the
+// overrides. On a mistake in either file, returns false with errors in `messages` and an empty scene.
+// Warnings may be added in either case.
 bool scene_load(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
-// The readers, from memory; `source->file` is used in messages only.
+// Each of these reads a scene from memory; `source->file` is used in messages only.
 bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages);
 
-// Reads a file that mesh_is_known accepts: its triangles, materials, camera and lights. Without a camera one
-// frames it; without lights there are two.
+// Reads the triangles, materials, camera and lights of a file that mesh_is_known accepts. Adds a camera that
+// frames the mesh if the file has no camera, and two lights if it has no lights.
 bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages);
 
-// Makes a scene of a mesh, which it takes: gray, with a camera that frames it and two lights.
+// Makes a scene of a gray mesh, a camera that frames it and two lights. Takes ownership of the mesh.
 void scene_of_mesh(Scene *scene, Mesh *mesh);
 
-// Decodes the images of a scene without errors, closes its reader's report, warns of what makes an image
-// black, and frees the scene if there are errors.
+// Decodes the images of a scene without errors, closes its reader's report, warns of causes of a black
+// image, and frees the scene if there are errors.
 bool scene_finish(Scene *scene, Report *report, Stage *stage);

@@ -28,7 +28,7 @@ typedef struct {
 
 static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
-// Moves to the next line with a word on it unless words are left on this one. Returns false at the end of the
+// Moves to the next line that has a word unless words are left on this one. Returns false at the end of the
 // source.
 static bool reach_word(NffReader *reader)
 {
@@ -78,7 +78,7 @@ static bool read_angle(NffReader *reader)
     return true;
 }
 
-// glint has no near clipping plane.
+// Skips `hither`, because glint has no near clipping plane.
 static bool read_hither(NffReader *reader)
 {
     double unused;
@@ -215,7 +215,7 @@ static bool read_sphere(NffReader *reader)
     return true;
 }
 
-// Reads a cone, or a cylinder where both radii are equal.
+// Reads a cone, or a cylinder if both radii are equal.
 static bool read_cone(NffReader *reader)
 {
     Vector3 base, apex;
@@ -310,8 +310,8 @@ static bool read_patch(NffReader *reader)
     return read_any_polygon(reader, true);
 }
 
-// These read what follows an element's name up to the end of a line. They report the first error and return
-// false.
+// Each `read` reads the words after an element's name up to the end of a line. Reports the first error and
+// returns false.
 static const struct {
     const char *name;
     bool (*read)(NffReader *reader);
@@ -320,7 +320,7 @@ static const struct {
     {"c", read_cone}, {"s", read_sphere},     {"p", read_polygon}, {"pp", read_patch},
 };
 
-// After an error the rest of its line is skipped, and lines that may have belonged to it.
+// Reads an element. After an error, skips the rest of its line and the lines that may belong to it.
 static void element_read(NffReader *reader)
 {
     Word name = line_word(&reader->line);
@@ -341,8 +341,9 @@ static void element_read(NffReader *reader)
         report_error(&reader->report, name.offset, "unknown element '%.*s'", word_shown(name), name.text);
 }
 
-// The format leaves intensities unspecified. Its author proposes this formula for each of n lights without a
-// color, and for ambient light (Haines, Standard Procedural Databases, README, File structure).
+// Sets the intensities, which the format leaves unspecified. Its author proposes this formula for each of n
+// lights without a color, and for ambient light (Haines, Standard Procedural Databases, README, File
+// structure).
 static void lights_finish(NffReader *reader)
 {
     Scene *scene = reader->scene;
@@ -365,7 +366,7 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
             const size_t offset = line_peek(&reader.line).offset;
             is_empty = false;
             element_read(&reader);
-            places_note(&places, scene, offset);
+            places_record(&places, scene, offset);
         }
         places_close(&places);
         if (is_empty)

@@ -49,7 +49,7 @@ static const char *digits_read(const char *at, const char *end, Decimal *decimal
 // Skips `e` and an integer, if the text starts with them.
 static const char *exponent_read(const char *at, const char *end, Decimal *decimal)
 {
-    enum { EXPONENT_MAX = 100000 }; // any larger one is as good
+    enum { EXPONENT_MAX = 100000 }; // larger ones have the same effect
     const char *start = at;
     if (at == end || (*at != 'e' && *at != 'E')) return at;
     at++;
@@ -63,8 +63,9 @@ static const char *exponent_read(const char *at, const char *end, Decimal *decim
     return at;
 }
 
-// An integer below 2^53 and a power of ten up to 10^22 are doubles, and the one product or quotient of them
-// is rounded once (Clinger, How to read floating point numbers accurately, PLDI 1990).
+// Returns whether one rounded operation yields the nearest double. An integer below 2^53 and a power of ten
+// up to 10^22 are doubles, so their product or quotient is rounded once (Clinger, How to read floating point
+// numbers accurately, PLDI 1990).
 static bool decimal_is_short(const Decimal *decimal)
 {
     enum { DIGITS_MAX = 19 };

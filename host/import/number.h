@@ -1,4 +1,4 @@
-// Decimal numbers of scene files, independent of the locale, and their valid ranges.
+// Reads decimal numbers of scene files, independently of the locale, and checks their ranges.
 #pragma once
 
 #include "host/import/report.h"
@@ -11,10 +11,10 @@
 
 typedef enum { NUMBER_READ, NUMBER_MALFORMED, NUMBER_TOO_LARGE } NumberStatus;
 
-// Reads exactly `length` bytes to the nearest double: sign, digits with an optional point, exponent; nothing
-// else (no hex, inf, nan). `value` is set on NUMBER_READ only.
+// Converts exactly `length` bytes to the nearest double. Accepts a sign, digits with an optional point and
+// an exponent, but no hex, inf or nan. Sets `value` on NUMBER_READ only.
 NumberStatus number_read(const char *text, size_t length, double *value);
-// Reads the longest number that starts at `*text`, which moves behind it unless it is malformed.
+// Reads the longest number that starts at `*text` and moves `*text` past it unless it is malformed.
 NumberStatus number_scan(const char **text, const char *end, double *value);
 
 typedef struct {

@@ -42,7 +42,7 @@ static size_t offsets_up_to(const Offsets *offsets, size_t offset)
     return first;
 }
 
-void places_note(Places *places, Scene *scene, size_t offset)
+void places_record(Places *places, Scene *scene, size_t offset)
 {
     if (places->object_count == scene->objects.count) return;
     uint32_t file = 0, line = 0;

@@ -1,4 +1,4 @@
-// The files of a scene and the lines there that objects come from.
+// Finds the files of a scene and the lines that define its objects.
 #pragma once
 
 #include "host/base/message.h"
@@ -16,9 +16,9 @@ typedef struct {
     size_t object_count;             // of the objects that have their lines
 } Places;
 
-// Finds the lines of a source and of those that follow it, up to `end`, which may be NULL.
+// Finds the lines of a source and of the sources after it, up to `end`, which may be NULL.
 Places places_open(const Source *source, const Source *end);
 void places_close(Places *places);
-// Sets the file and line of an offset, or the line 0 if it is beyond the sources, in all objects that were
-// added since the last call. Offsets may come in any order, because an alias leads back to its target.
-void places_note(Places *places, Scene *scene, size_t offset);
+// Stores the file and line of an offset in all objects added since the last call. The line is 0 if the
+// offset is beyond the sources. Offsets may decrease, because an alias leads back to its target.
+void places_record(Places *places, Scene *scene, size_t offset);

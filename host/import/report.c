@@ -63,7 +63,7 @@ static bool message_is_before(const Report *report, const Message *a, const Mess
     return a->line != b->line ? a->line < b->line : a->column < b->column;
 }
 
-// Returns whether the message repeats one from `first` up to `end`: an alias brings in the same mistake
+// Returns whether the message repeats one from `first` up to `end`. An alias can produce the same mistake
 // several times.
 static bool message_is_among(const Message *message, const MessageList *list, size_t first, size_t end)
 {

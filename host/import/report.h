@@ -1,12 +1,12 @@
-// The messages of one reader about its source: bounded in number, in source order, without repeats.
+// Collects one reader's messages about its source, bounded in number, in source order and without repeats.
 #pragma once
 
 #include "host/base/message.h"
 
-// The number of messages about other files that a report remembers.
+// Bounds the number of messages about other files that a report remembers.
 enum { REPORT_FILE_MESSAGES = 256 };
 
-// A message shows at most this many bytes of a word of the source.
+// Bounds the bytes of a source word that a message shows.
 enum { WORD_SHOWN = 40 };
 
 typedef struct {
@@ -27,15 +27,15 @@ bool report_error(Report *report, size_t offset, const char *format, ...)
 void report_warning(Report *report, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-// Returns whether a message about another file repeats one, and remembers it. A source may name a file many
-// times, in different places.
+// Returns whether a message about another file repeats an earlier one, and remembers it. A source may name
+// the same file in many places.
 bool report_repeats(Report *report, const char *file, unsigned line, unsigned column, const char *text);
 
 // Returns whether the error limit is reached. A reader then stops, which bounds the time for a hostile file.
 bool report_is_full(const Report *report);
 
-// Closes the report of a file that the source names. Its messages, which must be in a separate list, follow
-// those of the source and count as the source's.
+// Closes the report of a file that the source names. Appends its messages, which must be in a separate list,
+// after those of the source and counts them as the source's.
 void report_include(Report *report, Report *included);
 
 // Sorts the messages into source order, drops repeats and adds a count of those beyond the limit. Returns

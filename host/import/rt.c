@@ -24,7 +24,7 @@ static bool read_color(Line *line, Color *color)
     return true;
 }
 
-// Reads a unit vector. Other lengths are common and are normalized; zero is returned unchanged.
+// Reads a unit vector. Normalizes the other lengths that files often have, and leaves zero unchanged.
 static bool read_unit_vector(Line *line, const char *name, Vector3 *axis)
 {
     const double tolerated = 0.01; // files round to two or three digits
@@ -44,7 +44,7 @@ static bool read_axis(Line *line, const char *name, Vector3 *axis)
     return !vector_is_zero(*axis);
 }
 
-// Requires the end of the line. With --lenient the rest, such as textures, is skipped.
+// Requires the end of the line. With --lenient, skips the rest, such as textures.
 static bool element_end(RtReader *reader)
 {
     const Word first = line_peek(&reader->line);
@@ -63,7 +63,7 @@ static bool finish_follows(const RtReader *reader)
     return word_is_number(line_word(&ahead)) && (!reader->lenient || word_is_number(line_peek(&ahead)));
 }
 
-// Reads the end of an object's line: optional specular and shininess.
+// Reads the optional specular and shininess at the end of an object's line.
 static bool read_finish(RtReader *reader, Material *material)
 {
     Line *line = &reader->line;
@@ -221,7 +221,7 @@ static bool read_cylinder(RtReader *reader)
     return true;
 }
 
-// Reads the bonus cone: base center, axis towards the tip, height.
+// Reads the bonus part's cone: its base center, its axis towards the tip and its height.
 static bool read_cone(RtReader *reader)
 {
     Line *line = &reader->line;
@@ -279,7 +279,7 @@ static bool read_triangle(RtReader *reader)
     return true;
 }
 
-// These read the rest of their line. They report the first error and return false.
+// Each `read` reads the rest of its line. Reports the first error and returns false.
 static const struct {
     const char *name;
     bool (*read)(RtReader *reader);
@@ -318,7 +318,7 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
         reader.line.joins_blanks = reader.lenient;
         while (!report_is_full(&reader.report) && line_next(&reader.line, '#')) {
             element_read(&reader);
-            places_note(&places, scene, reader.line.start);
+            places_record(&places, scene, reader.line.start);
         }
         if (!reader.has_element)
             report_error(&reader.report, 0, "the scene is empty");

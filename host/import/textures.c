@@ -34,8 +34,9 @@ static bool image_is_gray(const Image *image)
     return true;
 }
 
-// Replaces heights, of which white is 1/50 of the image's width above black, by the normals of their slopes,
-// the difference of the two neighbors (Blinn, Simulation of wrinkled surfaces, SIGGRAPH 1978).
+// Replaces heights with the normals of their slopes, where white is 1/50 of the image's width above black
+// and a slope is the difference of the two neighbors (Blinn, Simulation of wrinkled surfaces, SIGGRAPH
+// 1978).
 static void normals_of_heights(Image *image)
 {
     const size_t width = image->width, height = image->height;
@@ -79,7 +80,8 @@ static bool colors_are_finite(const Image *image)
     return true;
 }
 
-// Returns what is wrong with an image of a scene whose others have `texel_count` texels, or NULL.
+// Describes why an image cannot join a scene whose other images have `texel_count` texels. Returns NULL if
+// it can.
 static const char *image_problem(const Image *image, size_t texel_count)
 {
     if (image->width > TEXTURE_SIDE_MAX || image->height > TEXTURE_SIDE_MAX)
@@ -89,8 +91,8 @@ static const char *image_problem(const Image *image, size_t texel_count)
     return colors_are_finite(image) ? NULL : "a color is not finite";
 }
 
-// Decodes an image and adds its texels to the count. Its reader's messages become those about its place in
-// the scene. Returns false if it cannot be used.
+// Decodes an image and adds its texels to the count. Moves its reader's messages to its place in the scene.
+// Returns false if it cannot be used.
 static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *report)
 {
     MessageList problems = {0};
@@ -115,19 +117,19 @@ static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *r
     return true;
 }
 
-// How a scene uses the alpha of an image.
+// Describes how a scene uses the alpha of an image.
 typedef struct {
-    bool loses;  // shows the image as if it were opaque, although its format does not say so
-    bool cuts;   // has holes where it is low,
-    bool blends; // in place of blending,
-    bool asks;   // because the scene's author says so
+    bool loses;  // a material shows the image as opaque, although its format does not ask for that
+    bool cuts;   // a material has holes where alpha is low
+    bool blends; // those holes replace blending
+    bool asks;   // the scene's author asked for those holes
 } AlphaUse;
 
 // Returns the use of each image. The caller frees it.
 static AlphaUse *alpha_uses(const Scene *scene)
 {
     AlphaUse *uses = memory_allocate_zeroed(scene->textures.count + 1, sizeof *uses);
-    uses[scene->sky.texture].loses = true; // uses[0] is that of no image
+    uses[scene->sky.texture].loses = true; // uses[0] stands for materials without an image
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *material = &scene->materials.items[i];
         const uint32_t cutout = material->cutout > 0 ? material->cutout_texture : 0;
@@ -148,7 +150,7 @@ static bool is_translucent(const Image *image)
     return false;
 }
 
-// Returns what a user must know about an image's alpha, or NULL.
+// Returns the warning that an image's alpha requires, or NULL if it requires none.
 static const char *alpha_warning(const Image *image, const AlphaUse *use)
 {
     if (image->alpha && use->loses) return "is ignored: its transparent parts are opaque";

@@ -1,11 +1,11 @@
-// The images of a scene's materials and sky.
+// Decodes the images of a scene's materials and sky.
 #pragma once
 
 #include "host/base/stage.h"
 #include "host/import/report.h"
 #include "host/scene/scene.h"
 
-// Decodes the images, removes cutouts by opaque ones and sets the ambient light if it is that of the sky,
-// and the light that the sky may be. Reports images that cannot be read or used, and warns of alpha that is
-// not shown and of cutouts that are removed.
+// Decodes the images, removes cutouts by opaque images, and sets up an ambient light that comes from the sky
+// and a sky that is a light. Reports images that cannot be read or used, and warns of alpha that is not
+// shown and of cutouts that are removed.
 void textures_decode(Scene *scene, Report *report, Stage *stage);

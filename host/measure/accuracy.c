@@ -120,8 +120,8 @@ static double color_error(const FilmComparison *comparison, size_t pixel)
 }
 
 // Keeps the error if it is the worst of its type so far. An error away from edges is worse than any at edges.
-static void worst_offer(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel,
-                        const AccuracyWorst *offered)
+static void worst_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel,
+                         const AccuracyWorst *offered)
 {
     AccuracyWorst *worst = &comparison->errors->worst[type];
     if (worst->found &&
@@ -144,12 +144,12 @@ static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, 
         count->edge++;
     else
         count->away++;
-    worst_offer(comparison, type, pixel,
-                &(AccuracyWorst){.away = !edge,
-                                 .light = light,
-                                 .error = color_error(comparison, pixel),
-                                 .reference = values[0],
-                                 .variant = values[1]});
+    worst_record(comparison, type, pixel,
+                 &(AccuracyWorst){.away = !edge,
+                                  .light = light,
+                                  .error = color_error(comparison, pixel),
+                                  .reference = values[0],
+                                  .variant = values[1]});
 }
 
 // Returns whether every light's bit equals the reference's. Where two surfaces touch, a rounding decides
@@ -211,24 +211,24 @@ static void surface_compare(const FilmComparison *comparison, size_t pixel)
     errors->t_ulps.largest = fmax(errors->t_ulps.largest, ulps);
     errors->normal.largest = fmax(errors->normal.largest, angle);
     if (relative > 0)
-        worst_offer(comparison, ACCURACY_T, pixel,
-                    &(AccuracyWorst){.error = relative, .reference = expected, .variant = found});
-    if (angle > 0) worst_offer(comparison, ACCURACY_NORMAL, pixel, &(AccuracyWorst){.error = angle});
+        worst_record(comparison, ACCURACY_T, pixel,
+                     &(AccuracyWorst){.error = relative, .reference = expected, .variant = found});
+    if (angle > 0) worst_record(comparison, ACCURACY_NORMAL, pixel, &(AccuracyWorst){.error = angle});
 }
 
-static void color_offer(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
+static void color_error_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
 {
     const size_t value = 3 * pixel + worst_channel(comparison, pixel);
     AccuracyWorst offered = {.error = color_error(comparison, pixel),
                              .reference = comparison->reference->color[value],
                              .variant = comparison->variant->color[value]};
-    if (offered.error > 0) worst_offer(comparison, type, pixel, &offered);
+    if (offered.error > 0) worst_record(comparison, type, pixel, &offered);
 }
 
 static void pixel_compare(const FilmComparison *comparison, size_t pixel)
 {
     AccuracyErrors *errors = comparison->errors;
-    color_offer(comparison, ACCURACY_IMAGE, pixel);
+    color_error_record(comparison, ACCURACY_IMAGE, pixel);
     if (errors->why_colors_only) return;
     const uint32_t objects[2] = {comparison->reference->object[pixel], comparison->variant->object[pixel]};
     if (objects[0] != objects[1]) {
@@ -245,7 +245,7 @@ static void pixel_compare(const FilmComparison *comparison, size_t pixel)
         comparison->found[3 * errors->shading_pixels + i] = comparison->variant->color[3 * pixel + i];
     }
     errors->shading_pixels++;
-    color_offer(comparison, ACCURACY_SHADING, pixel);
+    color_error_record(comparison, ACCURACY_SHADING, pixel);
 }
 
 static ImageMetrics display_compare(const Film *reference, const Film *variant, bool display_values)

@@ -159,4 +159,4 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type);
 unsigned accuracy_faults(const AccuracyErrors *errors);
 // Sets, from errors and times, each variant's disqualified and pareto, and a recommendation for each budget.
 // The runs of the variants must have been interleaved.
-void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets);
+void accuracy_classify(AccuracyScene *scene, const AccuracyBudgets *budgets);

@@ -133,7 +133,7 @@ bool accuracy_ties(const AccuracyRecommendation *pick, size_t variant)
     return pick->times[variant].ratio > 0 && pick->times[variant].verdict != VERDICT_SLOWER;
 }
 
-void accuracy_judge(AccuracyScene *scene, const AccuracyBudgets *budgets)
+void accuracy_classify(AccuracyScene *scene, const AccuracyBudgets *budgets)
 {
     for (size_t i = 0; i < scene->variant_count; i++) {
         AccuracyVariant *variant = &scene->variants[i];

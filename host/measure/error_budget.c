@@ -104,8 +104,8 @@ static double mean_of(const double *values, size_t count)
     return count > 0 ? sum / (double)count : 0;
 }
 
-SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample,
-                           const Sampling *sampling)
+SampleVerdict sample_classify(const ErrorBudget *budget, const Film *reference, const Film *sample,
+                              const Sampling *sampling)
 {
     const size_t count = film_pixel_count(reference), drawn = sampling->drawn;
     const double seen = fmax(largest_channel(reference), largest_channel(sample));

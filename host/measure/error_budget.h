@@ -45,5 +45,5 @@ typedef struct {
 double sample_rmse_floor(const Sampling *sampling);
 
 // Judges a sample. `reference` and `sample` must have the same pixels.
-SampleVerdict sample_judge(const ErrorBudget *budget, const Film *reference, const Film *sample,
-                           const Sampling *sampling);
+SampleVerdict sample_classify(const ErrorBudget *budget, const Film *reference, const Film *sample,
+                              const Sampling *sampling);

@@ -78,7 +78,7 @@ typedef struct {
     double first_seconds, last_seconds;
 } SampleFilm;
 
-static bool sample_take(void *context, const Film *band, double fraction_done)
+static bool sample_receive(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
     SampleFilm *sample = context;
@@ -141,9 +141,9 @@ static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute
         cell = pilot->cell;
     }
     SampleFilm sample = {.film = film_allocate(squares.region_width, squares.region_height, 0, AOV_COLOR)};
-    whole = whole && renderer_render(renderer, 0, sample_take, &sample);
+    whole = whole && renderer_render(renderer, 0, sample_receive, &sample);
     if (whole && sample.pixels == sample.first_pixels)
-        whole = renderer_render(renderer, 0, sample_take, &sample);
+        whole = renderer_render(renderer, 0, sample_receive, &sample);
     const size_t drawn = film_pixel_count(&sample.film);
     const size_t rest = pilot->image_pixels - drawn * cell * cell;
     *film = film_allocate((uint32_t)(drawn + rest), 1, 0, AOV_COLOR);
@@ -184,7 +184,7 @@ static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *com
 {
     Sampling sampling = sampling_of(pilot, settings, pilot->cell);
     sampling.display_values = scene->color_meaning == COLORS_DISPLAY;
-    if (!sample_judge(&pilot->budget, reference, reference, &sampling).keeps) return true;
+    if (!sample_classify(&pilot->budget, reference, reference, &sampling).keeps) return true;
     bool is_kept = false;
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
         if (i == PRECISION_DOUBLE) continue;
@@ -198,7 +198,7 @@ static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *com
         if (!whole && is_unfit) continue;
         if (!whole) return false;
         PilotCandidate *candidate = &pilot->candidates[i];
-        candidate->verdict = sample_judge(&pilot->budget, reference, &sample, &sampling);
+        candidate->verdict = sample_classify(&pilot->budget, reference, &sample, &sampling);
         is_kept = is_kept || candidate->verdict.keeps;
         film_free(&sample);
     }

@@ -109,7 +109,7 @@ static void layers_await(RankState *state, Scheduler *scheduler, size_t worker)
         state->next_layer++;
     if (state->next_layer < LAYER_COUNT) return;
     state->rows = (BandRows){0};
-    scheduler_give(scheduler, worker, &state->band);
+    scheduler_deliver(scheduler, worker, &state->band);
     film_free(&state->band);
 }
 

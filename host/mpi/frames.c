@@ -113,7 +113,7 @@ typedef struct {
 } Deal;
 
 // Returns the next frame, or NO_FRAME. There may be one later if a rank that has one fails.
-static size_t frame_take(Deal *deal)
+static size_t frame_acquire(Deal *deal)
 {
     size_t frame = NO_FRAME;
     pthread_mutex_lock(&deal->mutex);
@@ -128,14 +128,14 @@ static size_t frame_take(Deal *deal)
 
 // Records a frame's status. Returns false if the worker's device failed or does not fit the frame. Others
 // then render it, and all that are left. A frame that does not fit the last worker either is skipped.
-static bool frame_note(Deal *deal, size_t frame, int status)
+static bool frame_record(Deal *deal, size_t frame, int status)
 {
     pthread_mutex_lock(&deal->mutex);
     if (status == FRAME_UNFIT && deal->workers == 1) status = EXIT_USER;
     const bool works = status != EXIT_MACHINE && status != FRAME_UNFIT;
     deal->dealt--;
     if (works) {
-        render_command_note(deal->command, status);
+        render_command_record(deal->command, status);
     } else {
         array_push(deal->again, frame);
         deal->end = render_command_count(deal->command);
@@ -167,12 +167,12 @@ static void *own_frames_render(void *context)
 {
     Deal *deal = context;
     for (bool works = true; works && !deal_is_over(deal);) {
-        const size_t frame = frame_take(deal);
+        const size_t frame = frame_acquire(deal);
         if (frame == NO_FRAME) {
             rest();
             continue;
         }
-        works = frame_note(deal, frame, frame_render(deal->command, frame));
+        works = frame_record(deal, frame, frame_render(deal->command, frame));
         if (!works) render_command_drop_devices(deal->command);
     }
     return NULL;
@@ -188,7 +188,7 @@ static void frame_done_receive(Deal *deal, RankFrames *state, int rank)
 {
     int status;
     receive_bytes(&status, sizeof status, rank, TAG_FRAME_DONE);
-    if (state->frame != NO_FRAME) state->has_failed = !frame_note(deal, state->frame, status);
+    if (state->frame != NO_FRAME) state->has_failed = !frame_record(deal, state->frame, status);
     state->frame = NO_FRAME;
     state->wants = true;
 }
@@ -201,7 +201,7 @@ static bool frame_send(Deal *deal, RankFrames *state, int rank)
         return state->end_sent = true;
     }
     if (!state->wants) return false;
-    if (!state->end_sent) state->frame = frame_take(deal);
+    if (!state->end_sent) state->frame = frame_acquire(deal);
     if (state->frame == NO_FRAME && !state->end_sent) return false;
     send_bytes(&state->frame, sizeof state->frame, rank, TAG_FRAME);
     state->wants = false;
@@ -253,9 +253,9 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     free(deal.again.items);
     if (deal.workers == 0) {
         fprintf(stderr, "glint: no rank is left that can render\n");
-        render_command_note(command, EXIT_MACHINE);
+        render_command_record(command, EXIT_MACHINE);
     } else if (progress_interrupted() && (deal.next < deal.end || deal.again.count > 0)) {
-        render_command_note(command, EXIT_INTERRUPTED);
+        render_command_record(command, EXIT_INTERRUPTED);
     }
     return deal.end;
 }

@@ -21,7 +21,7 @@ static bool has_ended(void *ended)
     return *end_received;
 }
 
-static BandRows rows_take(void *ended, uint32_t rows_max, uint32_t step)
+static BandRows rows_acquire(void *ended, uint32_t rows_max, uint32_t step)
 {
     const Request request = {rows_max, step};
     send_bytes(&request, sizeof request, 0, TAG_TAKE);
@@ -35,7 +35,7 @@ static BandRows rows_take(void *ended, uint32_t rows_max, uint32_t step)
     return rows;
 }
 
-static bool band_give(void *ended, const Film *band)
+static bool band_send(void *ended, const Film *band)
 {
     const FilmHeader header = film_header(band);
     send_bytes(&header, sizeof header, 0, TAG_BAND);
@@ -92,7 +92,7 @@ static void scene_receive(RankRenderer *worker, SceneVariant variant)
     if (!takes) return;
     if (!worker->renderer) {
         compiled_scene_free(&compiled);
-    } else if (!renderer_take(worker->renderer, variant.pass, &compiled, &worker->messages)) {
+    } else if (!renderer_receive_scene(worker->renderer, variant.pass, &compiled, &worker->messages)) {
         renderer_close(worker->renderer);
         worker->renderer = NULL;
     }
@@ -105,7 +105,7 @@ static void worker_render(RankRenderer *worker, unsigned aovs)
     char failure[sizeof worker->own.failure] = "";
     bool end_received = false;
     const BandQueue queue = {
-        .take = rows_take, .give = band_give, .has_ended = has_ended, .context = &end_received};
+        .acquire = rows_acquire, .deliver = band_send, .has_ended = has_ended, .context = &end_received};
     const Compute *compute = worker->devices.items[0].compute;
     if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
     if (worker->messages.count > 0) {

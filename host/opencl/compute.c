@@ -16,10 +16,10 @@ bool compute_open(Compute *compute, const Device *device)
     const cl_context_properties properties[] = {CL_CONTEXT_PLATFORM, (cl_context_properties)device->platform,
                                                 0};
     cl_int status;
-    fault_note_call("clCreateContext");
+    fault_record_call("clCreateContext");
     compute->context = clCreateContext(properties, 1, &device->id, NULL, NULL, &status);
     if (!compute_check_object(compute, compute->context, status, "clCreateContext")) return false;
-    fault_note_call("clCreateCommandQueue");
+    fault_record_call("clCreateCommandQueue");
     compute->queue = clCreateCommandQueue(compute->context, device->id, CL_QUEUE_PROFILING_ENABLE, &status);
     return compute_check_object(compute, compute->queue, status, "clCreateCommandQueue");
 }
@@ -77,23 +77,23 @@ bool compute_check_reference(Compute *compute)
 
 bool compute_check(Compute *compute, cl_int status, const char *call)
 {
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     if (status != CL_SUCCESS) failure_keep(compute, call, status, NULL);
     return compute_ok(compute);
 }
 
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call)
 {
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     if (status != CL_SUCCESS || !object) failure_keep(compute, call, status, NULL);
     return compute_ok(compute);
 }
 
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped)
 {
-    fault_note_call("clEnqueueUnmapMemObject");
+    fault_record_call("clEnqueueUnmapMemObject");
     cl_int status = clEnqueueUnmapMemObject(compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL);
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     if (status != CL_SUCCESS && compute->unmap_failure.status == CL_SUCCESS)
         compute->unmap_failure = (ComputeFailure){.call = "clEnqueueUnmapMemObject", .status = status};
 }
@@ -134,9 +134,9 @@ static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_m
     cl_mem buffer = NULL;
     // NVIDIA's driver allocates at the first use, and would fail only there
     if (device->memory_bytes == 0 || size <= device->memory_bytes) {
-        fault_note_call("clCreateBuffer");
+        fault_record_call("clCreateBuffer");
         buffer = clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);
-        fault_note_call(NULL);
+        fault_record_call(NULL);
     }
     if (status != CL_SUCCESS || !buffer) {
         if (device->memory_bytes > 0 && device->largest_buffer_bytes > 0)
@@ -180,7 +180,7 @@ void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size)
 {
     if (!compute_ok(compute)) return NULL;
     cl_int status;
-    fault_note_call("clEnqueueMapBuffer");
+    fault_record_call("clEnqueueMapBuffer");
     void *mapped = clEnqueueMapBuffer(compute->queue, buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, begin,
                                       size, 0, NULL, NULL, &status);
     return compute_check_object(compute, mapped, status, "clEnqueueMapBuffer") ? mapped : NULL;
@@ -197,7 +197,7 @@ static void CL_CALLBACK bytes_free(cl_mem buffer, void *bytes)
     free(bytes);
 }
 
-cl_mem buffer_take(Compute *compute, size_t size, void *bytes)
+cl_mem buffer_adopt(Compute *compute, size_t size, void *bytes)
 {
     // small contents are copied: Oclgrind reports memory that it did not copy as uninitialized
     bool in_place = (compute->device->type & CL_DEVICE_TYPE_CPU) && size >= MEMORY_LARGE_MIN;

@@ -60,7 +60,7 @@ static inline bool compute_ok(const Compute *compute)
 // `compute_try(compute, clFinish(compute->queue))` makes the call unless an earlier one failed, and is false
 // if either failed.
 #define compute_try(compute, call)                                                                           \
-    (compute_ok(compute) ? (fault_note_call(#call), compute_check((compute), (call), #call)) : false)
+    (compute_ok(compute) ? (fault_record_call(#call), compute_check((compute), (call), #call)) : false)
 // Records the failure of a call that was made, if it is the first. The function's name is `call` up to a
 // parenthesis. Returns compute_ok.
 bool compute_check(Compute *compute, cl_int status, const char *call);
@@ -136,7 +136,7 @@ void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
 
 // Creates a read-only buffer of bytes of memory_allocate_large and takes ownership of them, even on failure:
 // a CPU may read large contents in place, other devices get a copy. Fails as buffer_create does.
-cl_mem buffer_take(Compute *compute, size_t size, void *bytes);
+cl_mem buffer_adopt(Compute *compute, size_t size, void *bytes);
 
 // One command's time by its event and by the host's clock.
 typedef struct {
@@ -153,7 +153,7 @@ typedef struct {
 
 // Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. An event may
 // exceed those by the timer's resolution and 1 %.
-LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
+LaunchTime launch_time_classify(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
 
 // Returns why the event's times are not trusted, or NULL if they are.
 const char *launch_clock_fault(const LaunchTime *time);

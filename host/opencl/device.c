@@ -17,7 +17,7 @@
 // double without fp64.
 static bool list_check(DeviceList *list, cl_int status, const char *call)
 {
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     bool is_absent =
         status == CL_DEVICE_NOT_FOUND || status == CL_PLATFORM_NOT_FOUND_KHR || status == CL_INVALID_VALUE;
     if (status != CL_SUCCESS && !is_absent && !list->failed_call) {
@@ -30,14 +30,14 @@ static bool list_check(DeviceList *list, cl_int status, const char *call)
 static bool device_query(DeviceList *list, cl_device_id id, cl_device_info what, size_t size, void *value,
                          size_t *needed)
 {
-    fault_note_call("clGetDeviceInfo");
+    fault_record_call("clGetDeviceInfo");
     return list_check(list, clGetDeviceInfo(id, what, size, value, needed), "clGetDeviceInfo");
 }
 
 static bool platform_query(DeviceList *list, cl_platform_id platform, cl_platform_info what, size_t size,
                            void *value, size_t *needed)
 {
-    fault_note_call("clGetPlatformInfo");
+    fault_record_call("clGetPlatformInfo");
     return list_check(list, clGetPlatformInfo(platform, what, size, value, needed), "clGetPlatformInfo");
 }
 
@@ -253,7 +253,7 @@ static void pocl_compile_once(void)
 static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform, cl_uint *count)
 {
     *count = 0;
-    fault_note_call("clGetDeviceIDs");
+    fault_record_call("clGetDeviceIDs");
     if (!list_check(list, clGetDeviceIDs(platform, CL_DEVICE_TYPE_ALL, 0, NULL, count), "clGetDeviceIDs"))
         *count = 0;
     cl_device_id *ids = memory_allocate_zeroed(*count, sizeof *ids);
@@ -268,7 +268,7 @@ void device_list_open(DeviceList *list)
     pocl_compile_once();
     *list = (DeviceList){0};
     cl_uint platform_count = 0;
-    fault_note_call("clGetPlatformIDs");
+    fault_record_call("clGetPlatformIDs");
     if (!list_check(list, clGetPlatformIDs(0, NULL, &platform_count), "clGetPlatformIDs") ||
         platform_count == 0)
         return;

@@ -3,7 +3,7 @@
 #include "host/opencl/passport.h"
 #include <string.h>
 
-LaunchTime launch_time_judge(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds)
+LaunchTime launch_time_classify(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds)
 {
     LaunchTime time = {
         .start_seconds = 1e-9 * (double)start,
@@ -39,17 +39,17 @@ static cl_ulong event_timestamp(cl_event event, cl_profiling_info what)
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start)
 {
     LaunchTime time = {0};
-    fault_note_call("clWaitForEvents");
+    fault_record_call("clWaitForEvents");
     cl_int waited = clWaitForEvents(1, &event), state = CL_COMPLETE;
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     double host_seconds = clock_seconds() - host_start;
     compute_try(compute,
                 clGetEventInfo(event, CL_EVENT_COMMAND_EXECUTION_STATUS, sizeof state, &state, NULL));
     if (state < 0) compute_fail(compute, command, state, "the command failed on the device");
     if (compute_check(compute, waited, "clWaitForEvents")) {
-        time = launch_time_judge(event_timestamp(event, CL_PROFILING_COMMAND_START),
-                                 event_timestamp(event, CL_PROFILING_COMMAND_END), host_seconds,
-                                 compute->device->timer_resolution_seconds);
+        time = launch_time_classify(event_timestamp(event, CL_PROFILING_COMMAND_START),
+                                    event_timestamp(event, CL_PROFILING_COMMAND_END), host_seconds,
+                                    compute->device->timer_resolution_seconds);
         time.device = compute->device;
         time.queued_seconds = 1e-9 * (double)event_timestamp(event, CL_PROFILING_COMMAND_QUEUED);
         time.submitted_seconds = 1e-9 * (double)event_timestamp(event, CL_PROFILING_COMMAND_SUBMIT);

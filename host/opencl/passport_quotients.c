@@ -47,7 +47,7 @@ static void result_add(RoundedResults *results, double error, bool is_repaired)
     results->is_repaired &= is_repaired;
 }
 
-static void sweep_judge(void *context, size_t begin, size_t end)
+static void sweep_classify(void *context, size_t begin, size_t end)
 {
     Sweep *sweep = context;
     const bool is_double = sweep->measurement->is_double;
@@ -99,7 +99,7 @@ static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint
         sweep.first = bytes;
         sweep.second = bytes + part * size;
         sweep.first_turn = done;
-        parallel_run(part, 1 << 14, sweep_judge, &sweep);
+        parallel_run(part, 1 << 14, sweep_classify, &sweep);
         done += part;
         last_seconds = clock_seconds() - start;
         if (part < RESULTS_MAX && last_seconds < 0.01) part *= 2;

@@ -107,7 +107,7 @@ static void build_release(Build *build)
 
 static bool build_check(Build *build, const char *call, cl_int status, bool is_there)
 {
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     if (status == CL_SUCCESS && is_there) return true;
     build->failed_call = call;
     build->status = status;
@@ -147,7 +147,7 @@ static void kernel_create(Build *build, const char *name)
 {
     if (!name) return;
     cl_int status;
-    fault_note_call("clCreateKernel");
+    fault_record_call("clCreateKernel");
     build->kernel = clCreateKernel(build->program, name, &status);
     build_check(build, "clCreateKernel", status, build->kernel);
 }
@@ -174,9 +174,9 @@ static void build_log_keep(const Compute *compute, cl_program program, const cha
     const Device *device = compute->device;
     if (!device->kernel_folder) return;
     Text entry = {0};
-    fault_note_call("clGetProgramBuildInfo");
+    fault_record_call("clGetProgramBuildInfo");
     char *log = build_log(compute, program);
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     text_appendf(&entry, "device: %s, %s\noptions: %s\nbuild: %s, %.3f s\n%s\n", device->name, device->driver,
                  options, cl_status_name(status), seconds, log);
     kernel_file_write(device, text, "log", "a", text_c(&entry));
@@ -189,7 +189,7 @@ static Build build_from_source(Compute *compute, const char *text, const Program
 {
     Build build = {0};
     cl_int status;
-    fault_note_call("clCreateProgramWithSource");
+    fault_record_call("clCreateProgramWithSource");
     build.program = clCreateProgramWithSource(compute->context, 1, &text, NULL, &status);
     if (!build_check(&build, "clCreateProgramWithSource", status, build.program)) return build;
     Text options = {0};
@@ -198,7 +198,7 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     // before the build, which may crash
     if (compute->device->kernel_folder) kernel_file_write(compute->device, text, "cl", "wx", text);
     const double start = clock_seconds();
-    fault_note_call("clBuildProgram");
+    fault_record_call("clBuildProgram");
     status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
     const bool is_built = build_check(&build, "clBuildProgram", status, true);
     build_log_keep(compute, build.program, text, text_c(&options), status, clock_seconds() - start);
@@ -226,13 +226,13 @@ static Build build_from_binary(const Compute *compute, const Text *binary, const
     Build build = {0};
     const unsigned char *bytes = (const unsigned char *)text_c(binary);
     cl_int binary_status, status;
-    fault_note_call("clCreateProgramWithBinary");
+    fault_record_call("clCreateProgramWithBinary");
     build.program = clCreateProgramWithBinary(compute->context, 1, &compute->device->id, &binary->count,
                                               &bytes, &binary_status, &status);
     if (build_check(&build, "clCreateProgramWithBinary", status, build.program)) {
         Text options = {0};
         program_options_append(&options, compute->device, request->options);
-        fault_note_call("clBuildProgram");
+        fault_record_call("clBuildProgram");
         status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
         text_free(&options);
         if (build_check(&build, "clBuildProgram", status, true)) kernel_create(&build, request->kernel);
@@ -289,7 +289,7 @@ cl_kernel program_kernel(Compute *compute, const Program *program, const char *n
 {
     if (!compute_ok(compute)) return NULL;
     cl_int status;
-    fault_note_call("clCreateKernel");
+    fault_record_call("clCreateKernel");
     cl_kernel kernel = clCreateKernel(program->program, name, &status);
     compute_check_object(compute, kernel, status, "clCreateKernel");
     return kernel;
@@ -297,9 +297,9 @@ cl_kernel program_kernel(Compute *compute, const Program *program, const char *n
 
 static bool program_query(const Program *program, cl_program_info what, size_t size, void *value)
 {
-    fault_note_call("clGetProgramInfo");
+    fault_record_call("clGetProgramInfo");
     cl_int status = clGetProgramInfo(program->program, what, size, value, NULL);
-    fault_note_call(NULL);
+    fault_record_call(NULL);
     return status == CL_SUCCESS;
 }
 

@@ -200,7 +200,7 @@ static bool place_launch(Renderer *renderer, KernelType type, const Place *place
     Place part = {0};
     while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
         const double seconds = renderer_launch(renderer, type, 2, part.first, part.items, part.group);
-        pace_note_launch(pace, place_pixels(&part) * samples, seconds);
+        pace_record_launch(pace, place_pixels(&part) * samples, seconds);
         if (!compute_ok(renderer->compute) || (settings->stop && settings->stop(settings->stop_context)))
             return false;
     }

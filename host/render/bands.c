@@ -43,7 +43,7 @@ typedef struct {
 
 static bool deliver(const Delivery *delivery, const Film *band)
 {
-    return delivery->queue ? delivery->queue->give(delivery->queue->context, band)
+    return delivery->queue ? delivery->queue->deliver(delivery->queue->context, band)
                            : delivery->pass_sink(delivery->context, band, delivery->samples);
 }
 
@@ -168,7 +168,7 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
     bool continues = compute_ok(compute);
     while (continues) {
         uint32_t wanted = band_rows(renderer, pace, end - settings->first_sample, buffers.rows);
-        BandRows rows = queue->take(queue->context, wanted, step);
+        BandRows rows = queue->acquire(queue->context, wanted, step);
         if (rows.row_count == 0) break;
         const double start = clock_seconds();
         continues = band_sample(renderer, &buffers, rows, settings->first_sample, end, &delivery) &&
@@ -249,7 +249,7 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
     return continues && compute_ok(renderer->compute);
 }
 
-static bool film_take_band(void *film, const Film *band, double fraction_done)
+static bool film_receive_band(void *film, const Film *band, double fraction_done)
 {
     (void)fraction_done;
     film_copy_band(film, band);
@@ -262,7 +262,7 @@ bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
     *film =
         film_allocate(settings->region_width, settings->region_height, (uint32_t)renderer->light_count, aovs);
     film->is_double = renderer->report.is_double;
-    bool whole = renderer_render(renderer, aovs, film_take_band, film);
+    bool whole = renderer_render(renderer, aovs, film_receive_band, film);
     if (!whole) film_free(film);
     return whole;
 }

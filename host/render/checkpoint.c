@@ -139,7 +139,7 @@ static RecordState record_check(const Checkpoint *checkpoint, off_t offset, off_
     return memcmp(record->hash, expected, HASH_BYTES) == 0 ? RECORD_WHOLE : RECORD_TORN;
 }
 
-static void record_note(Checkpoint *checkpoint, const RecordHeader *record)
+static void record_list(Checkpoint *checkpoint, const RecordHeader *record)
 {
     array_push(checkpoint->bands, ((BandRows){record->film.first_row, record->film.row_count}));
     array_push(checkpoint->offsets, checkpoint->end);
@@ -168,7 +168,7 @@ static bool records_find(Checkpoint *checkpoint)
     while ((state = record_check(checkpoint, checkpoint->end, status.st_size, &record, chunk)) ==
                RECORD_WHOLE &&
            rows_mark(is_saved, &record.film))
-        record_note(checkpoint, &record);
+        record_list(checkpoint, &record);
     free(is_saved);
     free(chunk);
     return state != RECORD_FAILED && ftruncate(checkpoint->descriptor, checkpoint->end) == 0;
@@ -378,7 +378,7 @@ bool checkpoint_append(Checkpoint *checkpoint, const Film *band)
     pthread_mutex_lock(&checkpoint->mutex);
     bool is_written = !checkpoint->failure &&
                       (record_write(checkpoint, &record, band) || checkpoint_failed(checkpoint, "write"));
-    if (is_written) record_note(checkpoint, &record);
+    if (is_written) record_list(checkpoint, &record);
     pthread_mutex_unlock(&checkpoint->mutex);
     return is_written;
 }

@@ -49,7 +49,7 @@ uint32_t pace_begin_pass(Pace *pace, uint64_t pixels, uint32_t left)
     return (uint32_t)fmax(1, fmin((double)pace_launch_samples(pace) / (double)pixels, largest));
 }
 
-void pace_note_launch(Pace *pace, uint64_t samples, double seconds)
+void pace_record_launch(Pace *pace, uint64_t samples, double seconds)
 {
     pace->launch_samples = (double)samples;
     pace->launch_seconds = seconds;

@@ -8,7 +8,7 @@
 // Samples are counted over all pixels of a launch or band. A Pace starts as zero except for its first two
 // members. For each band, pace_band_samples reads the sums of the previous band and pace_begin_band clears
 // them. A band is rendered in passes over its pixels: pace_begin_pass starts each pass, and
-// pace_launch_samples and pace_note_launch surround each of its launches.
+// pace_launch_samples and pace_record_launch surround each of its launches.
 typedef struct {
     double target_seconds;                 // the intended duration of a launch
     double samples_min;                    // keep the device busy; fewer take the same time
@@ -30,4 +30,4 @@ uint32_t pace_begin_pass(Pace *pace, uint64_t pixels, uint32_t left);
 // Returns how many samples the next launch of the pass may have; at least 1. The first launch has 4,096. Each
 // later launch has at most the larger of 4,096 and four times the samples of the launch before it.
 uint64_t pace_launch_samples(const Pace *pace);
-void pace_note_launch(Pace *pace, uint64_t samples, double seconds);
+void pace_record_launch(Pace *pace, uint64_t samples, double seconds);

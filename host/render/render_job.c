@@ -14,16 +14,16 @@ typedef struct {
     bool has_thread;
 } DeviceWorker;
 
-static BandRows worker_take(void *context, uint32_t rows_max, uint32_t step)
+static BandRows worker_acquire(void *context, uint32_t rows_max, uint32_t step)
 {
     const DeviceWorker *worker = context;
-    return scheduler_take(worker->scheduler, worker->number, rows_max, step);
+    return scheduler_acquire(worker->scheduler, worker->number, rows_max, step);
 }
 
-static bool worker_give(void *context, const Film *band)
+static bool worker_deliver(void *context, const Film *band)
 {
     const DeviceWorker *worker = context;
-    return scheduler_give(worker->scheduler, worker->number, band);
+    return scheduler_deliver(worker->scheduler, worker->number, band);
 }
 
 static bool worker_has_ended(void *context)
@@ -35,8 +35,10 @@ static bool worker_has_ended(void *context)
 static void *worker_run(void *argument)
 {
     DeviceWorker *worker = argument;
-    const BandQueue queue = {
-        .take = worker_take, .give = worker_give, .has_ended = worker_has_ended, .context = worker};
+    const BandQueue queue = {.acquire = worker_acquire,
+                             .deliver = worker_deliver,
+                             .has_ended = worker_has_ended,
+                             .context = worker};
     bool is_done = renderer_work(worker->renderer, worker->aovs, &queue);
     if (!compute_ok(worker->renderer->compute))
         scheduler_drop(worker->scheduler, worker->number);

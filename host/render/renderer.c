@@ -143,7 +143,7 @@ static void staged_upload(Renderer *renderer)
     for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
         if (!renderer->staged[i]) continue;
         renderer->buffers[i] =
-            buffer_take(renderer->compute, (size_t)renderer->layout.buffer_sizes[i], renderer->staged[i]);
+            buffer_adopt(renderer->compute, (size_t)renderer->layout.buffer_sizes[i], renderer->staged[i]);
         renderer->staged[i] = NULL;
     }
 }
@@ -240,7 +240,7 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     report->lanes = device_lanes(compute->device, report->is_double, settings->lanes);
     renderer->passport =
         arithmetic_passport(compute, renderer->settings.precision, report->lanes, settings->no_cache);
-    if (earlier) renderer_kernels_take(renderer, earlier);
+    if (earlier) renderer_kernels_adopt(renderer, earlier);
     if (renderer_certifies(renderer))
         renderer->next_pass =
             prepare(compute_in_double(compute), settings, pass + 1, earlier ? earlier->next_pass : NULL);
@@ -292,7 +292,7 @@ static void scene_changed(Renderer *renderer)
 
 // Uploads the scene to renderers of the same variant, on whose devices it fits, and takes ownership of it. A
 // renderer that moves is alone and keeps the arrays.
-static void scene_give(Renderer *const *renderers, size_t count, CompiledScene *compiled)
+static void scene_upload(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
     arrays_upload(renderers, count, compiled);
     if (count == 0) compiled_scene_free(compiled);
@@ -303,23 +303,24 @@ static void scene_give(Renderer *const *renderers, size_t count, CompiledScene *
     }
 }
 
-bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, MessageList *messages)
+bool renderer_receive_scene(Renderer *renderer, PixelPass pass, CompiledScene *compiled,
+                            MessageList *messages)
 {
-    Renderer *taker = of_pass(renderer, pass);
-    const bool has_room = device_has_room(compiled, taker, messages);
-    scene_give(&taker, has_room, compiled);
+    Renderer *receiver = of_pass(renderer, pass);
+    const bool has_room = device_has_room(compiled, receiver, messages);
+    scene_upload(&receiver, has_room, compiled);
     return has_room && compute_check_reference(renderer->compute);
 }
 
 // Finds the renderers of a variant. Closes those on whose devices the scene does not fit.
-static size_t takers_find(Renderer **takers, Renderer **renderers, size_t count, SceneVariant variant,
-                          const CompiledScene *compiled, MessageList *of_each)
+static size_t receivers_find(Renderer **receivers, Renderer **renderers, size_t count, SceneVariant variant,
+                             const CompiledScene *compiled, MessageList *of_each)
 {
     size_t taker_count = 0;
     for (size_t i = 0; i < count; i++) {
         if (renderer_lanes(renderers[i], variant.pass) != variant.lanes) continue;
-        takers[taker_count] = of_pass(renderers[i], variant.pass);
-        if (device_has_room(compiled, takers[taker_count], &of_each[i])) {
+        receivers[taker_count] = of_pass(renderers[i], variant.pass);
+        if (device_has_room(compiled, receivers[taker_count], &of_each[i])) {
             taker_count++;
         } else {
             renderer_close(renderers[i]);
@@ -344,7 +345,7 @@ static bool variants_compile(Renderer **renderers, size_t count, const Scene *sc
                              const RenderSettings *settings, const SceneReceivers *others,
                              MessageList *messages, MessageList *of_each)
 {
-    Renderer **takers = memory_allocate(count, sizeof *takers);
+    Renderer **receivers = memory_allocate(count, sizeof *receivers);
     bool compiles = true;
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT && compiles; pass++)
         for (uint32_t lanes = 1; lanes <= LANES_MAX && compiles; lanes *= 2) {
@@ -356,9 +357,10 @@ static bool variants_compile(Renderer **renderers, size_t count, const Scene *sc
             compiles = scene_compile(&compiled, scene, &compiling, messages);
             if (!compiles) break;
             if (others) others->send(others->context, variant, &compiled);
-            scene_give(takers, takers_find(takers, renderers, count, variant, &compiled, of_each), &compiled);
+            scene_upload(receivers, receivers_find(receivers, renderers, count, variant, &compiled, of_each),
+                         &compiled);
         }
-    free(takers);
+    free(receivers);
     return compiles;
 }
 
@@ -475,7 +477,7 @@ void *renderer_map(Renderer *renderer, cl_mem buffer, size_t begin, size_t size,
     double start = clock_seconds();
     cl_event event = NULL;
     cl_int status;
-    fault_note_call("clEnqueueMapBuffer");
+    fault_record_call("clEnqueueMapBuffer");
     void *mapped =
         clEnqueueMapBuffer(compute->queue, buffer, CL_FALSE, access, begin, size, 0, NULL, &event, &status);
     if (!compute_check_object(compute, mapped, status, "clEnqueueMapBuffer")) {

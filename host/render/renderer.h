@@ -107,10 +107,10 @@ bool renderers_open(Renderer **renderers, Compute *const *computes, size_t count
 // message if the device failed.
 Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
                         MessageList *messages);
-// Opens a renderer that has no scene on one device. The caller then calls renderer_take with the scene of
-// each pass. Closes `earlier`, NULL or an earlier renderer of the device, and reuses its kernels where they
-// suit. Returns NULL with a message if the settings do not fit the device, and NULL with no message if the
-// device failed.
+// Opens a renderer that has no scene on one device. The caller then calls renderer_receive_scene with the
+// scene of each pass. Closes `earlier`, NULL or an earlier renderer of the device, and reuses its kernels
+// where they suit. Returns NULL with a message if the settings do not fit the device, and NULL with no
+// message if the device failed.
 Renderer *renderer_open_empty(Compute *compute, const RenderSettings *settings, Renderer *earlier,
                               MessageList *messages);
 // Returns the lanes of a pass, or 0 if the renderer does not have that pass.
@@ -118,7 +118,8 @@ uint32_t renderer_lanes(Renderer *renderer, PixelPass pass);
 // Uploads the compiled scene of the pass and its lanes, and takes ownership of it even on failure. Returns
 // false with a message if the scene does not fit the device's memory, and false with no message if the device
 // failed.
-bool renderer_take(Renderer *renderer, PixelPass pass, CompiledScene *compiled, MessageList *messages);
+bool renderer_receive_scene(Renderer *renderer, PixelPass pass, CompiledScene *compiled,
+                            MessageList *messages);
 // Frees the memory that the scene takes. Only the kernels are left, for a later renderer.
 void renderer_release_scene(Renderer *renderer);
 void renderer_close(Renderer *renderer);
@@ -141,10 +142,10 @@ FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs);
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
 // The source of a renderer's rows and the destination of their bands. The functions have the contracts of
-// scheduler_take, scheduler_give and scheduler_has_ended.
+// scheduler_acquire, scheduler_deliver and scheduler_has_ended.
 typedef struct {
-    BandRows (*take)(void *context, uint32_t rows_max, uint32_t step);
-    bool (*give)(void *context, const Film *band);
+    BandRows (*acquire)(void *context, uint32_t rows_max, uint32_t step);
+    bool (*deliver)(void *context, const Film *band);
     bool (*has_ended)(void *context);
     void *context;
 } BandQueue;

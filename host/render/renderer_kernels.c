@@ -64,7 +64,7 @@ static void variant_close(Renderer *renderer, KernelVariant *variant)
     *variant = (KernelVariant){0};
 }
 
-void renderer_kernels_take(Renderer *renderer, Renderer *earlier)
+void renderer_kernels_adopt(Renderer *renderer, Renderer *earlier)
 {
     renderer->variant = earlier->variant;
     renderer->other_variant = earlier->other_variant;
@@ -187,12 +187,12 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelType type)
         .no_cache = renderer->settings.no_cache,
     };
     stage_begin(renderer->settings.stage, "building the kernel", NULL, 0);
-    fault_note_kernel(slot->request.kernel);
+    fault_record_kernel(slot->request.kernel);
     const double start = clock_seconds();
     program_build(renderer->compute, &slot->request, &slot->program);
     const HostSpan build = {kernel_sources[type].name, start, clock_seconds()};
     array_push(renderer->report.builds, build);
-    fault_note_kernel(NULL);
+    fault_record_kernel(NULL);
     stage_begin(renderer->settings.stage, "rendering", NULL, 0);
     if (is_of_image) renderer->report.kernel_hash = slot->program.text_hash;
     renderer->report.build_seconds += slot->program.build_seconds;
@@ -208,11 +208,11 @@ double renderer_launch(Renderer *renderer, KernelType type, cl_uint dimensions, 
                        const size_t *items, const size_t *group)
 {
     KernelSlot *slot = &renderer->variant.kernels[type];
-    fault_note_kernel(kernel_sources[type].name);
+    fault_record_kernel(kernel_sources[type].name);
     capture_launch(renderer->compute, &(Launch){slot->kernel, &slot->request, slot->program.is_easy,
                                                 dimensions, first, items, group});
     LaunchTime time = kernel_launch_from(renderer->compute, slot->kernel, dimensions, first, items, group);
-    fault_note_kernel(NULL);
+    fault_record_kernel(NULL);
     const bool is_fixed = renderer->compute->device->work_group[0] > 0;
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)
         compute_fail(renderer->compute, "clEnqueueNDRangeKernel", CL_INVALID_WORK_GROUP_SIZE,

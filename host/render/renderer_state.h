@@ -81,7 +81,7 @@ bool renderer_certifies(const Renderer *renderer);
 void renderer_kernels_choose(Renderer *renderer);
 // Moves the kernels of an earlier renderer of the device to this one, which must have none. The earlier
 // renderer has none afterwards.
-void renderer_kernels_take(Renderer *renderer, Renderer *earlier);
+void renderer_kernels_adopt(Renderer *renderer, Renderer *earlier);
 void renderer_kernels_close(Renderer *renderer);
 
 // The indices of SCENE_ARGUMENTS (kernels/scene.h). A kernel's other arguments follow them.

@@ -179,7 +179,8 @@ static bool rows_are_out(const Scheduler *scheduler)
 }
 
 // Takes rows if there are any for the worker now. Otherwise *waits tells whether there may be rows later.
-static BandRows rows_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits)
+static BandRows rows_acquire(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step,
+                             bool *waits)
 {
     const bool is_free = scheduler->free_rows.count > 0;
     BandRows rows = {0};
@@ -192,12 +193,12 @@ static BandRows rows_take(Scheduler *scheduler, size_t worker, uint32_t rows_max
     return rows;
 }
 
-BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
+BandRows scheduler_acquire(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step)
 {
     bool waits;
     BandRows rows;
     pthread_mutex_lock(&scheduler->mutex);
-    while ((rows = rows_take(scheduler, worker, rows_max, step, &waits)).row_count == 0 && waits)
+    while ((rows = rows_acquire(scheduler, worker, rows_max, step, &waits)).row_count == 0 && waits)
         pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
     pthread_mutex_unlock(&scheduler->mutex);
     return rows;
@@ -206,7 +207,7 @@ BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, 
 BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits)
 {
     pthread_mutex_lock(&scheduler->mutex);
-    BandRows rows = rows_take(scheduler, worker, rows_max, step, waits);
+    BandRows rows = rows_acquire(scheduler, worker, rows_max, step, waits);
     pthread_mutex_unlock(&scheduler->mutex);
     return rows;
 }
@@ -228,7 +229,7 @@ static void band_pass(Scheduler *scheduler, const Film *band)
 }
 
 // Takes the next band from the waiting ones. Returns false if it is not among them.
-static bool waiting_take(Scheduler *scheduler, Film *band)
+static bool waiting_acquire(Scheduler *scheduler, Film *band)
 {
     for (size_t i = 0; i < scheduler->waiting.count; i++) {
         if (scheduler->waiting.items[i].first_row != scheduler->delivered_rows) continue;
@@ -243,7 +244,7 @@ static bool waiting_take(Scheduler *scheduler, Film *band)
 static void waiting_pass(Scheduler *scheduler)
 {
     Film band;
-    while (!scheduler->has_ended && !scheduler->is_delivering && waiting_take(scheduler, &band)) {
+    while (!scheduler->has_ended && !scheduler->is_delivering && waiting_acquire(scheduler, &band)) {
         Checkpoint *checkpoint = scheduler->settings.checkpoint;
         if (checkpoint && !checkpoint_read(checkpoint, band.first_row, &band))
             scheduler->has_ended = true;
@@ -313,7 +314,7 @@ static void rows_done(WorkerState *worker)
     worker->rows_per_second = worker->rows.row_count / fmax(seconds, 1e-9);
 }
 
-bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band)
+bool scheduler_deliver(Scheduler *scheduler, size_t worker, const Film *band)
 {
     Checkpoint *checkpoint = scheduler->settings.checkpoint;
     bool is_kept = !checkpoint || checkpoint_append(checkpoint, band);

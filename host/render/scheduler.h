@@ -48,10 +48,10 @@ bool scheduler_close(Scheduler *scheduler, WorkerShare *shares);
 // Returns the next rows for the worker: at most `rows_max`, and a multiple of `step` where possible. Waits
 // while all rows are handed out or left to a faster worker, since that worker may yet fail, and while too
 // many bands wait for one above them. Returns no rows if the image is complete or the render has ended.
-BandRows scheduler_take(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step);
+BandRows scheduler_acquire(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step);
 // Delivers the band of the rows that the worker took. Returns false if the render has ended.
-bool scheduler_give(Scheduler *scheduler, size_t worker, const Film *band);
-// Returns the next rows for the worker as scheduler_take does, but does not wait. If there are none now,
+bool scheduler_deliver(Scheduler *scheduler, size_t worker, const Film *band);
+// Returns the next rows for the worker as scheduler_acquire does, but does not wait. If there are none now,
 // *waits tells whether there may be rows later.
 BandRows scheduler_try(Scheduler *scheduler, size_t worker, uint32_t rows_max, uint32_t step, bool *waits);
 // Hands the worker's rows to others. The worker takes no more rows.

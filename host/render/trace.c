@@ -141,7 +141,7 @@ static void trace_batch(Renderer *renderer, KernelType type, const TraceRay *ray
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
     renderer_unmap(renderer, ray_buffer, batch.ray_scalars);
     const double seconds = trace_launch(renderer, type, (uint32_t)count, ray_buffer, results, objects);
-    pace_note_launch(renderer_pace(renderer, type), count, seconds);
+    pace_record_launch(renderer_pace(renderer, type), count, seconds);
     batch.result_scalars = renderer_map(renderer, results, 0, result_size, CL_MAP_READ);
     batch.objects = renderer_map(renderer, objects, 0, object_size, CL_MAP_READ);
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, hits_read, &batch);

@@ -67,7 +67,7 @@ static double bound_of(const VerifyRun *run, const VerifyTarget *target, const R
 static void check_distance(VerifyRun *run, const ReferenceHit *exact, double t, double bound)
 {
     double ulp = verify_ulp(run, (double)exact->t);
-    verify_note_error(run, (double)quad_absolute(t - exact->t) / ulp, bound / ulp);
+    verify_record_error(run, (double)quad_absolute(t - exact->t) / ulp, bound / ulp);
 }
 
 ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, size_t pixel)

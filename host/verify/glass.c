@@ -132,7 +132,7 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
         double largest = fmax(fabs(off.x), fmax(fabs(off.y), fabs(off.z)));
         // an error of two cosines with a root each, and of a unit vector with a root and a quotient
         double bound = run->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
-        verify_note(run, largest / verify_roundoff(run), bound, "u");
+        verify_record(run, largest / verify_roundoff(run), bound, "u");
     }
     // most of the targets lie within the body
     run->result->wrong += entered < COUNT / 2;
@@ -157,7 +157,7 @@ void verify_matched_glass(VerifyRun *run)
             through += image.object[i] == 1;
             if (edge_distance(&empty, i) < 1e-3) continue;
             for (size_t c = 3 * i; c < 3 * i + 3; c++)
-                verify_note(run, fabs(image.color[c] - empty.color[c]), 1e-5, "of 1");
+                verify_record(run, fabs(image.color[c] - empty.color[c]), 1e-5, "of 1");
         }
         run->result->wrong += through == 0;
         film_free(&image);

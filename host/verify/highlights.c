@@ -57,7 +57,7 @@ void verify_highlights(VerifyRun *run)
             // whether grazing light reaches the surface is for the shadow tests
             if (quad_absolute(facing) < 16 * verify_roundoff(run)) continue;
             Quad exact = reference_highlight(normal, to_light, quad3_scale(ray, -1), power);
-            verify_note(run, (double)quad_absolute(value - exact), bound, "of 1");
+            verify_record(run, (double)quad_absolute(value - exact), bound, "of 1");
         }
         // in the close-up the highlight is in the middle of the image
         run->result->wrong += seen == 0 || (closely && brightest < 0.5);

@@ -39,7 +39,7 @@ void verify_ground_horizon(VerifyRun *run)
                 if (!verify_pixel_hit(&ground, &image, pixel).found) break;
                 exact--;
             }
-            verify_note(run, fabs((double)horizon - (double)exact), 1, "rows");
+            verify_record(run, fabs((double)horizon - (double)exact), 1, "rows");
         }
         film_free(&image);
     }

@@ -115,7 +115,7 @@ void verify_scaled_scenes(VerifyRun *run)
 }
 
 // Returns whether a ray, or one turned by a few roundings, hits the object.
-static bool meets_nearby(VerifyRun *run, Renderer *opened, const double direction[3], uint32_t object)
+static bool hits_nearby(VerifyRun *run, Renderer *opened, const double direction[3], uint32_t object)
 {
     enum { COUNT = 27 };
     // A tier leaves 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 open (is_open). As an
@@ -153,7 +153,7 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
 {
     for (size_t i = 0; i < film_pixel_count(image); i++) {
         bool same = image->object[i] == turned->object[i];
-        if (!same) run->result->wrong += !meets_nearby(run, opened, &image->ray[3 * i], turned->object[i]);
+        if (!same) run->result->wrong += !hits_nearby(run, opened, &image->ray[3 * i], turned->object[i]);
         for (size_t light = 0; light < image->light_count && same; light++) {
             size_t k = i * image->light_count + light;
             if (image->shadow[k] == turned->shadow[k]) continue;
@@ -161,7 +161,7 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
             run->result->wrong += !shadow_edge_beside(image, i, light);
         }
         for (size_t k = 3 * i; k < 3 * i + 3 && same; k++)
-            verify_note(run, fabs(image->color[k] - turned->color[k]), 1e-5, "of 1");
+            verify_record(run, fabs(image->color[k] - turned->color[k]), 1e-5, "of 1");
     }
 }
 

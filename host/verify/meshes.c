@@ -58,7 +58,7 @@ void verify_scale_ladder(VerifyRun *run)
         }
         run->result->differing += hit->t != ldexp(unscaled, k);
         if (run->tier != TIER_A)
-            verify_note_error(run, fabs(hit->t - ldexp(1, k)) / verify_ulp(run, ldexp(1, k)), 8);
+            verify_record_error(run, fabs(hit->t - ldexp(1, k)) / verify_ulp(run, ldexp(1, k)), 8);
     }
 }
 
@@ -114,7 +114,7 @@ void verify_facing_triangle(VerifyRun *run)
         Quad t = 1 - ((Quad)o[0] + 2 * (Quad)o[1] + 2 * (Quad)o[2]) / 9;
         run->result->leaks += !verify_is_hit(&hits[i]);
         if (verify_is_hit(&hits[i]) && run->tier > TIER_B)
-            verify_note_error(run, (double)quad_absolute(hits[i].t - t) / verify_ulp(run, (double)t), 4);
+            verify_record_error(run, (double)quad_absolute(hits[i].t - t) / verify_ulp(run, (double)t), 4);
     }
 }
 

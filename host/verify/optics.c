@@ -53,7 +53,7 @@ void verify_critical_angle(VerifyRun *run)
             sqrt(refracted[0] * refracted[0] + refracted[1] * refracted[1] + refracted[2] * refracted[2]);
         run->result->unsound += fabs(length - 1) > 4 * u;
         double cosine = sqrt(squared), ulp = verify_ulp(run, cosine);
-        verify_note_error(run, fabs(refracted[2] - cosine) / ulp, 8 * u / cosine / ulp);
+        verify_record_error(run, fabs(refracted[2] - cosine) / ulp, 8 * u / cosine / ulp);
     }
     free(rays);
     free(hits);

@@ -44,7 +44,7 @@ static void check_fringe(VerifyRun *run, const Film *image, const VerifyTarget *
     }
     bool near = sphere->distance <= 1e3; // farther away the 8 ulp of t exceed the bound of B
     if (count > 0 && (near || run->tier > TIER_B))
-        verify_note(run, percentile_999(errors, count), run->tier == TIER_B ? 2e-3 : 1e-5, "of 1");
+        verify_record(run, percentile_999(errors, count), run->tier == TIER_B ? 2e-3 : 1e-5, "of 1");
     free(errors);
 }
 
@@ -121,7 +121,7 @@ void verify_apex(VerifyRun *run)
             const double u = verify_roundoff(run);
             double length = vector_length(verify_vector(image.normal + 3 * i));
             // + 6 u: a root off by 3 ulp; + 4 u: a quotient off by 2
-            verify_note(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
+            verify_record(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
         }
         film_free(&image);
         scene_free(&scene);
@@ -182,7 +182,7 @@ typedef struct {
     bool *seen;
 } Flood;
 
-static bool flood_take(Flood *flood, uint32_t column, uint32_t row)
+static bool flood_visit(Flood *flood, uint32_t column, uint32_t row)
 {
     size_t pixel = (size_t)row * flood->image->width + column;
     if (flood->seen[pixel] || !verify_pixel_found(flood->image, pixel)) return false;
@@ -201,7 +201,7 @@ static void flood_run(Flood *flood)
         uint32_t column = place[0], row = place[1];
         for (uint32_t y = row > 0 ? row - 1 : 0; y <= row + 1 && y < image->height; y++)
             for (uint32_t x = column > 0 ? column - 1 : 0; x <= column + 1 && x < image->width; x++)
-                flood_take(flood, x, y);
+                flood_visit(flood, x, y);
     }
 }
 
@@ -213,7 +213,7 @@ static size_t count_parts(const Film *image)
                    memory_allocate_zeroed(pixels, sizeof *flood.seen)};
     for (uint32_t row = 0; row < image->height; row++)
         for (uint32_t column = 0; column < image->width; column++) {
-            if (!flood_take(&flood, column, row)) continue;
+            if (!flood_visit(&flood, column, row)) continue;
             parts++;
             flood_run(&flood);
         }

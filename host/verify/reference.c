@@ -108,7 +108,7 @@ ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
     return again;
 }
 
-void reference_hit_take(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray)
+void reference_hit_record(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray)
 {
     Quad margin = quad_minimum(nearest->margin, hit.margin);
     if (hit.found && nearest->found)
@@ -124,7 +124,7 @@ ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray)
 {
     ReferenceHit nearest = reference_miss();
     for (size_t i = 0; i < scene->objects.count; i++)
-        reference_hit_take(&nearest, reference_hit_object(&scene->objects.items[i], ray), (uint32_t)i, ray);
+        reference_hit_record(&nearest, reference_hit_object(&scene->objects.items[i], ray), (uint32_t)i, ray);
     return nearest;
 }
 

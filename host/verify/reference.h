@@ -46,7 +46,7 @@ ReferenceHit reference_hit_object(const Object *object, const ReferenceRay *ray)
 // Replaces *nearest by the hit of an object if that is nearer, and updates the margin in any case. The first
 // of equally distant objects is kept. Start with reference_miss, which has no hit.
 ReferenceHit reference_miss(void);
-void reference_hit_take(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray);
+void reference_hit_record(ReferenceHit *nearest, ReferenceHit hit, uint32_t object, const ReferenceRay *ray);
 // Returns the nearest hit of a scene. Among equal distances the lowest index counts.
 ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray);
 Quad3 reference_point(const ReferenceRay *ray, Quad t);

@@ -285,7 +285,7 @@ static bool is_on_side(Quad3 direction, Quad3 normal, int side, double *margin)
 }
 
 // Replaces a hit on a transparent surface by one on an opaque surface that coincides with it.
-static void hit_take_opaque(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit)
+static void hit_record_opaque(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit)
 {
     const Scene *scene = &world->scene;
     Quad length = quad3_length(ray->direction), reach = START_PART * hit->t * length;
@@ -410,7 +410,7 @@ static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Col
         return;
     }
     if (scene->materials.items[scene->objects.items[hit.object].material].transmission > 0)
-        hit_take_opaque(tree->world, ray, &hit);
+        hit_record_opaque(tree->world, ray, &hit);
     if (!tree->has_first) {
         tree->object = hit.object;
         tree->distance = (double)(hit.t * quad3_length(ray->direction));

@@ -93,6 +93,6 @@ ReferenceHit reference_scene_hit(const ReferenceScene *scene, const ReferenceRay
 {
     ReferenceHit nearest = reference_miss();
     for (size_t i = 0; i < scene->scene.objects.count; i++)
-        reference_hit_take(&nearest, reference_scene_hit_object(scene, i, ray, left), (uint32_t)i, ray);
+        reference_hit_record(&nearest, reference_scene_hit_object(scene, i, ray, left), (uint32_t)i, ray);
     return nearest;
 }

@@ -8,7 +8,7 @@ void hit_reduce_margin(ReferenceHit *hit, Quad margin)
 
 // A hit starts or ceases to count when the ray's start or end crosses the surface. The margin is twice the
 // height of these over the tangent plane of the hit.
-void hit_offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius)
+void hit_keep_nearest(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius)
 {
     if (hit->found && t >= hit->t) return;
     Quad inverse = 1 / quad3_length(normal), approach = -quad3_dot(normal, ray->direction) * inverse;

@@ -15,7 +15,8 @@ typedef struct {
 #define UNBOUNDED ((Quad)LDBL_MAX)
 
 // Records the crossing at `t` if it is the nearest so far. `normal` points outward; it need not be unit.
-void hit_offer(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal, Quad curvature_radius);
+void hit_keep_nearest(ReferenceHit *hit, const ReferenceRay *ray, Quad t, Quad3 normal,
+                      Quad curvature_radius);
 // Reduces the hit's margin to the magnitude of `margin` if that is smaller.
 void hit_reduce_margin(ReferenceHit *hit, Quad margin);
 // Pushes the crossing of a disc, such as a cap. Margins are those of its rim.

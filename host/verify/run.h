@@ -84,9 +84,9 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *
 bool verify_same_bits(const TraceHit *a, const TraceHit *b); // compares object, distance and normal
 
 // Records an error of t, in ulp of t, and counts it as wrong if it exceeds the bound.
-void verify_note_error(VerifyRun *run, double error, double bound);
+void verify_record_error(VerifyRun *run, double error, double bound);
 // Records an error in the given unit, and counts it as wrong if it exceeds the bound.
-void verify_note(VerifyRun *run, double error, double bound, const char *unit);
+void verify_record(VerifyRun *run, double error, double bound, const char *unit);
 
 // Reads a built-in scene: native YAML without the camera. A text that cannot be read is a bug. The caller
 // frees the scene with scene_free.

@@ -38,11 +38,11 @@ void verify_plane_acne(VerifyRun *run)
                 most = fmax(most, image.color[3 * i]);
             }
             run->result->wrong += !(least > 0);
-            verify_note(run, (most - least) / verify_ulp(run, most), 2, "ulp");
+            verify_record(run, (most - least) / verify_ulp(run, most), 2, "ulp");
             const double u = verify_roundoff(run);
-            verify_note(run,
-                        (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u,
-                        8, "u");
+            verify_record(
+                run, (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u, 8,
+                "u");
             film_free(&image);
             scene_free(&scene);
         }

@@ -106,7 +106,7 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, s
         if (run->tier == TIER_A)
             run->result->wrong += far->t < exit / 2;
         else
-            verify_note_error(run, fabs(far->t - exit) / verify_ulp(run, exit), 16);
+            verify_record_error(run, fabs(far->t - exit) / verify_ulp(run, exit), 16);
     }
 }
 

@@ -285,7 +285,7 @@ bool verify_same_bits(const TraceHit *a, const TraceHit *b)
     return memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0;
 }
 
-void verify_note(VerifyRun *run, double error, double bound, const char *unit)
+void verify_record(VerifyRun *run, double error, double bound, const char *unit)
 {
     VerifyResult *result = run->result;
     if (!(error <= bound)) result->wrong++;
@@ -299,9 +299,9 @@ void verify_note(VerifyRun *run, double error, double bound, const char *unit)
     }
 }
 
-void verify_note_error(VerifyRun *run, double error, double bound)
+void verify_record_error(VerifyRun *run, double error, double bound)
 {
-    verify_note(run, error, bound, "ulp");
+    verify_record(run, error, bound, "ulp");
 }
 
 Scene verify_scene(const char *objects)
@@ -386,7 +386,7 @@ void verify_run(Compute *compute, const VerifySettings *settings, const VerifyCh
             if (strcmp(verify_rays[k].name, result.name) == 0) verify_rays_run(&run, &verify_rays[k]);
         for (size_t k = 0; k < CHECKS_MAX && cases[i].checks[k]; k++)
             cases[i].checks[k](&run);
-        if (!sink->take(sink->context, &result)) break;
+        if (!sink->receive(sink->context, &result)) break;
     }
     renderer_close(tracer);
     renderer_close(painter);

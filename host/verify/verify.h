@@ -53,7 +53,7 @@ typedef struct {
     // Returns whether to run a case, whose name and title are set; NULL: run all.
     bool (*start)(void *context, const VerifyResult *result);
     // Returns whether to continue with the next case.
-    bool (*take)(void *context, const VerifyResult *result);
+    bool (*receive)(void *context, const VerifyResult *result);
     void *context;
 } VerifySink;
 

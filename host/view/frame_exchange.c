@@ -86,7 +86,7 @@ void files_changed(void *context)
     pthread_mutex_unlock(&loop->mutex);
 }
 
-bool probe_take(FrameLoop *loop, uint32_t pixel[2])
+bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])
 {
     pthread_mutex_lock(&loop->mutex);
     const bool has_probe = loop->has_probe;
@@ -173,7 +173,7 @@ void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
 }
 
 // Moves a text of the loop to the caller and sets it to NULL.
-static char *text_take(FrameLoop *loop, char **text)
+static char *text_acquire(FrameLoop *loop, char **text)
 {
     pthread_mutex_lock(&loop->mutex);
     char *taken = *text;
@@ -182,12 +182,12 @@ static char *text_take(FrameLoop *loop, char **text)
     return taken;
 }
 
-char *frame_loop_take_facts(FrameLoop *loop)
+char *frame_loop_acquire_facts(FrameLoop *loop)
 {
-    return text_take(loop, &loop->facts);
+    return text_acquire(loop, &loop->facts);
 }
 
-bool frame_loop_take(FrameLoop *loop, Frame *frame)
+bool frame_loop_acquire(FrameLoop *loop, Frame *frame)
 {
     pthread_mutex_lock(&loop->mutex);
     bool is_new = loop->has_ready;
@@ -201,7 +201,7 @@ bool frame_loop_take(FrameLoop *loop, Frame *frame)
     return is_new;
 }
 
-bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update)
+bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update)
 {
     pthread_mutex_lock(&loop->mutex);
     bool is_new = loop->has_update;
@@ -212,9 +212,9 @@ bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update)
     return is_new;
 }
 
-char *frame_loop_take_message(FrameLoop *loop)
+char *frame_loop_acquire_message(FrameLoop *loop)
 {
-    return text_take(loop, &loop->message);
+    return text_acquire(loop, &loop->message);
 }
 
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds)

@@ -74,10 +74,10 @@ unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request);
 // Asks for the color of the last request's image to be saved when it is complete.
 void frame_loop_save(FrameLoop *loop, const char *path);
 
-// Asks what a pixel of the last request's image sees. frame_loop_take_facts returns the answer.
+// Asks what a pixel of the last request's image sees. frame_loop_acquire_facts returns the answer.
 void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y);
 // Returns the answer to the last question, or NULL if none came since the last call. The caller frees it.
-char *frame_loop_take_facts(FrameLoop *loop);
+char *frame_loop_acquire_facts(FrameLoop *loop);
 
 // Writes the camera into the scene's file, which is not re-read because of that. With a `frame`, writes keys
 // there. Returns false with messages if it cannot.
@@ -85,7 +85,7 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
                              MessageList *messages);
 
 // Exchanges `frame` for the newest one. Returns false if that was already taken.
-bool frame_loop_take(FrameLoop *loop, Frame *frame);
+bool frame_loop_acquire(FrameLoop *loop, Frame *frame);
 // The scene that was read last.
 typedef struct {
     Camera camera;        // the scene's own
@@ -95,7 +95,7 @@ typedef struct {
     double frame_rate;    // 0: not given
 } SceneUpdate;
 // Returns false if none was read since the last call.
-bool frame_loop_take_scene(FrameLoop *loop, SceneUpdate *update);
+bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update);
 // Returns what went wrong, or was saved, since the last call, "" if a mistake was fixed, or NULL. The caller
 // frees it.
-char *frame_loop_take_message(FrameLoop *loop);
+char *frame_loop_acquire_message(FrameLoop *loop);

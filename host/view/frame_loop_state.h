@@ -64,7 +64,7 @@ typedef enum { WORK_RENDER, WORK_SAVE, WORK_PROBE, WORK_RELOAD, WORK_END } Work;
 // Waits for the next work and returns it. WORK_SAVE sets the path, which the caller frees.
 Work work_wait(FrameLoop *loop, bool can_save, char **save_path);
 // Sets the pixel of a question that has no answer yet. Returns false if there is none.
-bool probe_take(FrameLoop *loop, uint32_t pixel[2]);
+bool probe_acquire(FrameLoop *loop, uint32_t pixel[2]);
 // Takes ownership of the facts.
 void facts_publish(FrameLoop *loop, char *facts);
 // Takes ownership of the message. "" removes the last one; others are appended to those not yet taken.

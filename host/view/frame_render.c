@@ -16,7 +16,7 @@ static bool is_last(const Film *film, const Film *band)
 void probe_answer(FrameLoop *loop)
 {
     uint32_t pixel[2];
-    if (!probe_take(loop, pixel)) return;
+    if (!probe_acquire(loop, pixel)) return;
     const PixelView view = {loop->renderer,
                             &loop->scene,
                             loop->options.scene_path,
@@ -32,14 +32,14 @@ static void rendering_show(FrameLoop *loop, const Film *band)
     stage_set(loop->stage, band->first_row + band->height);
 }
 
-static bool preview_take(void *context, const Film *band, double fraction_done)
+static bool preview_receive(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
     film_copy_band(context, band);
     return true;
 }
 
-static bool pass_take(void *context, const Film *band, uint32_t samples)
+static bool pass_receive(void *context, const Film *band, uint32_t samples)
 {
     FrameLoop *loop = context;
     film_copy_band(&loop->film, band);
@@ -48,8 +48,8 @@ static bool pass_take(void *context, const Film *band, uint32_t samples)
     if (!is_last(&loop->film, band)) return true;
     const bool is_first = samples == 1 && band->layers[LAYER_COLOR];
     if (is_first && loop->current.is_moving && !loop->has_preview)
-        preview_note(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
-                     (double)film_pixel_count(&loop->film));
+        preview_record(&loop->preview, 1, loop->move_seconds, clock_seconds() - loop->render_start,
+                       (double)film_pixel_count(&loop->film));
     if (is_first && view_aovs[loop->current.view]) return true; // its AOVs follow the first pass
     frame_fill(loop, samples);
     if (!is_first) distances_fill(loop);
@@ -149,9 +149,9 @@ static bool preview_render(FrameLoop *loop)
     if (!renderer_prepare(loop, loop->divisor, 1, true)) return false;
     film_fit(loop, aovs);
     atomic_store(&loop->first_is_due, true);
-    if (!renderer_render(loop->renderer, aovs, preview_take, &loop->film)) return false;
-    preview_note(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
-                 (double)film_pixel_count(&loop->film));
+    if (!renderer_render(loop->renderer, aovs, preview_receive, &loop->film)) return false;
+    preview_record(&loop->preview, loop->divisor, loop->move_seconds, clock_seconds() - loop->render_start,
+                   (double)film_pixel_count(&loop->film));
     frame_fill(loop, 1);
     frame_publish(loop, 0);
     atomic_store(&loop->first_is_due, false);
@@ -163,7 +163,7 @@ typedef struct {
     Film film;
 } Reference;
 
-static bool reference_take(void *context, const Film *band, double fraction_done)
+static bool reference_receive(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
     Reference *reference = context;
@@ -188,7 +188,7 @@ static bool errors_render(FrameLoop *loop)
     messages_publish(loop, &messages);
     if (!prepared) return false;
     Reference reference = {loop, film_allocate(settings.width, settings.height, loop->film.light_count, 0)};
-    const bool done = renderer_render(loop->reference, 0, reference_take, &reference);
+    const bool done = renderer_render(loop->reference, 0, reference_receive, &reference);
     if (done) {
         frame_fill(loop, 1);
         loop->frame.largest_error = view_error(loop->frame.pixels, &loop->film, &reference.film);
@@ -212,7 +212,7 @@ bool request_render(FrameLoop *loop)
     if (complete) {
         film_fit(loop, aovs);
         atomic_store(&loop->first_is_due, is_moving && !loop->has_preview);
-        complete = renderer_accumulate(loop->renderer, aovs, pass_take, loop) &&
+        complete = renderer_accumulate(loop->renderer, aovs, pass_receive, loop) &&
                    (view != VIEW_ERROR || errors_render(loop));
         atomic_store(&loop->first_is_due, false);
     }

@@ -27,8 +27,8 @@ uint32_t preview_divisor(const Preview *preview, uint32_t width, uint32_t height
     return DIVISOR_MAX;
 }
 
-void preview_note(Preview *preview, uint32_t divisor, double move_seconds, double render_seconds,
-                  double pixels)
+void preview_record(Preview *preview, uint32_t divisor, double move_seconds, double render_seconds,
+                    double pixels)
 {
     for (int i = preview->divisor == 0 ? 0 : 2; i < 3; i++) {
         memmove(preview->fixed_seconds, preview->fixed_seconds + 1, 2 * sizeof *preview->fixed_seconds);

@@ -19,5 +19,5 @@ typedef struct {
 uint32_t preview_divisor(const Preview *preview, uint32_t width, uint32_t height);
 
 // Records the times that a frame of this divisor took to move the camera and to render its pixels.
-void preview_note(Preview *preview, uint32_t divisor, double move_seconds, double render_seconds,
-                  double pixels);
+void preview_record(Preview *preview, uint32_t divisor, double move_seconds, double render_seconds,
+                    double pixels);

@@ -52,7 +52,7 @@ static void facts_exchange(Window *window)
         frame_loop_probe(window->frames, (uint32_t)at[0], (uint32_t)at[1]);
         window->facts_are_due = false;
     }
-    char *facts = frame_loop_take_facts(window->frames);
+    char *facts = frame_loop_acquire_facts(window->frames);
     if (!facts) return;
     if (window->prints_facts) fputs(facts, stdout);
     fflush(stdout);
@@ -122,9 +122,9 @@ static void event_handle(Window *window, const SDL_Event *event)
     }
 }
 
-static void message_take(Window *window)
+static void message_acquire(Window *window)
 {
-    char *message = frame_loop_take_message(window->frames);
+    char *message = frame_loop_acquire_message(window->frames);
     if (!message) return;
     size_t length = strlen(message);
     if (length > 0) fprintf(stderr, "%s%s", message, message[length - 1] == '\n' ? "" : "\n");
@@ -158,11 +158,11 @@ static bool is_refused(const Window *window)
     return frame_loop_scene(window->frames, &size) == SCENE_REFUSED;
 }
 
-static void scene_take(Window *window)
+static void scene_acquire(Window *window)
 {
     const bool follows = cameras_equal(&window->camera, &window->scene.camera);
     const double frame_rate = window->scene.frame_rate;
-    if (!frame_loop_take_scene(window->frames, &window->scene)) return;
+    if (!frame_loop_acquire_scene(window->frames, &window->scene)) return;
     if (follows || window->scene.has_new_camera) window->camera = window->scene.camera;
     window->camera_changed |= window->scene.has_new_camera;
     window->plays &= has_time_line(window);
@@ -175,16 +175,16 @@ static void scene_take(Window *window)
 static void work_exchange(Window *window)
 {
     if (!window->is_loaded) scene_receive(window);
-    scene_take(window);
+    scene_acquire(window);
     key_record(window);
     request_send(window);
-    if (frame_loop_take(window->frames, &window->frame)) {
+    if (frame_loop_acquire(window->frames, &window->frame)) {
         window->facts_are_due |= window->frame.number != window->facts_request;
         window->facts_request = window->frame.number;
         frame_show(window);
     }
     facts_exchange(window);
-    message_take(window);
+    message_acquire(window);
     stage_show(window);
 }
 
@@ -201,7 +201,7 @@ static WindowEnd events_run(Window *window)
         if (window->plays) play(window);
         work_exchange(window);
         if (!window->is_loaded && is_refused(window)) {
-            message_take(window); // it may have come since the last look, together with the refusal
+            message_acquire(window); // it may have come since the last look, together with the refusal
             return WINDOW_REFUSED;
         }
         if (window->redraws) window_draw(window);

@@ -10,7 +10,7 @@
 // is lowered by 256 u v^2, on the host, and here by 128 u d^2, the ray's cull slack. A shadow ray's |d| is
 // the distance to the light; rays from the eye start there and need only the former. docs/numerics.md derives
 // this and the cull of several packets.
-static inline mask ray_meets_cull_sphere(const Ray *ray, global const CullSphere *sphere)
+static inline mask ray_hits_cull_sphere(const Ray *ray, global const CullSphere *sphere)
 {
     global const scalar *center_power = (global const scalar *)sphere;
     real along = real_fma(
@@ -35,7 +35,7 @@ typedef struct {
     scalar slack;          // the largest cull slack
 } DirectionBounds;
 
-// Exceeds the error of inverse_root_estimate and all roundings here and in directions_meet_cull_spheres.
+// Exceeds the error of inverse_root_estimate and all roundings here and in directions_hit_cull_spheres.
 #define DIRECTION_REACH_SLACK ((scalar)(0x1p-13f))
 
 // Bounds the active rays of `packets`, given as bits. Returns false if a length is too small to square.
@@ -71,8 +71,8 @@ static inline bool rays_bound_directions(const Ray *rays, uint packets, Directio
 }
 
 // Returns which of the next LANES spheres, as bits, any ray may intersect.
-static inline uint directions_meet_cull_spheres(const DirectionBounds *bounds,
-                                                global const CullSphere *spheres)
+static inline uint directions_hit_cull_spheres(const DirectionBounds *bounds,
+                                               global const CullSphere *spheres)
 {
     RealLanes x, y, z, power;
     for (uint lane = 0; lane < LANES; lane++) {
@@ -105,7 +105,7 @@ static inline uint packets_near(const Scene *scene, const Ray *rays, uint packet
     if (!spheres || !rays_bound_directions(rays, packets, &bounds)) return ~0u;
     uint near = 0;
     for (uint i = 0; i + 1 < count; i += LANES)
-        near |= directions_meet_cull_spheres(&bounds, spheres + 1 + i) << i;
+        near |= directions_hit_cull_spheres(&bounds, spheres + 1 + i) << i;
     return near;
 }
 

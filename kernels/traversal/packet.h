@@ -197,13 +197,13 @@ typedef struct {
     RealLanes entry;     // each child's first entry distance
     bool by_ray;         // each ray was tested, instead of the group's bounds
     IntegerLanes hit_by; // if by_ray, the lanes that hit each child, as bits
-} MetChildren;
+} HitChildren;
 
 // Returns the children that the lanes may hit. Runs the shorter of two loops, which cost one test per ray or
 // per child that passes the bounds.
-static inline MetChildren group_meets_children(const RayGroup *group, uint lanes, global const scalar *boxes)
+static inline HitChildren group_hits_children(const RayGroup *group, uint lanes, global const scalar *boxes)
 {
-    MetChildren met;
+    HitChildren met;
     met.children = 0;
     met.by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
     if (!met.by_ray) {
@@ -218,7 +218,7 @@ static inline MetChildren group_meets_children(const RayGroup *group, uint lanes
 }
 
 // Returns the lanes, as bits, that intersect one child's box before their tmax.
-static inline uint child_lanes(const RayGroup *group, const MetChildren *met, uint child,
+static inline uint child_lanes(const RayGroup *group, const HitChildren *met, uint child,
                                global const scalar *boxes)
 {
     real entry = (real)(met->entry.each[child]);
@@ -240,7 +240,7 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
                               global const BvhNode *node, RayGroup *group, uint lanes)
 {
     global const scalar *boxes = (global const scalar *)node->planes;
-    MetChildren met = group_meets_children(group, lanes, boxes);
+    HitChildren met = group_hits_children(group, lanes, boxes);
     const uint leaves = met.children & node_leaves(node), bottom = stack->count;
     for (uint left = leaves; left != 0; left &= left - 1) {
         uint leaf = lowest_bit(left);

@@ -115,7 +115,7 @@ static inline bool intersect_instances(Traversal *traversal, const Scene *scene,
             if (count - next < 32) near &= (1u << (count - next)) - 1;                                       \
             for (; near != 0; near &= near - 1) {                                                            \
                 const uint i = next + lowest_bit(near);                                                      \
-                if (!cull_spheres || lanes_any(ray_meets_cull_sphere(ray, &cull_spheres[i])))                \
+                if (!cull_spheres || lanes_any(ray_hits_cull_sphere(ray, &cull_spheres[i])))                 \
                     intersect_##names(traversal, scene, ray, first + i, first + i + 1);                      \
                 if (traversal->query == OCCLUSION && !lanes_any(traversal->active)) return;                  \
             }                                                                                                \

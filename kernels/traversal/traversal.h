@@ -31,7 +31,7 @@ static inline bool traversal_begin(Traversal *traversal, const Scene *scene, Ray
     if (near != 0 && scene->header->cull_spheres.x != 1) intersect_outside_bvh(traversal, scene, ray, near);
     if (!HAS_BVH || !lanes_any(traversal->active)) return false;
     global const CullSphere *cull_spheres = ray_cull_spheres(scene, ray);
-    return !cull_spheres || lanes_any(ray_meets_cull_sphere(ray, cull_spheres));
+    return !cull_spheres || lanes_any(ray_hits_cull_sphere(ray, cull_spheres));
 }
 
 // Traverses the BVH with `packets`, as bits, for which traversal_begin returned true. Their rays have the

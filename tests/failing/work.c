@@ -13,7 +13,7 @@ const Device *work_device;
 Scene work_scene;
 Answer right;
 
-bool work_take_band(void *context, const Film *band, double fraction_done)
+bool work_receive_band(void *context, const Film *band, double fraction_done)
 {
     (void)fraction_done;
     Answer *answer = context;
@@ -42,9 +42,9 @@ bool work(Compute *compute, Answer *answer)
     MessageList messages = {0};
     memset(answer, 0, sizeof *answer);
     compute_open(compute, work_device);
-    cl_mem large = buffer_take(compute, LARGE_BYTES, memory_allocate_large(LARGE_BYTES, 1));
+    cl_mem large = buffer_adopt(compute, LARGE_BYTES, memory_allocate_large(LARGE_BYTES, 1));
     Renderer *renderer = renderer_open(compute, &work_scene, &work_settings, &messages);
-    bool done = renderer && renderer_render(renderer, AOVS_ALL, work_take_band, answer) &&
+    bool done = renderer && renderer_render(renderer, AOVS_ALL, work_receive_band, answer) &&
                 renderer_trace(renderer, rays, RAY_COUNT, answer->hits);
     if (renderer) memcpy(answer->ray_counts, renderer_report(renderer)->rays, sizeof answer->ray_counts);
     renderer_close(renderer);

@@ -22,7 +22,7 @@ int work_set_up(void **state);
 int work_tear_down(void **state);
 
 // A BandSink into an Answer.
-bool work_take_band(void *answer, const Film *band, double fraction_done);
+bool work_receive_band(void *answer, const Film *band, double fraction_done);
 // Returns whether all was done; the compute is left open.
 bool work(Compute *compute, Answer *answer);
 // Fails the test where an object is not released.

@@ -10,7 +10,7 @@ static bool disc_bounds(const Scene *scene, const Object *object, Bounds *bounds
 
 // Sets the eye's power if the center's rounding would move the disc, or its rim, by more than 4 roundings of
 // its distance from the eye. The disc is then where its plane intersects a sphere that the power defines.
-static void disc_take_power(Disc *disc, Flattening *flattening, const Object *object)
+static void disc_set_power(Disc *disc, Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
     const double radius = object->as.disc.radius, u = roundoff_of(rounding);
@@ -26,7 +26,7 @@ static void disc_take_power(Disc *disc, Flattening *flattening, const Object *ob
     const double rim_moved = (double)quad3_length(quad3_subtract(center, quad3(stored))) +
                              fabs(radius - rounded(rounding, radius));
     if (rim_moved <= 4 * u * from_rim && (double)quad3_dot_magnitude(unit, center) <= 4 * from_disc) return;
-    if (!primitive_take_power(flattening, (double)(squared - (Quad)radius * radius), &disc->id)) return;
+    if (!primitive_set_power(flattening, (double)(squared - (Quad)radius * radius), &disc->id)) return;
     disc->foot = scalar4_of(vector_rounded(rounding, quad3_rounded(foot)), 0);
 }
 
@@ -36,7 +36,7 @@ static void disc_flatten(Flattening *flattening, const Object *object)
     const Vector3 center = point_from_eye(&flattening->rounding, object->as.disc.center);
     Disc disc = {.center_radius = scalar4_of(center, object->as.disc.radius),
                  .normal = normal_and_inverse_length(&flattening->rounding, normal)};
-    disc_take_power(&disc, flattening, object);
+    disc_set_power(&disc, flattening, object);
     surface_grid(flattening, object->material, normal, &disc.grid_u, &disc.grid_v);
     primitive_add(flattening, TYPE_DISCS, &disc, object->material);
 }

@@ -41,7 +41,7 @@ static bool paraboloid_moves(const Rounding *rounding, const Object *object, con
 }
 
 // Lets the eye's power define the paraboloid if rounding matters.
-static void paraboloid_take_power(Paraboloid *shape, Flattening *flattening, const Object *object)
+static void paraboloid_set_power(Paraboloid *shape, Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
     const Quad focal_length = object->as.paraboloid.focal_length;
@@ -53,7 +53,7 @@ static void paraboloid_take_power(Paraboloid *shape, Flattening *flattening, con
     const Quad3 axis = quad3(vector3_of(&shape->axis_end));
     const Quad squared = quad3_dot(axis, axis), length = quad_root(squared);
     const Quad power = squared * (quad3_dot(exact.foot, exact.foot) - 4 * focal_length * exact.lift);
-    if (!primitive_take_power(flattening, (double)power, &shape->id)) return;
+    if (!primitive_set_power(flattening, (double)power, &shape->id)) return;
     shape->foot_lift =
         scalar4_of(vector_rounded(rounding, quad3_rounded(exact.foot)), (double)(exact.lift * length));
     shape->axis_end.w = finite ? (double)(exact.below_end * length) : 0;
@@ -72,7 +72,7 @@ static void paraboloid_flatten(Flattening *flattening, const Object *object)
         .id.y = (finite ? REVOLUTION_FINITE : 0u) |
                 (finite && object->as.paraboloid.caps ? REVOLUTION_CAPPED : 0u),
     };
-    paraboloid_take_power(&paraboloid, flattening, object);
+    paraboloid_set_power(&paraboloid, flattening, object);
     primitive_add(flattening, TYPE_PARABOLOIDS, &paraboloid, object->material);
 }
 

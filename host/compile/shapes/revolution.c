@@ -118,7 +118,7 @@ static bool revolution_moves(const RevolutionGiven *given, const RevolutionFromE
 }
 
 // Makes everything relative to the eye if rounding matters.
-static void revolution_take_power(Revolution *shape, Flattening *flattening, const RevolutionGiven *given)
+static void revolution_set_power(Revolution *shape, Flattening *flattening, const RevolutionGiven *given)
 {
     const Rounding *rounding = &flattening->rounding;
     if (revolution_is_far(rounding, given)) return;
@@ -134,7 +134,7 @@ static void revolution_take_power(Revolution *shape, Flattening *flattening, con
     const Quad3 wide_axis = quad3(axis);
     const Quad squared = quad3_dot(wide_axis, wide_axis), length = quad_root(squared);
     const Quad power = squared * (quad3_dot(exact.foot, exact.foot) - exact.radius * exact.radius);
-    if (!primitive_take_power(flattening, (double)power, &shape->id)) return;
+    if (!primitive_set_power(flattening, (double)power, &shape->id)) return;
     shape->base_radius =
         scalar4_of(vector_rounded(rounding, quad3_rounded(exact.foot)), (double)(exact.radius * length));
     shape->axis_slope = scalar4_of(axis, (double)exact.slope);
@@ -146,7 +146,7 @@ static void revolution_flatten(Flattening *flattening, int type, const Object *o
                                const RevolutionGiven *given)
 {
     Revolution shape = revolution_rounded(&flattening->rounding, given);
-    revolution_take_power(&shape, flattening, given);
+    revolution_set_power(&shape, flattening, given);
     primitive_add(flattening, type, &shape, object->material);
 }
 

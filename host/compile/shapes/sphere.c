@@ -35,14 +35,14 @@ static EyePower eye_power(const Rounding *rounding, const Object *object, Vector
 }
 
 // Sets the sphere's power if needed. The surface of most moves by less than 4 roundings of its distance.
-static void sphere_take_power(Sphere *sphere, Flattening *flattening, const Object *object, Vector3 center)
+static void sphere_set_power(Sphere *sphere, Flattening *flattening, const Object *object, Vector3 center)
 {
     const Rounding *rounding = &flattening->rounding;
     const EyePower eye = eye_power(rounding, object, center);
     const double size = vector_length(center) + object->as.sphere.radius, distance = fabs(eye.power) / size;
     if (eye.moved > 4 * roundoff_of(rounding) * distance ||
         (rounding->certifies && distance < NEAR_EYE * size))
-        primitive_take_power(flattening, eye.power, &sphere->id);
+        primitive_set_power(flattening, eye.power, &sphere->id);
 }
 
 static void sphere_flatten(Flattening *flattening, const Object *object)
@@ -50,7 +50,7 @@ static void sphere_flatten(Flattening *flattening, const Object *object)
     const Vector3 center = point_from_eye(&flattening->rounding, object->as.sphere.center);
     Sphere sphere = {.center_radius = scalar4_of(center, object->as.sphere.radius),
                      .id.y = object->as.sphere.only_inside ? IGNORES_FRONT_FACES : 0u};
-    sphere_take_power(&sphere, flattening, object, center);
+    sphere_set_power(&sphere, flattening, object, center);
     primitive_add(flattening, TYPE_SPHERES, &sphere, object->material);
 }
 

@@ -36,7 +36,7 @@ static Quad torus_gap(const TorusFromEye *relative, Quad minor)
 // Lets the eye's power define a torus that is near the eye for its size. The ray's closest approach to the
 // center, where the other form starts, is off by some roundings of that size, whether or not they move the
 // torus itself.
-static void torus_take_power(Torus *torus, Flattening *flattening, const Object *object)
+static void torus_set_power(Torus *torus, Flattening *flattening, const Object *object)
 {
     const Rounding *rounding = &flattening->rounding;
     const Quad minor = object->as.torus.minor;
@@ -46,7 +46,7 @@ static void torus_take_power(Torus *torus, Flattening *flattening, const Object 
     const Quad gap = torus_gap(&exact, minor), size = object->as.torus.major + object->as.torus.minor;
     if (!rounding->has_eye || !(quad_absolute(gap) < size)) return;
     const Quad squared = exact.outward * exact.outward + exact.height * exact.height;
-    if (!primitive_take_power(flattening, (double)((squared - minor * minor) / (2 * minor)), &torus->id))
+    if (!primitive_set_power(flattening, (double)((squared - minor * minor) / (2 * minor)), &torus->id))
         return;
     const Quad3 from_circle = quad3_add(quad3_scale(exact.radial, exact.outward),
                                         quad3_scale(quad3_unit(quad3(object->as.torus.axis)), exact.height));
@@ -62,7 +62,7 @@ static void torus_flatten(Flattening *flattening, const Object *object)
         .center_major = scalar4_of(center, object->as.torus.major),
         .axis_minor = scalar4_of(vector_normalize(object->as.torus.axis), object->as.torus.minor),
     };
-    torus_take_power(&torus, flattening, object);
+    torus_set_power(&torus, flattening, object);
     primitive_add(flattening, TYPE_TORI, &torus, object->material);
 }
 

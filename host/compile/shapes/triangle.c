@@ -100,7 +100,7 @@ static inline bool triangle_is_far(const Triangle *triangle)
 
 // Lets the eye's height define the plane, with the normal of the vertices before they are rounded, if
 // rounding moves the plane by more than 4 roundings of its distance from the eye.
-static void triangle_take_height(Triangle *triangle, Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
+static void triangle_set_height(Triangle *triangle, Flattening *flattening, Vector3 a, Vector3 b, Vector3 c)
 {
     const Rounding *rounding = &flattening->rounding;
     const Vector3 seen = vector3_of(&triangle->a);
@@ -131,7 +131,7 @@ static Triangle triangle_make(Flattening *flattening, Vector3 a, Vector3 b, Vect
 {
     Triangle triangle = triangle_rounded(&flattening->rounding, a, b, c);
     if (!flattening->rounding.is_local && !triangle_is_far(&triangle))
-        triangle_take_height(&triangle, flattening, a, b, c);
+        triangle_set_height(&triangle, flattening, a, b, c);
     return triangle;
 }
 

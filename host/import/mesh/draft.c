@@ -61,7 +61,7 @@ size_t draft_part_count(const MeshDraft *draft, DraftPart part)
                                   : draft->normals.count;
 }
 
-void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset)
+void draft_record_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset)
 {
     if (index >= draft->needed[part].index) draft->needed[part] = (DraftPlace){index + 1, offset};
 }

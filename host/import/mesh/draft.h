@@ -89,7 +89,7 @@ void draft_warn(MeshDraft *draft, const char *format, ...) __attribute__((format
 size_t draft_part_count(const MeshDraft *draft, DraftPart part);
 // Sets a part in all corners from this one on, and in none before.
 void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
-void draft_note_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
+void draft_record_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
 // Makes the part share the indices of the positions, and gives each of the first `count` positions that lacks
 // one a value of 0. A reader calls it before it adds values and after the last position.
 void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
@@ -102,7 +102,7 @@ void draft_drop_missing(MeshDraft *draft);
 // file defines later is checked at the end.
 static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t index, size_t offset)
 {
-    if (index >= draft_part_count(draft, part)) draft_note_index(draft, part, index, offset);
+    if (index >= draft_part_count(draft, part)) draft_record_index(draft, part, index, offset);
     array_push(draft->corners[part], index);
 }
 

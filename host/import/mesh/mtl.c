@@ -179,7 +179,7 @@ static void dissolve_read(MtlReader *reader, MtlMaterial *material)
     const Word word = scan_word(&ahead);
     material->opacity_offset = word.offset;
     if (word_is(word, "-halo")) {
-        unused_note(&reader->unused, &reader->report, word, "is not used");
+        unused_record(&reader->unused, &reader->report, word, "is not used");
         reader->scan = ahead;
     }
     number_of_line(reader, &range_unit, &material->dissolve);
@@ -314,7 +314,7 @@ static void line_read(MtlReader *reader)
             statements[i].read(reader, material);
         return;
     }
-    unused_note(&reader->unused, &reader->report, word, "is not used");
+    unused_record(&reader->unused, &reader->report, word, "is not used");
 }
 
 // Returns whether the file was read, by whatever name.
@@ -486,7 +486,8 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
                                               sizeof(MtlMaterial), name_compare)
                                     : NULL;
         if (!material && all_read)
-            unused_note(&unknown, &draft->report, used->name, "is in no material file: the default is used");
+            unused_record(&unknown, &draft->report, used->name,
+                          "is in no material file: the default is used");
         array_push(
             draft->materials,
             ((DraftMaterialRun){used->first_corner, material_use(draft, material ? material : &otherwise)}));

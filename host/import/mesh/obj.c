@@ -182,7 +182,7 @@ static bool line_read(ObjReader *reader)
     if (word.length == 0) return true;
     for (size_t i = 0; i < COUNT_OF(statements); i++)
         if (word_is(word, statements[i].word)) return statements[i].read(reader);
-    unused_note(&reader->unused, &reader->draft->report, word, "is not used");
+    unused_record(&reader->unused, &reader->draft->report, word, "is not used");
     return true;
 }
 

@@ -11,7 +11,7 @@ bool scan_is_text(Scan *scan, Report *report)
     return !nul;
 }
 
-void unused_note(UnusedWords *unused, Report *report, Word word, const char *what)
+void unused_record(UnusedWords *unused, Report *report, Word word, const char *what)
 {
     for (size_t i = 0; i < unused->count; i++)
         if (words_equal(unused->words[i], word)) return;

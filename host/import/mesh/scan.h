@@ -115,4 +115,4 @@ typedef struct {
 } UnusedWords;
 
 // Warns that the word `what`, such as "is not used".
-void unused_note(UnusedWords *unused, Report *report, Word word, const char *what);
+void unused_record(UnusedWords *unused, Report *report, Word word, const char *what);

@@ -57,7 +57,7 @@ static bool line_read(StlReader *reader)
         return facet_end(reader, word.offset);
     for (size_t i = 0; i < COUNT_OF(known); i++)
         if (word_is_in_any_case(word, known[i])) return true;
-    unused_note(&reader->unused, &reader->draft->report, word, "is not used");
+    unused_record(&reader->unused, &reader->draft->report, word, "is not used");
     return true;
 }
 

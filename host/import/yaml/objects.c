@@ -265,6 +265,6 @@ void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_
         mesh_count = reader->scene->meshes.count;
         stage_set(stage, done++);
         object_read(reader, item);
-        places_note(&reader->places, reader->scene, item->offset);
+        places_record(&reader->places, reader->scene, item->offset);
     }
 }

@@ -140,7 +140,7 @@ static bool anchor_add(TreeBuilder *builder, struct fy_token *token)
     return true;
 }
 
-static bool event_take(TreeBuilder *builder, struct fy_event *event)
+static bool event_read(TreeBuilder *builder, struct fy_event *event)
 {
     const struct fy_mark *start = fy_event_start_mark(event), *end = fy_event_end_mark(event);
     YamlNode node = {.offset = (uint32_t)(start ? start->input_pos : builder->end)};
@@ -226,7 +226,7 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
             return false;
         }
         ended = event->type == FYET_STREAM_END;
-        bool taken = event_take(builder, event);
+        bool taken = event_read(builder, event);
         fy_parser_event_free(parser, event);
         stage_set(stage, builder->end);
         if (!taken) return false;

@@ -17,7 +17,7 @@ static void hit_box(const Object *object, const ReferenceRay *ray, ReferenceHit 
             int next = (axis + 1) % 3, last = (axis + 2) % 3;
             if (at[next] >= low[next] && at[next] <= high[next] && at[last] >= low[last] &&
                 at[last] <= high[last])
-                hit_offer(hit, ray, t, quad3_scale(along, side ? 1 : -1), UNBOUNDED);
+                hit_keep_nearest(hit, ray, t, quad3_scale(along, side ? 1 : -1), UNBOUNDED);
         }
         for (int edge = 0; edge < 4 && !along_axis; edge++) {
             Vector3 y_and_z = {corners[0].x, corners[edge & 1].y, corners[edge >> 1].z};

@@ -11,7 +11,7 @@ void hit_disc_at(Quad3 center, Quad3 normal, Quad radius, const ReferenceRay *ra
     Quad3 across = quad3_cross(ray->direction, quad3_unit(quad3_cross(normal, from_center)));
     Quad approach = quad3_dot(ray->direction, quad3_unit(normal)), spread = quad3_length(across);
     hit_reduce_margin(hit, excess * radius * (spread > 0 ? approach / spread : 1));
-    if (excess <= 0) hit_offer(hit, ray, t, normal, UNBOUNDED);
+    if (excess <= 0) hit_keep_nearest(hit, ray, t, normal, UNBOUNDED);
 }
 
 static void hit_disc(const Object *object, const ReferenceRay *ray, ReferenceHit *hit)

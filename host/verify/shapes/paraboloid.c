@@ -28,7 +28,7 @@ static void hit_paraboloid(const Object *object, const ReferenceRay *ray, Refere
             hit_reduce_margin(hit, 2 * (height - z) * plane_cosine(ray, normal));
             if (z > height) continue;
         }
-        hit_offer(hit, ray, roots[i], normal, quad3_length(normal));
+        hit_keep_nearest(hit, ray, roots[i], normal, quad3_length(normal));
     }
     if (object->as.paraboloid.finite && object->as.paraboloid.caps)
         hit_disc_at(quad3_add(apex, quad3_scale(axis, height)), axis, 2 * quad_root(focal_length * height),

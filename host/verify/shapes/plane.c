@@ -9,7 +9,7 @@ static void hit_plane(const Object *object, const ReferenceRay *ray, ReferenceHi
     // Twice the height of the ray's start, because the hit ends on the plane itself.
     hit_reduce_margin(hit, 2 * quad3_dot(quad3_unit(normal), quad3_subtract(point, ray->origin)));
     Quad t;
-    if (plane_crossing(ray, point, normal, &t)) hit_offer(hit, ray, t, normal, UNBOUNDED);
+    if (plane_crossing(ray, point, normal, &t)) hit_keep_nearest(hit, ray, t, normal, UNBOUNDED);
 }
 
 static void surface_plane(const Object *object, Quad3 point, ReferenceSurface *surface)

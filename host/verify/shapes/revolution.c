@@ -80,7 +80,7 @@ static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceH
             if (z < 0 || z > body->height) continue;
         }
         if (body->only_inside && quad3_dot(normal, ray->direction) < 0) continue;
-        hit_offer(hit, ray, roots[i], normal, quad_root(x * x + y * y));
+        hit_keep_nearest(hit, ray, roots[i], normal, quad_root(x * x + y * y));
     }
 }
 

@@ -14,7 +14,7 @@ static void hit_sphere(const Object *object, const ReferenceRay *ray, ReferenceH
     for (int i = 0; i < count; i++) {
         Quad3 normal = quad3_add(from_center, quad3_scale(ray->direction, roots[i]));
         if (object->as.sphere.only_inside && quad3_dot(normal, ray->direction) < 0) continue;
-        hit_offer(hit, ray, roots[i], normal, radius);
+        hit_keep_nearest(hit, ray, roots[i], normal, radius);
     }
 }
 

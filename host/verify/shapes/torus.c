@@ -104,7 +104,7 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
         Quad rho = quad_root(at.x * at.x + at.y * at.y), out = 1 - major / rho;
         Quad3 normal = quad3_add(quad3_add(quad3_scale(across, at.x * out), quad3_scale(beside, at.y * out)),
                                  quad3_scale(axis, at.z));
-        hit_offer(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
+        hit_keep_nearest(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
     }
     // the hit is there because of the turns up to the next behind it
     int turn_count = polynomial_zeros(cubic, 3, -half_span, half_span, turns);

@@ -52,7 +52,7 @@ static void hit_triangle(const Object *object, const ReferenceRay *ray, Referenc
     Quad t = determinant(first, second, from) / whole;
     if (u < 0 || v < 0 || u + v > 1) return;
 
-    hit_offer(hit, ray, t, normal, UNBOUNDED);
+    hit_keep_nearest(hit, ray, t, normal, UNBOUNDED);
     if (!object->as.triangle.smooth || !hit->found) return;
     // The vertices' unit normals, turned to the side from which the flat face is seen.
     Quad weights[3] = {1 - u - v, u, v};
