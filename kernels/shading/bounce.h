@@ -21,7 +21,7 @@ typedef struct {
     Medium medium;  // with HAS_ABSORPTION
     // At `certified`, copied to the Ray's fields of the same names; start_error becomes -tmin:
     real origin_error, start_error, direction_error;
-    integer left;
+    integer origin_object;
     mask leaves_outward;
     real chord_turn, chord_end_place;
 } Bounce;
@@ -40,7 +40,7 @@ static inline Ray bounce_ray(const Bounce *bounce)
         ray.origin_error = bounce->origin_error;
         ray.tmin = -bounce->start_error;
         ray.direction_error = bounce->direction_error;
-        ray.left = bounce->left;
+        ray.origin_object = bounce->origin_object;
         ray.leaves_outward = bounce->leaves_outward;
         if (HAS_CHORDS) {
             ray.chord_turn = bounce->chord_turn;
@@ -301,7 +301,7 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     reflected->start_error = surface->start_error;
     refracted->origin_error = surface->place_error;
     refracted->start_error = (real)(0);
-    reflected->left = refracted->left = surface->object;
+    reflected->origin_object = refracted->origin_object = surface->object;
     reflected->leaves_outward = surface->entering;
     refracted->leaves_outward = !surface->entering;
     refracted->direction_error = (real)(0);

@@ -59,7 +59,7 @@ static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit
                  (real)(16 * UNIT_ROUNDOFF);
     mask usable = lanes & (moved <= CHORD_MOVE_MAX * cosine * radius);
     end.radius = lanes_select(usable, radius, (real)(0));
-    mask continues = usable & (hit->object == ray->left) & (ray->chord_turn < NEVER);
+    mask continues = usable & (hit->object == ray->origin_object) & (ray->chord_turn < NEVER);
     end.place = lanes_select(continues, ray->chord_end_place + moved, NEVER);
     end.turn = lanes_select(continues, ray->chord_turn, NEVER);
     return end;

@@ -262,7 +262,7 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
         shadow_ray->ends_at_light = true;
     }
     shadow_ray->origin_error = place_error;
-    shadow_ray->left = surface->object;
+    shadow_ray->origin_object = surface->object;
     real geometric = vector_dot(surface_normal(surface), to_light->direction);
     real facing_error = surface->normal_error + angle_error;
     real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;

@@ -109,7 +109,7 @@ static inline Interval certain_box(const Box *box, const Ray *ray, real more)
 // box lies within it.
 static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
 {
-    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, box->id.x, false);
+    mask lanes = RAY_ACTIVE(ray) & !ray_cannot_rehit(ray, box->id.x, false);
     Vector to_low = vector_subtract(vector_of(box->low), ray->origin),
            to_high = vector_subtract(vector_of(box->high), ray->origin);
     real distance = vector_norm1((Vector){real_max(fabs(to_low.x), fabs(to_high.x)),
@@ -127,8 +127,8 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     CertainHit far =
         certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
     // if the ray starts on a face, the other crossing counts
-    mask left = ray->left == (integer)((scalar_integer)box->id.x);
-    return certain_select(left & certain, far, certain_first(ray, near, near_high, far));
+    mask leaves = ray->origin_object == (integer)((scalar_integer)box->id.x);
+    return certain_select(leaves & certain, far, certain_first(ray, near, near_high, far));
 }
 
 // Sets the errors of a point. Faces that join at an edge have different normals, so another face that is as

@@ -34,10 +34,10 @@ static inline real ray_place_error(const Ray *ray, real distance)
 
 // Returns the lanes whose ray starts on this shape and does not hit it again, because it is flat, or convex
 // and left outward.
-static inline mask ray_left_for_good(const Ray *ray, uint id, bool is_flat)
+static inline mask ray_cannot_rehit(const Ray *ray, uint id, bool is_flat)
 {
-    mask left = ray->left == (integer)((scalar_integer)id);
-    return is_flat ? left : left & ray->leaves_outward;
+    mask leaves = ray->origin_object == (integer)((scalar_integer)id);
+    return is_flat ? leaves : leaves & ray->leaves_outward;
 }
 
 // Returns the lanes whose crossing between low and high lies before the ray's start or beyond its end, which

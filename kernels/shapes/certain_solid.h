@@ -6,10 +6,10 @@
 #include "shapes/certain_round.h"
 
 // Returns the first hit, with bounds, on a shape between side and ends. A capped solid is the intersection
-// of both; any other one is hit on its side between the ends. In the lanes `left` the ray starts on the
+// of both; any other one is hit on its side between the ends. In the lanes `leaves` the ray starts on the
 // shape and runs into it.
 static inline CertainHit round_first_hit(uint flags, const Ray *ray, const CertainInterval *side,
-                                         const CertainInterval *slab, mask left)
+                                         const CertainInterval *slab, mask leaves)
 {
     if (flags & REVOLUTION_CAPPED) {
         Interval outer = intervals_common(side->outer, slab->outer),
@@ -23,7 +23,7 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
             certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
         near = certain_at(near, roots.near);
         far = certain_at(far, roots.far);
-        return certain_select(left, far, certain_first(ray, near, near_high, far));
+        return certain_select(leaves, far, certain_first(ray, near, near_high, far));
     }
     CertainHit hits[2];
     mask passed[2];
@@ -38,7 +38,7 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
         passed[i] = beyond | (high < ray->tmin);
     }
     if (flags & IGNORES_FRONT_FACES) return hits[1];
-    return certain_select(left | passed[0], hits[1], hits[0]);
+    return certain_select(leaves | passed[0], hits[1], hits[0]);
 }
 
 static inline CertainInterval round_unbounded(void)
@@ -99,7 +99,7 @@ static inline mask round_bounds(Vector center, real radius, const Ray *ray, real
 
 // Returns the first hit on both nappes of an unbounded cone, each of which is a convex body. A ray that
 // starts on one nappe leaves that one.
-static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ray, mask lanes, mask left,
+static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ray, mask lanes, mask leaves,
                                           real from, real to)
 {
     real radius = real_fma(round.slope, vector_dot(round.axis, round.start), round.radius);
@@ -107,7 +107,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
     const CertainInterval slab = round_unbounded();
     CertainHit hits[2];
     for (uint i = 0; i < 2; i++) {
-        mask on_it = left & (radius > (real)(0));
+        mask on_it = leaves & (radius > (real)(0));
         CertainInterval side =
             round_interval(&round, ray, lanes & !(on_it & ray->leaves_outward), from, to, false);
         hits[i] = round_first_hit(flags, ray, &side, &slab, on_it);
@@ -120,7 +120,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
     CertainHit first = certain_select(swaps, hits[1], hits[0]),
                second = certain_select(swaps, hits[0], hits[1]);
     mask mixes = one & other & !(second.low > first.high);
-    mask at_apex = lanes & left & (fabs(radius) <= error);
+    mask at_apex = lanes & leaves & (fabs(radius) <= error);
     first.low = lanes_select(at_apex, ray->tmin, first.low);
     first.uncertain = first.uncertain | (first.found & mixes) | at_apex;
     first.found = first.found & !first.uncertain;
@@ -130,7 +130,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
 static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool two_nappes, const Ray *ray)
 {
     const Round *round = &solid->round;
-    mask left = ray->left == (integer)((scalar_integer)id.x), lanes = RAY_ACTIVE(ray);
+    mask leaves = ray->origin_object == (integer)((scalar_integer)id.x), lanes = RAY_ACTIVE(ray);
     real from, to;
     if (solid->is_finite) {
         lanes = lanes & round_bounds(solid->middle, solid->widest + solid->half_height + round->start_error,
@@ -140,9 +140,9 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
         to = round_range(ray, vector_norm1(round->start) + vector_norm1(ray->origin) + solid->widest +
                                   round->foot_norm1);
         from = -to;
-        if (two_nappes) return nappes_first_hit(*round, id.y, ray, lanes, left, from, to);
+        if (two_nappes) return nappes_first_hit(*round, id.y, ray, lanes, leaves, from, to);
     }
-    lanes = lanes & !(left & ray->leaves_outward);
+    lanes = lanes & !(leaves & ray->leaves_outward);
     CertainInterval slab = round_unbounded();
     if (solid->is_finite) {
         slab = round_slab(round, ray, solid->low, solid->high);
@@ -152,7 +152,7 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
         if (!lanes_any(lanes)) return certain_miss();
     }
     CertainInterval side = round_interval(round, ray, lanes, from, to, solid->is_finite);
-    return round_first_hit(id.y, ray, &side, &slab, left);
+    return round_first_hit(id.y, ray, &side, &slab, leaves);
 }
 
 // Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the

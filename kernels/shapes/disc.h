@@ -94,7 +94,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     Vector center = vector_of(disc->center_radius);
     real radius = (real)(disc->center_radius.w);
     CertainSphere bounding = certain_sphere(center, radius, ray, RAY_ACTIVE(ray));
-    mask lanes = bounding.perhaps & !ray_left_for_good(ray, disc->id.x, true);
+    mask lanes = bounding.perhaps & !ray_cannot_rehit(ray, disc->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
     mask crosses = certain_plane_of(disc_foot(disc), disc->normal, ray, &low, &high);

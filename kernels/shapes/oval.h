@@ -84,7 +84,7 @@ static inline void oval_ray_set_errors(Ray *own, const Oval *oval, const Ray *ra
     own->direction_error = (norm * (ray->length * ray->direction_error) +
                             few * vector_norm1(affine_reach(oval->inverses, ray->direction))) *
                            ray_inverse_length(own) * (real)(1 + 16 * UNIT_ROUNDOFF);
-    own->left = ray->left;
+    own->origin_object = ray->origin_object;
     own->leaves_outward = ray->leaves_outward;
 }
 

@@ -102,7 +102,7 @@ static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray
 
 static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
 {
-    mask lanes = RAY_ACTIVE(ray) & !ray_left_for_good(ray, plane->id.x, true);
+    mask lanes = RAY_ACTIVE(ray) & !ray_cannot_rehit(ray, plane->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
     real low, high;
     mask crosses = certain_plane_of(vector_of(plane->point), plane->normal, ray, &low, &high);

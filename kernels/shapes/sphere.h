@@ -61,7 +61,7 @@ static inline real sphere_discriminant(SphereCoefficients compensated, Vector mo
 
 // Returns the lanes whose rays start outside the sphere and leave it outward. b and c are the coefficients
 // of the textbook's test.
-static inline mask sphere_is_left(real c, real squared_radius, real b, real tmin)
+static inline mask leaves_sphere(real c, real squared_radius, real b, real tmin)
 {
     return (c > (real)(32 * UNIT_ROUNDOFF) * squared_radius) & (b > (real)(0)) & (tmin >= (real)(0));
 }
@@ -70,8 +70,8 @@ static inline mask sphere_is_left(real c, real squared_radius, real b, real tmin
 static inline mask ray_leaves_sphere(Vector from, Vector direction, real tmin, real radius)
 {
     const real squared_radius = radius * radius;
-    return sphere_is_left(vector_dot(from, from) - squared_radius, squared_radius,
-                          vector_dot(from, direction), tmin);
+    return leaves_sphere(vector_dot(from, from) - squared_radius, squared_radius, vector_dot(from, direction),
+                         tmin);
 }
 
 // Intersects a sphere after two conservative rejects. The first is b^2 - a c, divided by a to stay in range
@@ -96,7 +96,7 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     hit = hit & RAY_ACTIVE(ray);
 
     real c = squared_distance - squared_radius;
-    hit = hit & !sphere_is_left(c, squared_radius, b, ray->tmin);
+    hit = hit & !leaves_sphere(c, squared_radius, b, ray->tmin);
     if (!lanes_any(hit)) return mask_none();
 
     real discriminant;
@@ -161,8 +161,8 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
 static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray)
 {
     const real zero = (real)(0);
-    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
-    mask lanes = RAY_ACTIVE(ray) & !(left & ray->leaves_outward);
+    mask leaves = ray->origin_object == (integer)((scalar_integer)sphere->id.x);
+    mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
     Round round;
     round.start = ray->origin;
     round.foot = vector_of(sphere->center_radius);
@@ -176,14 +176,14 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     round.curves = false;
     real range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));
     CertainInterval side = round_interval(&round, ray, lanes, -range, range, false), slab = round_unbounded();
-    return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, left);
+    return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, leaves);
 }
 
 static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
 {
     if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray);
-    mask left = ray->left == (integer)((scalar_integer)sphere->id.x);
-    mask lanes = RAY_ACTIVE(ray) & !(left & ray->leaves_outward);
+    mask leaves = ray->origin_object == (integer)((scalar_integer)sphere->id.x);
+    mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
     if (!lanes_any(lanes)) return certain_miss();
     CertainSphere crossed =
         certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);
@@ -193,17 +193,17 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
         certain_crossing(ray, crossed.certain, crossed.perhaps, near - crossed.t_error, near_high);
     mask passed = crossed.perhaps;
     if (!(sphere->id.y & IGNORES_FRONT_FACES)) passed = passed & (near_high < ray->tmin);
-    left = left & lanes;
-    if (!lanes_any(passed | left)) return hit;
+    leaves = leaves & lanes;
+    if (!lanes_any(passed | leaves)) return hit;
     real far = sphere_far(&crossed, ray), far_low = far - crossed.t_error, far_high = far + crossed.t_error;
     hit = certain_select(passed, certain_crossing(ray, crossed.certain, crossed.perhaps, far_low, far_high),
                          hit);
-    if (!lanes_any(left)) return hit;
+    if (!lanes_any(leaves)) return hit;
     // one crossing is the start, and the other lies twice as far as the closest point
     real t = (real)(2) * crossed.middle_t, t_error = (real)(2.1f) * crossed.middle_error;
-    CertainHit other =
-        certain_crossing(ray, left, left, real_max(t - t_error, far_low), real_min(t + t_error, far_high));
-    return certain_select(left, other, hit);
+    CertainHit other = certain_crossing(ray, leaves, leaves, real_max(t - t_error, far_low),
+                                        real_min(t + t_error, far_high));
+    return certain_select(leaves, other, hit);
 }
 
 static inline mask sphere_set_errors(const Sphere *sphere, const Ray *ray, real t, real place_error,

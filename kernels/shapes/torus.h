@@ -354,17 +354,17 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     real breaks[TORUS_BREAKS];
     torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
 
-    mask left = ray->left == (integer)((scalar_integer)torus->id.x);
+    mask leaves = ray->origin_object == (integer)((scalar_integer)torus->id.x);
     real start = real_max(from, ray->tmin), departure = torus_departure(&certain, ray);
-    start = lanes_select(left, departure, start);
+    start = lanes_select(leaves, departure, start);
     TorusPoint point = torus_point(&certain, ray, start);
     // a break is a turning point within rounding; its distance moves by less than this part of the rounding
     const real margin = real_fma(radius, real_divide((real)(0.125f), certain.minor), (real)(2));
-    mask outside = lanes_select(left, ray->leaves_outward, point.distance > (real)(0));
+    mask outside = lanes_select(leaves, ray->leaves_outward, point.distance > (real)(0));
     mask known = fabs(point.distance) > point.place;
-    known = lanes_select(left, known & (departure > (real)(0)) & (outside == (point.distance > (real)(0))),
+    known = lanes_select(leaves, known & (departure > (real)(0)) & (outside == (point.distance > (real)(0))),
                          known);
-    mask enters = !left & (from > ray->tmin);
+    mask enters = !leaves & (from > ray->tmin);
     outside = outside | enters;
     known = known | enters;
 

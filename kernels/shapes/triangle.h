@@ -390,10 +390,10 @@ static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray 
 
 // Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
 // vertices of a triangle that is hit are not farther across the ray than its longest edge and the error.
-// `own` marks the lanes whose triangle certainly lies ahead.
+// `sinks` marks the lanes whose ray leaves this triangle into its plane, which certainly lies ahead.
 static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle *triangle,
                                                                  const TriangleEdges *edges, const Ray *ray,
-                                                                 mask lanes, mask own, TriangleSigns signs,
+                                                                 mask lanes, mask sinks, TriangleSigns signs,
                                                                  TriangleSizes sizes, real error)
 {
     mask perhaps = lanes & signs.perhaps, certain = perhaps & signs.certain;
@@ -405,7 +405,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     real place = triangle_place_error(ray, distance, (real)(sizes.size));
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
     // most triangles that lines hit lie behind the start or beyond the end
-    perhaps = perhaps & (own | !ray_excludes(ray, low - vertex_error, high + vertex_error));
+    perhaps = perhaps & (sinks | !ray_excludes(ray, low - vertex_error, high + vertex_error));
     if (!lanes_any(perhaps)) return certain_miss();
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
     // applies to uncertain lanes, which are hit, if at all, where the weights say
@@ -423,7 +423,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     mask slim = perhaps & !(narrows & (t_error <= (real)(4) * vertex_error));
     if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &low, &high, &t);
     if (HAS_SMOOTH_NORMALS) {
-        low = lanes_select(own, real_max(low, (real)(SMALLEST_RATIO)), low);
+        low = lanes_select(sinks, real_max(low, (real)(SMALLEST_RATIO)), low);
         high = real_max(low, high);
     }
     CertainHit hit = certain_crossing(ray, certain, perhaps, low, high);
@@ -451,12 +451,11 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     mask lanes = RAY_ACTIVE(ray) & !((highest > edge_error) & (lowest < -edge_error));
     if (!lanes_any(lanes)) return certain_miss();
     TriangleSigns signs = triangle_signs(&edges, error);
-    mask own = ray_left_for_good(ray, triangle->id.x, true);
-    if (HAS_SMOOTH_NORMALS) own = own & !ray->sinks;
-    lanes = lanes & signs.perhaps & !own;
+    mask leaves = ray_cannot_rehit(ray, triangle->id.x, true), sinks = mask_none();
+    if (HAS_SMOOTH_NORMALS) sinks = leaves & ray->sinks;
+    lanes = lanes & signs.perhaps & (!leaves | sinks);
     if (!lanes_any(lanes)) return certain_miss();
-    own = HAS_SMOOTH_NORMALS ? ray_left_for_good(ray, triangle->id.x, true) : mask_none();
-    CertainHit hit = triangle_certain_crossing(triangle, &edges, ray, lanes, own, signs, sizes, error);
+    CertainHit hit = triangle_certain_crossing(triangle, &edges, ray, lanes, sinks, signs, sizes, error);
     if (RARELY(lanes_any(hit.uncertain))) hit.uncertain = hit.uncertain & !triangle_is_passed(&edges, error);
     return hit;
 }
@@ -532,8 +531,8 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
     uint4 ids_sides = neighbors->ids_sides;
     integer by_a = (integer)((scalar_integer)ids_sides.x), by_b = (integer)((scalar_integer)ids_sides.y),
             by_c = (integer)((scalar_integer)ids_sides.z);
-    mask over_a = lanes & (ray->left == by_a), over_b = lanes & (ray->left == by_b),
-         over_c = lanes & (ray->left == by_c);
+    mask over_a = lanes & (ray->origin_object == by_a), over_b = lanes & (ray->origin_object == by_b),
+         over_c = lanes & (ray->origin_object == by_c);
     if (!lanes_any(over_a | over_b | over_c)) return mask_none();
     const integer none = (integer)(0);
     integer sides = lanes_select(over_a, (integer)((scalar_integer)(ids_sides.w & 15)), none);

@@ -25,7 +25,7 @@ static inline void object_prefetch(const Scene *scene, uint type, uint4 id)
 // Clears the uncertain lanes of rays that leave a neighbor of a triangle and so cannot hit the triangle.
 static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ray *ray, CertainHit *hit)
 {
-    if (!lanes_any(hit->uncertain & (ray->left >= (integer)(0)))) return;
+    if (!lanes_any(hit->uncertain & (ray->origin_object >= (integer)(0)))) return;
     Triangle triangle = scene->triangles[scene->objects[id].type_index_material.y];
     TriangleNeighbors neighbors = scene->triangle_neighbors[id];
     hit->uncertain = hit->uncertain & !triangle_left_behind(&triangle, &neighbors, ray, hit->uncertain);

@@ -29,7 +29,7 @@ typedef struct {
     // leaves it outward; and whether the exact rays end at one point, a light, where the errors of their
     // origins have vanished. The exact ray starts between t = tmin <= 0 and -tmin.
     real origin_error, direction_error;
-    integer left;
+    integer origin_object;
     mask leaves_outward;
     bool ends_at_light;
     // With HAS_SMOOTH_NORMALS, whether the ray starts in front of the triangle that it leaves instead of on
@@ -120,7 +120,7 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     ray.common_origin = COMMON_ORIGIN_NONE;
     if (IS_CERTIFIED) {
         ray.origin_error = ray.direction_error = (real)(0);
-        ray.left = (integer)(-1);
+        ray.origin_object = (integer)(-1);
         ray.leaves_outward = mask_none();
         ray.ends_at_light = false;
         if (HAS_SMOOTH_NORMALS) ray.is_lifted = ray.sinks = mask_none();
