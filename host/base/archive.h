@@ -5,9 +5,8 @@
 #include "host/base/text.h"
 #include <time.h>
 
-// Appends a file to the archive, whose members are those of `tar`, which starts empty. The name has at most
-// ARCHIVE_NAME_MAX bytes.
+// Appends a file to the archive `tar`, which starts empty. The name has at most ARCHIVE_NAME_MAX bytes.
 enum { ARCHIVE_NAME_MAX = 99 };
 void archive_add(Text *tar, const char *name, const Text *contents, time_t modified);
-// Ends the archive and writes it compressed. On failure adds a message and returns false.
+// Ends the archive and writes it compressed. Returns false with a message on failure.
 bool archive_write(Text *tar, OutputFile *output, MessageList *messages);

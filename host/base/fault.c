@@ -13,8 +13,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-// The current call of this thread, and the latest of any thread, which stands for calls in threads of a
-// driver.
+// The current call of this thread, and the latest of any thread, which stands in for drivers' threads.
 static _Thread_local const char *volatile noted_call;
 static const char *_Atomic last_call;
 static const char *_Atomic noted_kernel;
@@ -110,7 +109,7 @@ static void crash_describe(CrashText *crash, const char *call, int signal_number
     crash_append(crash, limits, strlen(limits));
 }
 
-// Calls only what a signal handler may call.
+// Prints the crash's message. Calls only functions that a signal handler may call.
 static void crash_report(int signal_number)
 {
     const char *call = noted_call ? noted_call : calling_threads > 0 ? last_call : NULL;
@@ -136,8 +135,8 @@ static void crash_report(int signal_number)
     _exit(is_complete ? complete_status : EXIT_MACHINE);
 }
 
-// Replaces libc's function, also for drivers (see LDFLAGS), because LLVM replaces the handler of SIGABRT by
-// one that does not call ours.
+// Replaces libc's function, also in drivers (through LDFLAGS), because LLVM replaces our handler of SIGABRT
+// with one that does not call ours.
 __attribute__((visibility("default"))) _Noreturn void abort(void)
 {
     crash_report(SIGABRT);
@@ -146,7 +145,7 @@ __attribute__((visibility("default"))) _Noreturn void abort(void)
     _exit(EXIT_MACHINE);
 }
 
-// Replaces libc's function, which does not call the abort above.
+// Replaces libc's function, which does not call our abort.
 // NOLINTNEXTLINE(bugprone-reserved-identifier): libc's name
 __attribute__((visibility("default"))) _Noreturn void __assert_fail(const char *assertion, const char *file,
                                                                     unsigned line, const char *function)

@@ -10,21 +10,22 @@ enum {
     EXIT_INTERRUPTED = 130
 };
 
-// Prints `glint: format…` to stderr and exits with EXIT_MACHINE, or as fault_output_is_complete says.
+// Prints `glint: format…` to stderr and exits with EXIT_MACHINE. After fault_output_is_complete, prints a
+// warning and exits with that call's status.
 _Noreturn void fault(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-// An OpenCL driver that lacks memory or threads may abort or read where nothing is. After this call, that
-// ends the process with EXIT_MACHINE and a message that names the call. A crash outside of a call is a bug of
-// glint and ends the process by the signal. Sanitizers handle crashes themselves.
+// Makes a crash within an OpenCL call end the process with EXIT_MACHINE and a message that names the call. A
+// driver that lacks memory or threads may abort or access invalid memory. A crash outside of a call is a bug
+// of glint and ends the process by the signal. Sanitizers handle crashes themselves.
 void fault_catch_crashes(void);
-// Records the OpenCL call that follows, a text up to a parenthesis, or NULL for none.
+// Records the name of the OpenCL call that follows, which ends at a parenthesis, or NULL for none.
 void fault_record_call(const char *call);
 // Records the kernel that the following calls build or run, which a crash's message names, or NULL for none.
 void fault_record_kernel(const char *name);
 // Makes a crash within a call write its description to `text` instead of stderr.
 enum { CRASH_TEXT_SIZE = 160 };
 void fault_record_crashes(char text[CRASH_TEXT_SIZE]);
-// Makes a fault or a crash a warning, after which the process exits with `status`: all output is complete.
+// Declares all output complete. A later fault or crash prints a warning and the process exits with `status`.
 void fault_output_is_complete(int status);
-// Returns " (limited to …)" where the process has little address space or may have few threads, otherwise "".
+// Returns " (limited to …)" if the process has little address space or may have few threads, otherwise "".
 const char *fault_limits(void);

@@ -1,4 +1,4 @@
-// Locks, names and syncs of files that outlive their process or that others name.
+// Locks, identifies and syncs files that outlive their process or that other files name.
 #pragma once
 
 #include <stdbool.h>
@@ -7,20 +7,20 @@
 // FILE_REMOVED: the file is locked but had lost its last name before.
 typedef enum { FILE_LOCKED, FILE_BUSY, FILE_REMOVED } FileLock;
 
-// Locks an open file until it is closed, without waiting. A file counts as locked where the file system has
-// no locks.
+// Locks an open file until it is closed, without waiting. If the file system has no locks, it counts as
+// locked.
 FileLock file_lock(int descriptor);
 // Returns whether the name in the open folder (or AT_FDCWD) is that of the open file, and not of another file
 // or a symbolic link.
 bool file_has_name(int descriptor, int folder, const char *name);
 // Returns whether a path, which may be NULL, leads to the file with this status.
 bool file_is_same(const char *path, const struct stat *other);
-// Opens the folder of a file. A folder that may be written but not listed is opened and cannot be synced.
+// Opens the folder of a file. A folder that may be written but not listed is opened, but cannot be synced.
 // Returns -1 and sets errno on failure.
 int file_folder_open(const char *path);
-// Returns the reason why a file that another one names cannot be read, or NULL: a pipe might wait, a device
-// never end.
+// Returns the reason why a file that another file names must not be read, or NULL. A pipe might block, and a
+// device might never end.
 const char *file_obstacle(const char *path);
-// Syncs a file or folder. Returns false if a write failed. That a file system cannot sync a file is not a
+// Syncs a file or folder. Returns false if a write failed. A file system that cannot sync the file is not a
 // failure.
 bool file_sync(int descriptor);

@@ -23,8 +23,8 @@ static int json_output(const char *bytes, size_t length, void *text)
     return 0;
 }
 
-// jansson writes only the texts, because version 2.14 prints numbers with 17 digits, or all with the same
-// number of digits.
+// Writes a text with jansson. jansson does not write numbers, because version 2.14 prints all of them with
+// 17 digits or another fixed number of digits.
 static void json_quote(Json *json, const char *value)
 {
     Text utf8 = {0};
@@ -45,7 +45,7 @@ static void json_line(Json *json)
     text_appendf(&json->text, "\n%*s", (int)(2 * json->count), "");
 }
 
-// Writes what precedes a value.
+// Writes the separator, indent and key before a value.
 static void json_next(Json *json, const char *key)
 {
     if (json->count == 0 || json->items[json->count - 1] != (key != NULL))

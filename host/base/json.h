@@ -12,13 +12,13 @@ typedef struct Json Json;
 Json *json_open(void);                               // the root is an object
 void json_begin_object(Json *json, const char *key); // key NULL: inside an array
 void json_begin_array(Json *json, const char *key);
-void json_end(Json *json);                                      // of the innermost object or array
+void json_end(Json *json);                                      // ends the innermost object or array
 void json_text(Json *json, const char *key, const char *value); // NULL value: null
 void json_number(Json *json, const char *key, double value);    // shortest that reads back; NaN, inf: null
 void json_int64(Json *json, const char *key, int64_t value);
 void json_bool(Json *json, const char *key, bool value);
 void json_none(Json *json, const char *key);
-// Writes a number as JSON has it: the shortest that reads back; null where it is not finite.
+// Formats a number as JSON, as the shortest text that reads back, or null if it is not finite.
 enum { JSON_NUMBER_SIZE = 32 };
 void json_number_print(char word[JSON_NUMBER_SIZE], double value);
 // Returns the document with one newline at its end, and frees the writer.

@@ -19,7 +19,7 @@ size_t memory_product(size_t count, size_t size)
     return total;
 }
 
-// An empty allocation is one byte, so that NULL always means failure.
+// Returns the bytes to allocate, at least one, so that NULL always means failure.
 static size_t memory_size(size_t count, size_t size)
 {
     const size_t total = memory_product(count, size);

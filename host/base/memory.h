@@ -1,14 +1,14 @@
-// Allocation that never fails: lack of memory is a fault.
+// Allocates memory and never fails, since lack of memory is a fault.
 #pragma once
 
 #include <stddef.h>
 
-// Return memory, never NULL. `zeroed` clears it. `count * size` is checked for overflow.
+// Return memory, never NULL. memory_allocate_zeroed clears it. `count * size` is checked for overflow.
 void *memory_allocate(size_t count, size_t size);
 void *memory_allocate_zeroed(size_t count, size_t size);
 void *memory_resize(void *memory, size_t count, size_t size);
 char *memory_copy_text(const char *text);
-char *memory_copy_part(const char *text, size_t length); // with a NUL behind it
+char *memory_copy_part(const char *text, size_t length); // ends the copy with a NUL
 
 // Returns count * size, or ends the program by a fault if that exceeds the address space.
 size_t memory_product(size_t count, size_t size);

@@ -11,7 +11,7 @@
 // A longer source line is truncated, or not shown if the caret would be beyond.
 enum { CHARACTERS_SHOWN = 240 };
 
-// C0 and C1 controls could control the user's terminal.
+// Returns whether a character is a C0 or C1 control, which could control the user's terminal.
 static bool character_is_control(const unsigned char *bytes, size_t size)
 {
     return (size == 1 && (bytes[0] < 0x20 || bytes[0] == 0x7F)) ||
@@ -193,7 +193,7 @@ void message_list_free(MessageList *list)
     *list = (MessageList){0};
 }
 
-// Returns whether texts are the same but for numbers that are not both whole.
+// Returns whether texts are equal except for pairs of numbers that are not both whole.
 static bool texts_are_alike(const char *a, const char *b)
 {
     while (*a && *b) {

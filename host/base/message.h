@@ -1,4 +1,4 @@
-// Messages to the user: errors and warnings with their file, line and column.
+// Collects errors and warnings for the user with their file, line and column.
 #pragma once
 
 #include <stdbool.h>
@@ -38,14 +38,14 @@ bool message_error(MessageList *list, const char *format, ...) __attribute__((fo
 #define MESSAGE_WHOLE_FILE SIZE_MAX
 
 // Adds a message at a byte offset of a source, which determines its line, column and source line. An offset
-// past the end is taken as the end. Control characters are replaced by `?`.
+// past the end counts as the end. Control characters are replaced by `?`.
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
-// Returns the place of a byte offset, as in FILE:LINE:COLUMN. The caller frees it.
+// Returns the place of a byte offset as FILE:LINE:COLUMN. The caller frees it.
 char *message_place_text(const Source *source, size_t offset);
 
-// Returns the source, of one and those that follow it, whose text has an offset, and makes the offset one in
-// that text.
+// Returns the source that contains an offset, among `source` and those after it, and makes the offset
+// relative to that source's text.
 const Source *source_at(const Source *source, size_t *offset);
 
 size_t message_count(const MessageList *list, MessageSeverity severity);
@@ -56,8 +56,8 @@ void message_list_print(const MessageList *list, FILE *stream);
 char *message_list_text(const MessageList *list);
 void message_free(Message *message);
 void message_list_free(MessageList *list);
-// Removes each message that `known` has: one of the same severity and place, whose text differs at most in
-// numbers that are not whole.
+// Removes each message that is in `known`, with the same severity and place and a text that differs at most
+// in numbers that are not whole.
 void message_list_remove(MessageList *list, const MessageList *known);
 // Appends all messages of `from`, which is then empty.
 void message_list_move(MessageList *to, MessageList *from);

@@ -40,7 +40,7 @@ static void pending_remove_all(void)
     pthread_mutex_unlock(&pending_mutex);
 }
 
-// Registers a temporary before it has its name, so that nothing can fail afterwards.
+// Reserves an entry before a temporary gets its name, so that registering it cannot fail.
 static void pending_prepare(void)
 {
     static bool is_registered;
@@ -152,8 +152,8 @@ static DescriptorPath descriptor_path(int descriptor)
     return link;
 }
 
-// Opens a file without a name, which vanishes with its process. Returns -1 where the file system has none, or
-// nothing in /proc to name it by.
+// Opens an unnamed file, which vanishes with its process. Returns -1 if the file system does not support it
+// or /proc cannot name it.
 static int unnamed_open(const OutputFile *output, mode_t mode)
 {
     int descriptor = openat(output->folder, ".", O_WRONLY | O_TMPFILE | O_CLOEXEC, mode);
@@ -162,7 +162,7 @@ static int unnamed_open(const OutputFile *output, mode_t mode)
     return -1;
 }
 
-// Gives an unnamed file its target's name if that is free, else a temporary one to be renamed.
+// Links an unnamed file to its target's name if that is free, else to a temporary name.
 static bool unnamed_link(OutputFile *output)
 {
     int descriptor = fileno(output->file);
@@ -185,7 +185,7 @@ static bool unnamed_link(OutputFile *output)
     return false;
 }
 
-// A device or a pipe cannot be replaced by renaming: it is written directly.
+// Opens a device or a pipe directly, because renaming cannot replace it.
 static bool output_open_directly(OutputFile *output, MessageList *messages)
 {
     output->file = fopen(output->target, "wbe");
@@ -194,14 +194,14 @@ static bool output_open_directly(OutputFile *output, MessageList *messages)
 
 enum { MODE_NEW = 0666, MODE_PRIVATE = 0600, MODE_BITS = 0777 };
 
-// Creates `output->name` in `output->folder`. `created` is the mode to which the umask applies, and `exact`,
-// if given, the mode to which it does not.
+// Creates `output->name` in `output->folder`. The umask applies to the mode `created`, but not to `exact`,
+// which may be NULL.
 static bool output_open_beside(OutputFile *output, mode_t created, const mode_t *exact, MessageList *messages)
 {
     int descriptor = unnamed_open(output, created);
     if (descriptor < 0) descriptor = named_open(output, created);
     if (descriptor < 0) return output_failed(output, "create", messages);
-    if (exact) fchmod(descriptor, *exact); // fails where a file system has no modes, which does not matter
+    if (exact) fchmod(descriptor, *exact); // failure is harmless on a file system without modes
     output->file = fdopen(descriptor, "wb");
     if (output->file) return true;
     int error = errno;
@@ -234,8 +234,7 @@ bool output_open_private(OutputFile *output, int folder, const char *name, Messa
     return output_open_beside(output, MODE_PRIVATE, &exact, messages);
 }
 
-// Returns the end of a chain of symbolic links, whether a file exists there or not, or `target` itself if it
-// is not a link.
+// Returns the end of a chain of symbolic links, even if no file exists there, or `target` if not a link.
 static char *link_end(const char *target)
 {
     enum { STEPS_MAX = 40 }; // as in Linux; a longer chain is a cycle
@@ -262,7 +261,7 @@ bool output_open(OutputFile *output, const char *target, MessageList *messages)
     struct stat old;
     bool exists = stat(target, &old) == 0;
     int error = exists ? 0 : errno;
-    // A symbolic link is kept: its target is replaced or created.
+    // A symbolic link is kept, and its target is replaced or created.
     char *resolved = exists ? realpath(target, NULL) : link_end(target);
     output->target = resolved ? resolved : memory_copy_text(target);
     if (error == ELOOP) {

@@ -17,11 +17,11 @@ typedef struct {
 } OutputFile;
 
 // Opens a file for `target` or, for `-`, standard output, which main flushes. On failure adds a message and
-// returns false. output_abandon removes the temporary, and so does an atexit handler. Temporaries of killed
-// processes are removed when the next one is needed.
+// returns false. output_abandon or an atexit handler removes the temporary. Temporaries of killed processes
+// are removed when the next one is needed.
 bool output_open(OutputFile *output, const char *target, MessageList *messages);
-// Opens a file of mode 0600 for `name` in an open folder, and replaces whatever has that name. It is not
-// synced: for contents that may be lost.
+// Opens a file of mode 0600 for `name` in an open folder, which replaces any file of that name. It is not
+// synced, so its contents may be lost in a crash.
 bool output_open_private(OutputFile *output, int folder, const char *name, MessageList *messages);
 // Writes bytes. On failure adds a message and returns false; the file stays open until it is abandoned.
 bool output_write(OutputFile *output, const void *bytes, size_t size, MessageList *messages);

@@ -1,4 +1,4 @@
-// Loops over several threads.
+// Runs loops in several threads.
 #pragma once
 
 #include <stddef.h>

@@ -1,4 +1,4 @@
-// The 99.9th percentile.
+// Computes the 99.9th percentile.
 #pragma once
 
 #include <stddef.h>

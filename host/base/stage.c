@@ -55,7 +55,7 @@ static bool is_ignored(const Stage *stage)
     return !stage || (stage->keeps_spans && !pthread_equal(stage->opener, pthread_self()));
 }
 
-// The caller holds the mutex.
+// Ends the current span. The caller holds the mutex.
 static void span_end(Stage *stage, double now)
 {
     if (stage->keeps_spans && stage->name.count > 0)

@@ -1,5 +1,5 @@
-// What a long operation is doing and how much of it is done, for another thread to show. With a NULL Stage
-// nothing is recorded.
+// Records the stage and the progress of a long operation for another thread to show. A NULL Stage records
+// nothing.
 #pragma once
 
 #include "host/base/text.h"
@@ -7,14 +7,14 @@
 
 typedef struct Stage Stage;
 
-// What the host did, by clock_seconds.
+// A period of the host's work, by clock_seconds.
 typedef struct {
     const char *name;
     double start_seconds, end_seconds;
 } HostSpan;
 
-// Opens a stage. If `keeps_spans` is set, it keeps each stage that has ended until stage_close, and ignores
-// what other threads than the caller's begin and end.
+// Opens a stage. If `keeps_spans` is set, it keeps each ended stage until stage_close, and ignores stages
+// that other threads begin and end.
 Stage *stage_open(bool keeps_spans);
 void stage_close(Stage *stage);
 // Returns the `*count` stages that have ended, in the order in which they began. No other thread may use the
@@ -29,9 +29,9 @@ void stage_end(Stage *stage);
 
 // Sets how much of the stage's total is done.
 void stage_set(Stage *stage, size_t done);
-// Adds to it. Any number of threads may call this.
+// Adds to the amount that is done. Any number of threads may call this.
 void stage_add(Stage *stage, size_t count);
 
 // Appends the stage, such as "reading bunny.obj 41%", and sets for how many seconds the operation has lasted.
-// Returns false if none is under way.
+// Returns false if no operation is in progress.
 bool stage_write(Stage *stage, Text *text, double *seconds);

@@ -91,7 +91,7 @@ const char *text_plural(uint64_t count)
     return count == 1 ? "" : "s";
 }
 
-// The Unicode Standard 15.0, table 3-7.
+// Implements the Unicode Standard 15.0, table 3-7.
 size_t text_character_size(const char *text, size_t length)
 {
     const unsigned char *bytes = (const unsigned char *)text;

@@ -16,9 +16,9 @@ void text_append(Text *text, const char *bytes, size_t length);
 void text_appendf(Text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
 char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2))); // never NULL; caller frees
 const char *text_c(const Text *text);                                             // never NULL
-void text_free(Text *text);                                                       // and zeroes
+void text_free(Text *text);                                                       // frees and zeroes
 
-// A short text by value.
+// A short text that is returned by value.
 typedef struct {
     char text[32];
 } ShortText;
@@ -27,10 +27,10 @@ typedef struct {
 ShortText text_size(double bytes);
 // Returns a duration in the unit that suits it, such as "90 seconds" or "3 hours".
 ShortText text_duration(double seconds);
-// Returns the ending of a noun for that many: "" for 1, otherwise "s".
+// Returns the plural ending of a noun for the count, "" for 1 and otherwise "s".
 const char *text_plural(uint64_t count);
 
-// Returns whether a line ends with the first byte: a newline, or a carriage return that no newline follows.
+// Returns whether the first byte ends a line, as a newline or a carriage return without a newline after it.
 static inline bool text_ends_line(const char *text, size_t length)
 {
     return *text == '\n' || (*text == '\r' && (length < 2 || text[1] != '\n'));

@@ -14,7 +14,7 @@ struct ImageWriter {
     bool finished, failed;
 };
 
-// A function that fails adds a message and returns false. Only `free` is called after that.
+// Functions return false with a message on failure. After a failure only `free` is called.
 typedef struct Encoder {
     bool (*begin)(ImageWriter *writer, MessageList *messages);
     // arrays[0] has the pixels, and the following ones those of the header's layers
@@ -30,7 +30,7 @@ extern const Encoder png_encoder, ppm_encoder, exr_encoder, npy_encoder;
 // Decoders read a file's bytes from memory.
 typedef struct {
     const char *path;
-    const char *layer; // of an EXR file; NULL: see exr_layer_find
+    const char *layer; // of an EXR file; NULL: the default
     const uint8_t *bytes;
     size_t length;
     MessageList *messages;

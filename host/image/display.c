@@ -6,11 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-// Values that are converted at once, and the fewest that a thread converts.
+// The number of values converted at once, and the fewest per thread.
 enum { CHUNK = 768, VALUES_OF_THREAD_MIN = 1 << 16 };
 
-// Krzysztof Narkowicz, "ACES Filmic Tone Mapping Curve", 2016: a rational fit of the Academy's reference
-// transforms, per channel. It reaches 1 at 7.24.
+// Applies a rational fit of the Academy's reference transforms per channel (Krzysztof Narkowicz, "ACES
+// Filmic Tone Mapping Curve", 2016). It reaches 1 at 7.24.
 static double filmic(double value)
 {
     if (!(value > 0)) return 0;
@@ -24,8 +24,8 @@ double tone_apply(double value, Tone tone)
     return tone == TONE_FILMIC ? filmic(value) : value;
 }
 
-// Returns 0 to 63 in the order of B. E. Bayer, "An optimum method for two-level rendition of continuous-tone
-// pictures", ICC 1973, for 8 by 8 pixels.
+// Returns the rank of a pixel, 0 to 63, in the order of B. E. Bayer, "An optimum method for two-level
+// rendition of continuous-tone pictures", ICC 1973, for 8 by 8 pixels.
 static uint32_t bayer(uint32_t x, uint32_t y)
 {
     uint32_t order = 0;
@@ -34,8 +34,8 @@ static uint32_t bayer(uint32_t x, uint32_t y)
     return order;
 }
 
-// A display value of 16 bits is 257 times one of 8 bits and a remainder, which the order of the pixel rounds
-// up or down. Multiples of 257 are unchanged.
+// Returns a dithered 8-bit display value. A value of 16 bits is 257 times one of 8 bits and a remainder,
+// which the pixel's rank rounds up or down. Multiples of 257 are exact.
 static uint8_t dithered(float value, Transfer transfer, uint32_t x, uint32_t y)
 {
     return (uint8_t)((image_quantize(value, transfer, 16) + ((2 * bayer(x, y) + 1) * 257 >> 7)) / 257);
@@ -45,7 +45,7 @@ static void row_convert(uint8_t *bytes, const float *values, const ImageHeader *
 {
     const size_t count = (size_t)header->width * header->channels, value_size = header->bits / 8;
     const double gain =
-        (float)exp2(header->exposure); // rounded: hosts' exp2() differ in the last bits of a double
+        (float)exp2(header->exposure); // rounded, because hosts' exp2() differ in the last bits of a double
     const bool is_toned = gain != 1 || header->tone != TONE_NONE;
     float toned[CHUNK];
     for (size_t start = 0, length; start < count; start += length) {

@@ -10,6 +10,5 @@ size_t display_row_size(const ImageHeader *header);
 void display_rows(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t first_row,
                   uint32_t row_count);
 
-// Returns the displayed fraction of a linear value, which is not limited by TONE_NONE, and from 0 to 1 by
-// others.
+// Returns the displayed fraction of a linear value. It is from 0 to 1 except for TONE_NONE.
 double tone_apply(double value, Tone tone);

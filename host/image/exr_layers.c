@@ -1,6 +1,6 @@
-// Layers follow OpenEXR's "Technical Introduction" (2013), "Naming conventions": a channel's name is its
-// layer's, a dot and a base name. In a file of several parts the name of a part serves as the layer of its
-// channels without one.
+// Finds layers by OpenEXR's "Technical Introduction" (2013), "Naming conventions". A channel's name is its
+// layer's name, a dot and a base name. In a file of several parts, a part's name is the layer of its
+// channels that have none.
 #include "host/image/exr_layers.h"
 
 #include "host/base/array.h"
@@ -126,7 +126,7 @@ static const char *shown_name(const Candidate *candidate, int *length)
     return candidate->length > 0 ? candidate->name : "default";
 }
 
-// The most bytes of names that a message shows.
+// Bounds the bytes of names that a message shows.
 enum { NAMES_SHOWN = 200 };
 
 static void names_add(Text *names, const char *name, size_t length)
@@ -153,7 +153,7 @@ static bool channels_refuse(exr_const_context_t context, const ImageFile *file, 
     return false;
 }
 
-// Refuses a choice among the layers that have light, or among those that do not.
+// Returns false with a message that lists the layers with light, or those without, as ambiguous.
 static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool with_light)
 {
     Text names = {0};

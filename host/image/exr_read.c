@@ -1,5 +1,5 @@
-// Reads OpenEXR through the C core: one layer at full resolution, in scan lines or tiles, of halves or
-// floats, or of integers with a single channel.
+// Reads OpenEXR through the C core. Supports one layer at full resolution, in scan lines or tiles, of halves
+// or floats, or of integers with a single channel.
 #include "host/base/array.h"
 #include "host/image/codec.h"
 #include "host/image/exr_layers.h"
@@ -45,8 +45,7 @@ static int64_t exr_size(exr_const_context_t context, void *reader)
     return (int64_t)((ExrReader *)reader)->file->length;
 }
 
-// Returns fewer bytes at the end of the file, as pread does: the library reads ahead past a header of unknown
-// size.
+// Reads bytes, fewer at the file's end, like pread. The library reads ahead past a header of unknown size.
 static int64_t exr_read_bytes(exr_const_context_t context, void *reader, void *bytes, uint64_t size,
                               uint64_t offset, exr_stream_error_func_ptr_t fail)
 {
@@ -119,7 +118,7 @@ static void channel_place(exr_coding_channel_info_t *channel, float *place, uint
     channel->user_line_stride = (int32_t)(row_values * sizeof *place);
 }
 
-// Returns false if the block, which starts at pixel (x, y) of the data, does not fit into the planes.
+// Sets the destinations of a block at pixel (x, y) of the data. Returns false if it exceeds the planes.
 static bool channels_place(const ExrReader *reader, exr_decode_pipeline_t *pipeline, float *scratch,
                            uint32_t x, uint32_t y)
 {
@@ -189,8 +188,7 @@ static exr_result_t exr_tiles(const ExrReader *reader, uint32_t width, uint32_t 
     return code;
 }
 
-// Copies the value at a pixel of the data; between samples it lies on the line between them in each
-// direction.
+// Copies the value at a pixel of the data. Interpolates bilinearly between samples.
 static void plane_sample(const Plane *plane, uint32_t x, uint32_t y, float *pixel)
 {
     const uint32_t column = x / plane->across, row = y / plane->down;
@@ -217,7 +215,7 @@ static void chroma_convert(float *pixel)
     pixel[1] = (luminance - 0.2126F * pixel[0] - 0.0722F * pixel[2]) / 0.7152F;
 }
 
-// Stores the values, and integers also as doubles, which hold each of them.
+// Converts integers to floats and to doubles, which hold each of them exactly.
 static void integers_widen(Image *image)
 {
     const size_t count = (size_t)image->width * image->height;
@@ -231,7 +229,7 @@ static void integers_widen(Image *image)
     }
 }
 
-// Fills the image, which is the display window. It stays 0 where the file has no data.
+// Fills the image, which is the display window. Pixels outside the data stay 0.
 static void image_fill(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
     const int64_t left = (int64_t)reader->display.min.x - reader->window.min.x;
@@ -247,12 +245,12 @@ static void image_fill(const ExrReader *reader, Image *image, uint32_t width, ui
             float *alpha = image->alpha + (size_t)y * image->width + x;
             plane_sample(&reader->planes[reader->layer.channel_count], (uint32_t)(x + left),
                          (uint32_t)(y + top), alpha);
-            *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1; // not a number: 1
+            *alpha = *alpha < 1 ? fmaxf(*alpha, 0) : 1; // NaN becomes 1
         }
     }
 }
 
-// Gives an image with transparent pixels, such as those outside the data window, an alpha of zeros.
+// Allocates a zeroed alpha for an image with transparent pixels, such as those outside the data window.
 static void alpha_open(const ExrReader *reader, Image *image, uint32_t width, uint32_t height)
 {
     if (!reader->layer.has_alpha) return;

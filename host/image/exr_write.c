@@ -1,5 +1,5 @@
-// Writes OpenEXR through the C core (Technical Introduction to OpenEXR, 2013): 32-bit floats and integers,
-// ZIP in blocks of 16 rows.
+// Writes OpenEXR through the C core (Technical Introduction to OpenEXR, 2013), as 32-bit floats and integers
+// with ZIP in blocks of 16 rows.
 #include "host/image/codec.h"
 
 #include "host/base/fault.h"
@@ -20,7 +20,7 @@ typedef struct {
     uint8_t *rows_held; // of a block that is not complete
 } WrittenLayer;
 
-// A channel of the file and the place of its values: the number of the layer and of the value in each pixel.
+// A channel of the file and the indices of its layer and of its value in each pixel.
 typedef struct {
     const char *name;
     size_t layer, value;
@@ -28,7 +28,7 @@ typedef struct {
 
 enum { VALUE_BYTES = 4, BLOCKS_MAX = 16 };
 
-// A block of rows in the queue, which threads compress. The buffers of a queue take about twice its rows.
+// A block of rows in the queue, which threads compress. A queue's buffers have about twice its rows' size.
 typedef struct {
     exr_encode_pipeline_t pipeline;
     bool has_pipeline; // kept and reused
@@ -49,7 +49,7 @@ typedef struct {
     int write_error; // errno of a failed write
 } ExrWriter;
 
-// Silences the library, which calls this with its lock taken: the context must not be used here.
+// Silences the library, which calls this with its lock held, so that the context must not be used here.
 static void exr_keep_silent(exr_const_context_t context, exr_result_t code, const char *message)
 {
     (void)context, (void)code, (void)message;
@@ -75,7 +75,7 @@ static bool exr_write_failed(ImageWriter *writer, exr_result_t code, MessageList
                                             : exr_get_default_error_message(code));
 }
 
-// Returns the first failure of a sequence of calls.
+// Makes a call unless an earlier one failed, and keeps the first failure.
 #define EXR_STEP(code, call) ((code) = (code) ? (code) : (call))
 
 static void layer_add(ExrWriter *state, const ImageLayer *layer)
@@ -194,7 +194,7 @@ static bool exr_begin(ImageWriter *writer, MessageList *messages)
     return true;
 }
 
-// The rows of a block by layer: in the caller's arrays or in rows_held.
+// The rows of a block by layer, in the caller's arrays or in rows_held.
 typedef struct {
     const uint8_t *layers[1 + IMAGE_LAYERS_MAX];
 } BlockRows;
@@ -214,8 +214,8 @@ static void channel_place(const ExrWriter *state, exr_encode_pipeline_t *pipelin
     channel->user_data_type = layer->is_integer ? EXR_PIXEL_UINT : EXR_PIXEL_FLOAT;
 }
 
-// Stores such a block uncompressed. A block of its uncompressed size is read as uncompressed, but OpenEXR 3.1
-// and 3.4.7 also store compressed bytes of that size (its issue 2306).
+// Compresses a block. Stores it uncompressed if compression does not change its size, because such a block
+// is read as uncompressed. OpenEXR 3.1 and 3.4.7 store the compressed bytes (its issue 2306).
 static exr_result_t exr_compress(exr_encode_pipeline_t *pipeline)
 {
     const ExrWriter *state = pipeline->encoding_user_data;
@@ -244,8 +244,8 @@ static exr_result_t blocks_write(ExrWriter *state)
     return code;
 }
 
-// Lets the library choose how a pipeline packs, compresses and writes. Blocks are written later, in the
-// file's order: the default functions fail for any block but the next.
+// Lets the library choose a pipeline's functions for packing, compressing and writing. Postpones writing to
+// the file's order, because the default functions fail for any block but the next.
 static exr_result_t pipeline_prepare(ExrWriter *state, exr_encode_pipeline_t *pipeline)
 {
     const exr_result_t code = exr_encoding_choose_default_routines(state->context, 0, pipeline);
@@ -282,7 +282,7 @@ static exr_result_t block_add(ImageWriter *writer, const BlockRows *rows, uint32
     return code;
 }
 
-// Copies rows into rows_held. First writes the queue, which may still refer to these.
+// Copies rows into rows_held. First writes the queue, which may still refer to rows_held.
 static exr_result_t rows_hold(ImageWriter *writer, const BlockRows *rows, uint32_t row_count)
 {
     ExrWriter *state = writer->state;

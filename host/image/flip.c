@@ -13,8 +13,8 @@ static const double color_exponent = 0.7, feature_exponent = 0.5; // q_c, q_f
 static const double compressed_from = 0.4, compressed_to = 0.95;  // p_c, p_t
 static const double feature_width_degrees = 0.082;                // w
 
-// The eye's sensitivity to contrast as sums of Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), with x in degrees
-// (table 1), for luminance, red-green and blue-yellow.
+// The contrast sensitivity of the eye as sums of Gaussians a sqrt(pi / b) exp(-pi^2 x^2 / b), with x in
+// degrees (table 1), for luminance, red-green and blue-yellow.
 static const struct {
     double a[2], b[2];
 } sensitivity[3] = {
@@ -103,14 +103,14 @@ static float *channel_row(const Channel *channel, uint32_t y)
     return channel->values + (size_t)y * channel->width;
 }
 
-// Weights of the neighbors -radius..radius, the same horizontally and vertically.
+// A separable filter with the weights of the neighbors -radius..radius in each direction.
 enum { RADIUS_MAX = 15 };
 typedef struct {
     int radius;
     float weights[2 * RADIUS_MAX + 1];
 } Filter;
 
-// Filters across. Outside the image its border pixels are repeated.
+// Filters horizontally. Repeats the border pixels outside the image.
 static void filter_across(const Filter *filter, const Channel *in, Channel *out)
 {
     size_t width = in->width, radius = (size_t)filter->radius;

@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-// Cubehelix with the author's standard start, rotations, hue and gamma (Green: "A colour scheme for the
-// display of astronomical intensity images", Bulletin of the Astronomical Society of India 39, 2011, section
-// 3).
+// Computes cubehelix with the author's standard start, rotations, hue and gamma (Green: "A colour scheme for
+// the display of astronomical intensity images", Bulletin of the Astronomical Society of India 39, 2011,
+// section 3).
 void heatmap_color(double fraction, float color[3])
 {
     const double start = 0.5, rotations = -1.5, hue = 1;

@@ -1,4 +1,4 @@
-// Shows errors as colors: the larger the lighter, so that the order survives gray printing and color
+// Shows errors as colors. Larger errors are lighter, so that the order survives gray printing and color
 // blindness.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Images: float colors in files and memory. Rows run from the top.
+// Reads and writes images of float colors. Rows run from the top.
 #pragma once
 
 #include "host/base/message.h"
@@ -14,7 +14,7 @@ typedef struct {
     const char *key, *value;
 } ImageNote; // written into PNG text chunks and EXR string attributes
 
-// More values of each pixel, in an EXR only.
+// Additional values per pixel, in an EXR only.
 typedef struct {
     const char *channels; // their names in turn, separated by commas, such as "normal.X,normal.Y,normal.Z"
     size_t channel_count;
@@ -28,9 +28,9 @@ typedef struct {
     unsigned bits;                    // 8 or 16: PNG, PPM
     char npy_type;                    // 'f': float32, 'd': float64, 'u': uint32
     const ImageNote *notes;           // ended by a NULL key
-    // The image's place in a larger one, whose size is 0 if there is none: EXR; the place is that of dither
+    // The image's place in a larger one, whose size is 0 if there is none, for EXR. It also offsets dither.
     uint32_t full_width, full_height, left, top;
-    const ImageLayer *layers; // after the color: of an EXR, or alpha alone of a PNG
+    const ImageLayer *layers; // after the color, of an EXR; a PNG can have only alpha
     size_t layer_count;       // at most IMAGE_LAYERS_MAX
     double exposure;          // in stops, before the tone curve: PNG, PPM
     Tone tone;                // before the transfer: PNG, PPM
@@ -43,8 +43,8 @@ ImageFormat image_format_of(const char *path); // by its ending, in any case
 
 uint64_t image_bytes(const ImageHeader *header); // of its pixels, uncompressed
 
-// Writes an image row by row, so that a large one needs memory for a band only. Nothing is at the target path
-// until image_writer_commit renames the file.
+// Writes an image row by row, so that a large one needs memory for one band only. The target path stays
+// unchanged until image_writer_commit renames the file.
 typedef struct ImageWriter ImageWriter;
 // Opens a file. Returns NULL with an error message if it cannot be written or cannot fit on its disk. The
 // header's notes and layers need not outlive the writer.
@@ -57,12 +57,11 @@ bool image_writer_rows(ImageWriter *writer, const void *pixels, uint32_t row_cou
 // width x its channels.
 bool image_writer_layer_rows(ImageWriter *writer, const void *const *arrays, uint32_t row_count,
                              MessageList *messages);
-// Adds a note that is known only once rows are written, to a PNG alone, whose text chunks may follow its
-// rows. Returns false as image_writer_rows does.
+// Adds a note after rows were written. Only PNG keeps it, since its text chunks may follow its rows. Returns
+// false with an error message on failure.
 bool image_writer_note(ImageWriter *writer, const ImageNote *note, MessageList *messages);
-// Completes the file so that only the rename is left, and none of several files is put in place before all
-// are complete. Returns false with an error message on failure. The writer must still be committed or
-// abandoned.
+// Completes the file up to its rename, so that several files can all be complete before the first is
+// renamed. Returns false with an error message on failure. The writer must still be committed or abandoned.
 bool image_writer_finish(ImageWriter *writer, MessageList *messages);
 // Completes the file unless finished and renames it to its target. On failure returns false with an error
 // message and leaves the target unchanged. Frees the writer in either case. Missing rows are a bug.
@@ -71,11 +70,11 @@ bool image_writer_commit(ImageWriter *writer, MessageList *messages);
 bool image_write(const char *path, const ImageHeader *header, const void *pixels, MessageList *messages);
 void image_writer_abandon(ImageWriter *writer); // removes the file and frees the writer; NULL is accepted
 
-// Converts a linear value to a display value of 2^bits - 1 steps: clipped to 0..1, curve, rounded to nearest.
-// NaN gives 0. sRGB: IEC 61966-2-1:1999.
+// Converts a linear value to a display value of 2^bits - 1 steps. Clips it to 0..1, applies the curve and
+// rounds to nearest. NaN becomes 0. sRGB is IEC 61966-2-1:1999.
 uint32_t image_quantize(float value, Transfer transfer, unsigned bits);
 
-// An image in memory. `image_read` gives linear values. Display values of a file become value / maximum, and
+// An image in memory. Values are linear, except that display values of a file become value / maximum and
 // `transfer` is their curve (PNG: from its sRGB chunk).
 typedef struct {
     uint32_t width, height, channels;
@@ -91,8 +90,7 @@ typedef struct {
 // and an empty image that need not be freed. An image whose header declares more pixels than
 // image_limit_pixels permits is refused before anything is decoded, because a small file may expand to many.
 bool image_read(Image *image, const char *path, MessageList *messages);
-// Reads the named layer of an EXR file. With NULL it reads what image_read does, the default layer or the
-// only one with colors.
+// Reads the named layer of an EXR file. NULL stands for the default layer or the only one with colors.
 bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages);
 // Reads an image from memory; `source->file` names it in messages.
 bool image_read_bytes(Image *image, const Source *source, MessageList *messages);
@@ -101,5 +99,5 @@ bool image_is_known(const char *path);
 bool image_bytes_are_known(const void *bytes, size_t length);
 enum { IMAGE_PIXELS_MAX = 1 << 27 }; // the default: 1.6 GB of floats
 void image_limit_pixels(uint32_t largest);
-double image_value(const Image *image, size_t i); // values[i], at the file's own width
+double image_value(const Image *image, size_t i); // values[i] at the precision of the file
 void image_free(Image *image);

@@ -1,11 +1,10 @@
-// Measures how far an image is from a reference, in numbers.
+// Measures the difference of an image from a reference.
 #pragma once
 
 #include "host/base/message.h"
 #include "host/image/image.h"
 
-// Summarizes the differences test - reference of many values. Pairs of which neither value is finite are left
-// out.
+// Summarizes the differences test - reference of many values. Excludes pairs without a finite value.
 typedef struct {
     size_t count;               // values compared
     double largest, rmse, bias; // bias is the mean difference with its sign
@@ -23,7 +22,7 @@ typedef struct {
     size_t nonfinite_reference, nonfinite_test; // pixels
     size_t unmatched_count;    // pairs of values of which one is NaN or infinite and the other differs
     ErrorSummary linear;       // compares linear light, or data as they are
-    uint32_t worst_x, worst_y; // the place of the largest difference, or of a number that became NaN
+    uint32_t worst_x, worst_y; // the pixel of the largest difference, or of a number that became NaN
     // Only for floats and doubles from EXR and NPY:
     bool has_ulp;
     double largest_ulp; // the largest ulp_distance; infinite if a value is unmatched
@@ -45,8 +44,7 @@ const char *image_kind(const Image *image);
 bool image_comparable(const Image *reference, const Image *test, MessageList *messages);
 
 // Returns the metrics of comparable images. Display values are compared as light, with the sRGB curve undone
-// whatever curve they were written with, because a screen does so. An image with 1 channel of display values
-// is gray.
+// whatever curve they were written with, as on a screen. An image with 1 channel of display values is gray.
 ImageMetrics image_metrics(const Image *reference, const Image *test);
 
 // Fills `errors` with the largest difference among each pixel's channels, as light. It is infinite where one

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <turbojpeg.h>
 
-// Bounds the declared size by the file's size: the expansion of a flat gray image.
+// Bounds the declared size by the file's size. This is the expansion of a flat gray image.
 enum { JPEG_EXPANSION = 1 << 14 };
 
 // Finds the content of the first application segment with the number (T.81, 1992, annex B) that starts with
@@ -44,7 +44,7 @@ static unsigned orientation_of(const ImageFile *file)
     return orientation >= 1 && orientation <= 8 ? orientation : 1;
 }
 
-// Turns and mirrors the image so that it is upright.
+// Rotates and mirrors the image so that it is upright.
 static void image_orient(Image *image, unsigned orientation)
 {
     if (orientation == 1) return;

@@ -1,4 +1,4 @@
-// NumPy's array format (NumPy reference, numpy.lib.format), version 1.0 out, 1.0 to 3.0 in.
+// Writes version 1.0 and reads 1.0 to 3.0 of NumPy's array format (NumPy reference, numpy.lib.format).
 #include "host/image/codec.h"
 
 #include "host/base/fault.h"

@@ -1,4 +1,4 @@
-// PNG through libpng (Portable Network Graphics, second edition, 2003).
+// Reads and writes PNG through libpng (Portable Network Graphics, second edition, 2003).
 #include "host/image/codec.h"
 #include "host/image/display.h"
 #include "host/image/transfer.h"
@@ -50,7 +50,7 @@ static bool png_write_failed(ImageWriter *writer, MessageList *messages)
                          ((PngState *)writer->state)->problem);
 }
 
-// tEXt is Latin-1, iTXt UTF-8; ASCII fits both, and more programs show tEXt.
+// Adds a note as tEXt, which more programs show, if it is ASCII, else as iTXt, which is UTF-8.
 static void png_note(PngState *state, const ImageNote *note)
 {
     bool is_ascii = true;
@@ -91,7 +91,7 @@ static bool png_begin(ImageWriter *writer, MessageList *messages)
     return true;
 }
 
-// Adds alpha, whose values are linear, behind the bytes of each pixel's color. `bytes` has room for both.
+// Inserts alpha, whose values are linear, after the bytes of each pixel's color. `bytes` can hold both.
 static void alpha_interleave(uint8_t *bytes, const float *alpha, const ImageHeader *header,
                              size_t pixel_count)
 {
@@ -234,7 +234,7 @@ static bool png_read_all(PngReader *reader, Image *image)
     return true;
 }
 
-// Warns of colors that are not sRGB's, unless the file states that they are.
+// Warns of colors that are not sRGB, unless the file declares them to be.
 static void png_check_colors(const PngReader *reader)
 {
     png_structp png = reader->state.png;

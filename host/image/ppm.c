@@ -1,4 +1,4 @@
-// Portable anymaps (Netpbm, the formats ppm and pgm): P5 and P6 are written; P2, P3, P5 and P6 are read.
+// Writes P5 and P6 and reads P2, P3, P5 and P6 portable anymaps (Netpbm, the formats ppm and pgm).
 #include "host/image/codec.h"
 #include "host/image/display.h"
 

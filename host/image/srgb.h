@@ -1,4 +1,4 @@
-// The sRGB curve on single numbers between 0 and 1 (IEC 61966-2-1:1999), without rounding to steps.
+// Computes the sRGB curve of single numbers between 0 and 1 (IEC 61966-2-1:1999), without rounding to steps.
 #pragma once
 
 #include <math.h>

@@ -1,5 +1,5 @@
-// The sRGB curve (IEC 61966-2-1:1999). It is monotonic, so a display value follows exactly from comparisons
-// with the thresholds between neighboring display values, computed once.
+// Applies the sRGB curve (IEC 61966-2-1:1999). The curve is monotonic, so comparisons with the thresholds
+// between neighboring display values, which are computed once, yield exact display values.
 #include "host/image/transfer.h"
 #include "host/base/memory.h"
 #include "host/image/srgb.h"
@@ -13,7 +13,7 @@ typedef struct {
     unsigned shift;    // bits of a float below the bucket index
     uint32_t first;    // bucket of thresholds[1]
     float least;       // in that bucket
-    float *thresholds; // [k]: the least float that gives k
+    float *thresholds; // [k]: the least float that becomes k
     uint16_t *starts;  // [bucket - first]: the display value of the bucket's least float
 } Curve;
 
@@ -26,7 +26,8 @@ static uint32_t float_bits(float value)
     return bits;
 }
 
-// No threshold lies within a relative 1e-12 of a float, so double precision decides each value.
+// Returns the least float at or above a threshold. No threshold lies within a relative 1e-12 of a float, so
+// double precision suffices.
 static float float_at_least(double value)
 {
     float near = (float)value;
@@ -89,7 +90,7 @@ static inline uint32_t curve_quantize(const Curve *curve, float value)
     return display;
 }
 
-// 24 bits times 16 bits plus a half is exact in a double.
+// Rounds a linear value to a display value. 24 bits times 16 bits plus a half is exact in a double.
 static inline uint32_t linear_quantize(float value, uint32_t maximum)
 {
     if (!(value > 0.0F)) return 0;
@@ -102,7 +103,7 @@ uint32_t image_quantize(float value, Transfer transfer, unsigned bits)
                                      : linear_quantize(value, bits == 8 ? 255 : 65535);
 }
 
-// Display values of 8 bits have at most one threshold in a bucket, so that no branch depends on the value.
+// Converts values to 8 bits. A bucket has at most one threshold, so that no branch depends on the value.
 static void srgb_quantize_8(uint8_t *bytes, const float *values, size_t count)
 {
     const Curve *curve = curve_of(8);

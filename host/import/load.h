@@ -18,7 +18,7 @@ typedef struct {
     void (*file_named)(void *context, const char *path);
     void *context;
     Stage *stage; // shows what is being read; NULL: not wanted
-    // The program that assimp_process_main serves, looked for in PATH: it reads the formats of assimp. NULL:
+    // The program that assimp_process_main serves, searched in PATH. It reads the formats of assimp. NULL:
     // this process's program.
     const char *mesh_program;
 } SceneOptions;

@@ -12,7 +12,7 @@ typedef struct {
 typedef struct {
     Offsets line_starts;
     Offsets file_starts, file_lines; // and the index of each file's first line
-    size_t end;                      // behind the last file
+    size_t end;                      // past the last file
     size_t object_count;             // of the objects that have their lines
 } Places;
 

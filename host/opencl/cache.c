@@ -105,7 +105,7 @@ static void make_folders(char *path)
     mkdir(path, 0700);
 }
 
-// Returns -1 without a folder, with a message if there is one that cannot be opened or trusted.
+// Opens the cache's folder. Returns -1 on failure, with a message unless it does not exist.
 static int folder_open(bool makes, MessageList *messages)
 {
     char *path = cache_folder_path();
@@ -132,8 +132,8 @@ static int folder_open(bool makes, MessageList *messages)
 
 static const char absent[] = "absent";
 
-// Reads a file of the folder. Returns why it cannot be trusted, `absent` if there is none, or NULL if it can
-// be trusted. Opening never blocks.
+// Reads a file of the folder without blocking. Returns NULL if the file can be trusted, `absent` if there is
+// none, else why it cannot be trusted.
 static const char *file_read(Text *content, int folder, const char *name, uint64_t bytes_max)
 {
     int descriptor = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
@@ -166,8 +166,8 @@ static const char *secret_read(Secret *secret, int folder)
     return why;
 }
 
-// Locks the folder: one process at a time makes or removes the hash's key and writes entries with it. Without
-// locks some of them may be lost. Returns a descriptor to close, or -1.
+// Locks the folder, so that one process at a time makes or removes the hash's key and writes entries with
+// it. Without locks, entries may be lost. Returns a descriptor to close, or -1.
 static int folder_lock(int folder)
 {
     int locked = openat(folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -176,7 +176,7 @@ static int folder_lock(int folder)
     return locked;
 }
 
-// Reads the hash's key, or replaces one that is absent or cannot be trusted. The folder must be locked.
+// Reads the hash's key. Replaces a key that is absent or cannot be trusted. The folder must be locked.
 static bool secret_make(Secret *secret, int folder)
 {
     bool has_secret = secret_read(secret, folder) == NULL;
@@ -275,7 +275,7 @@ static bool starts_with_entry_name(const char *name)
     return strspn(name, "0123456789abcdef") == 16 && strncmp(name + 16, ending, strlen(ending)) == 0;
 }
 
-// Returns whether the file is the temporary of an entry, of which a killed process may leave some.
+// Returns whether the file is the temporary of an entry, which a killed process may leave behind.
 static bool is_temporary(const char *name)
 {
     if (name[0] != '.' || !starts_with_entry_name(name + 1)) return false;
@@ -296,7 +296,7 @@ void cache_entries_free(CacheEntries *entries)
     *entries = (CacheEntries){0};
 }
 
-// Returns the next name in a folder, or NULL at its end, where errno is 0, and on failure.
+// Returns the next name in a folder, or NULL at its end or on failure. errno is 0 at the end.
 static const char *folder_next(DIR *items)
 {
     errno = 0;
@@ -316,8 +316,8 @@ static void entries_add(CacheEntries *entries, int folder, const char *name)
     entries->size += entry.size;
 }
 
-// Lists the entries, the least recently used first, and removes stale temporaries. Other files are not ours.
-// Returns false, with a message and no entries, if the folder cannot be read to its end.
+// Lists the entries, the least recently used first, and removes stale temporaries. Leaves other files alone.
+// Returns false with a message and no entries if the folder cannot be read to its end.
 static bool entries_list(CacheEntries *entries, int folder, MessageList *messages)
 {
     *entries = (CacheEntries){0};
@@ -327,7 +327,7 @@ static bool entries_list(CacheEntries *entries, int folder, MessageList *message
         if (is_temporary(name)) output_remove_stale(folder, name);
         entries_add(entries, folder, name);
     }
-    const int error = errno; // of what came last
+    const int error = errno; // of the last call
     if (items) closedir(items);
     if (!items && descriptor >= 0) close(descriptor);
     if (error != 0) {
@@ -345,8 +345,8 @@ static bool file_remove(int folder, const char *name, MessageList *messages)
     return message_error(messages, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
 }
 
-// Removes the least recently used entries beyond `bytes_max`, also those too large to be loaded. Returns
-// false with messages if something remains.
+// Removes the least recently used entries beyond `bytes_max`, including those too large to load. Returns
+// false with messages if a removal fails.
 static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
 {
     CacheEntries entries;

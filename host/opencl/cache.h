@@ -1,25 +1,25 @@
-// Compiled programs on disk, in $XDG_CACHE_HOME/glint, else $HOME/.cache/glint. A path that is not absolute
-// is ignored, as the XDG Base Directory Specification requires (0.8, "Basics"); without either there is no
-// cache. An entry is named by the hash of its key and contains the whole key, so that keys are never
-// confused. Safe with many processes: entries are written next to their target and renamed. What is loaded is
-// machine code. The folder and its files are used only if they belong to the user and nobody else may access
-// them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a file of the folder).
-// Nothing here is an error: what cannot be trusted is absent, with one warning per process, and replaced
-// where the folder can be trusted; what cannot be written is discarded.
+// Caches compiled programs on disk, in $XDG_CACHE_HOME/glint, else $HOME/.cache/glint. A path that is not
+// absolute is ignored, as the XDG Base Directory Specification requires (0.8, "Basics"); without either
+// there is no cache. An entry is named by the hash of its key and contains the whole key, so that keys are
+// never confused. Many processes can use the cache, because entries are written to a temporary and renamed.
+// Entries are machine code. The folder and its files are used only if they belong to the user and nobody
+// else may access them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a file of
+// the folder). No function fails because of an entry. An untrusted entry counts as absent, with one warning
+// per process, and is replaced if the folder can be trusted. An entry that cannot be written is discarded.
 #pragma once
 
 #include "host/base/text.h"
 #include <stdint.h>
 #include <time.h>
 
-// Fills `binary`, which must be empty. Returns false without an entry that can be trusted.
+// Loads the key's entry into `binary`, which must be empty. Returns false if no trusted entry exists.
 bool cache_load(const char *key, Text *binary);
 // Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX. An entry above CACHE_ENTRY_BYTES_MAX is
 // discarded.
 void cache_store(const char *key, const Text *binary);
 
 enum { CACHE_BYTES_MAX = 128 << 20, CACHE_ENTRY_BYTES_MAX = 32 << 20 }; // several hundred programs
-// Removes the least recently used entries until at most `bytes_max` are left.
+// Removes the least recently used entries until at most `bytes_max` bytes are left.
 void cache_trim(uint64_t bytes_max);
 
 typedef struct {
@@ -36,14 +36,14 @@ typedef struct {
     uint64_t size;
 } CacheEntries;
 
-// Lists and checks all entries; without a folder there are none. Returns false with a message if the folder
-// cannot be trusted or read.
+// Lists and checks all entries. The list is empty if there is no folder. Returns false with a message if the
+// folder cannot be trusted or read.
 bool cache_list(CacheEntries *entries, MessageList *messages);
 void cache_entries_free(CacheEntries *entries);
 // Removes all entries and the hash's key. Returns false with a message if the folder cannot be trusted or
 // read, or an entry cannot be removed.
 bool cache_clear(MessageList *messages);
 
-// Return the folder and the path of the key's entry, which the caller frees, or NULL without a cache.
+// Return the cache's folder and the path of the key's entry, or NULL without a cache. The caller frees them.
 char *cache_folder_path(void);
 char *cache_entry_path(const char *key);

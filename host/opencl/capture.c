@@ -32,7 +32,7 @@ void capture_close(Compute *compute)
 }
 
 // Writes a file named by the hash of its bytes, unless it exists, and adds its name to the JSON object.
-// Returns false if that failed, which is a failure of the Compute.
+// On failure sets the Compute's failure and returns false.
 static bool file_write(Compute *compute, Json *json, const char *key, const char *ending, const void *bytes,
                        size_t size)
 {

@@ -1,4 +1,4 @@
-// Writes launches of kernels to a folder, from which host/python/glint/locate.py repeats them on any device.
+// Writes launches of kernels to a folder, from which host/python/glint/locate.py re-runs them on any device.
 #pragma once
 
 #include "host/opencl/compute.h"
@@ -13,8 +13,8 @@ typedef struct {
 } Launch;
 
 // Writes a launch and the current contents of its buffers to the device's capture folder, if it has one. Each
-// file is named by a hash of its contents, so that launches share texts and buffers. A file that cannot be
-// written is a failure of the Compute.
+// file is named by a hash of its contents, so that launches share texts and buffers. Sets the Compute's
+// failure if a file cannot be written.
 void capture_launch(Compute *compute, const Launch *launch);
 
 // Records the value of an argument for the launches that follow.

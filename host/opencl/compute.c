@@ -1,4 +1,4 @@
-// The context, its queue, its first failure, and buffers.
+// Opens the context and its queue, records its first failure, and handles buffers.
 #include "host/opencl/compute.h"
 
 #include "host/base/fault.h"
@@ -125,14 +125,15 @@ char *compute_unmap_failure_text(const Compute *compute)
     return compute->unmap_failure.status ? failure_text(compute, &compute->unmap_failure) : NULL;
 }
 
-// OpenCL 1.2 takes the bytes as a pointer to non-const, and only reads them here (section 5.2.1).
+// Creates a buffer. OpenCL 1.2's pointer to the bytes is non-const, but with these flags the bytes are only
+// read (section 5.2.1).
 static cl_mem buffer_make(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags)
 {
     if (!compute_ok(compute)) return NULL;
     const Device *device = compute->device;
     cl_int status = CL_MEM_OBJECT_ALLOCATION_FAILURE;
     cl_mem buffer = NULL;
-    // NVIDIA's driver allocates at the first use, and would fail only there
+    // NVIDIA's driver allocates at the first use and would fail only then
     if (device->memory_bytes == 0 || size <= device->memory_bytes) {
         fault_record_call("clCreateBuffer");
         buffer = clCreateBuffer(compute->context, flags, size ? size : 1, (void *)(uintptr_t)bytes, &status);

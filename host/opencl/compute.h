@@ -1,9 +1,10 @@
-// A device opened for work: context, queue, programs, buffers, launches and their times. Knows no scenes.
+// Opens a device and handles its context, queue, programs, buffers, launches and their times. Knows no
+// scenes.
 //
-// The first OpenCL call that fails is kept in `failure`, as stdio keeps a stream's error: from then on every
-// function that takes the Compute enqueues and creates nothing and returns NULL, zeros or false, so that a
-// sequence of calls needs one check, compute_ok. What was created is released as usual. A release never
-// fails: no result depends on it. A failed Compute is closed, not repaired; others are not affected.
+// `failure` keeps the first OpenCL call that fails, as stdio keeps a stream's error. From then on every
+// function with a Compute argument enqueues and creates nothing and returns NULL, zeros or false, so that a
+// sequence of calls needs one check, compute_ok. Existing objects are released as usual. A release never
+// fails, since no result depends on it. A failed Compute is closed, not repaired. Others are not affected.
 #pragma once
 
 #include "host/base/fault.h"
@@ -12,12 +13,12 @@
 
 typedef struct {
     char call[40];   // the OpenCL function, or the host's work; empty: none failed
-    cl_int status;   // CL_SUCCESS: the call returned NULL all the same, unless is_of_host
-    bool is_of_host; // no call failed: the detail says what did
-    char *detail;    // what else is known, such as a build log; NULL: nothing
+    cl_int status;   // CL_SUCCESS: the call returned NULL in spite of it, unless is_of_host
+    bool is_of_host; // no call failed, and the detail names the failure
+    char *detail;    // more about the failure, such as a build log; NULL: nothing
 } ComputeFailure;
 
-// The value that an argument of a kernel was set to last.
+// The latest value of a kernel's argument.
 typedef struct {
     cl_kernel kernel;
     cl_uint index;
@@ -38,9 +39,9 @@ typedef struct Compute {
     } captured; // empty unless the device has a capture folder
 } Compute;
 
-// Opens the device. Returns false if that failed. compute_close closes it either way.
+// Opens the device. Returns false on failure. compute_close closes it in either case.
 bool compute_open(Compute *compute, const Device *device);
-void compute_close(Compute *compute); // and zeroes; accepts a zeroed one
+void compute_close(Compute *compute); // closes and zeroes; accepts a zeroed one
 
 // Opens the device as the Compute's reference, which compute_close closes.
 bool compute_open_reference(Compute *compute, const Device *device);
@@ -57,12 +58,12 @@ static inline bool compute_ok(const Compute *compute)
     return compute->failure.call[0] == '\0';
 }
 
-// `compute_try(compute, clFinish(compute->queue))` makes the call unless an earlier one failed, and is false
+// Makes a call, as in `compute_try(compute, clFinish(compute->queue))`, unless an earlier one failed. False
 // if either failed.
 #define compute_try(compute, call)                                                                           \
     (compute_ok(compute) ? (fault_record_call(#call), compute_check((compute), (call), #call)) : false)
-// Records the failure of a call that was made, if it is the first. The function's name is `call` up to a
-// parenthesis. Returns compute_ok.
+// Records a call's failure if it is the first. The function's name is `call` up to a parenthesis. Returns
+// compute_ok.
 bool compute_check(Compute *compute, cl_int status, const char *call);
 // Records the failure of a call that returns an object, where NULL is a failure even with CL_SUCCESS.
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call);
@@ -72,14 +73,13 @@ void compute_fail(Compute *compute, const char *call, cl_int status, const char 
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped);
 // Returns "CALL: STATUS (CODE) on DEVICE: detail" after a failure. The caller frees it.
 char *compute_failure_text(const Compute *compute);
-// Returns such a text for an unmap that failed with no launch after it, or NULL if none did. The caller frees
-// it.
+// Returns the text of a failed unmap with no launch after it, or NULL if there is none. The caller frees it.
 char *compute_unmap_failure_text(const Compute *compute);
 
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"
     const char *prelude; // definitions placed before the text (features, LANES, precision)
-    // For a second build where the first fails: definitions that make the text easier to compile. NULL: none.
+    // Definitions that make the text easier to compile, for a second build if the first fails. NULL: none.
     const char *easy_prelude;
     const char *kernel;  // a program from which it cannot be created is not built; NULL: none is created
     const char *options; // compiler flags only
@@ -89,7 +89,7 @@ typedef struct {
 
 typedef struct {
     cl_program program;
-    cl_kernel kernel;   // the request's; NULL: none, or the caller has it
+    cl_kernel kernel;   // the request's; NULL: none, or the caller owns it
     uint64_t text_hash; // of the composed text, prelude included
     bool is_easy;       // built with the easy prelude
     double build_seconds;
@@ -102,43 +102,42 @@ void program_options_append(Text *text, const Device *device, const char *option
 // Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
 // (host/opencl/cache.h) or builds it. The key consists of text, options, launch (NULL: the work-group of
 // --work-group), device name, driver, platform version and the cache's format version. `no_cache` also
-// bypasses PoCL's cache. Returns false if it failed. Where the text does not compile, the detail has the
-// build log and the file in which the composed text was saved. Where both builds fail, the first one's
-// failure is kept.
+// bypasses PoCL's cache. Returns false on failure. If the text does not compile, the detail has the build
+// log and the file in which the composed text was saved. If both builds fail, the first failure is kept.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
-// Writes the program to the cache, unless it came from there. Call after its first launch has ended: PoCL
-// compiles a kernel at its first launch, a binary holds what was launched by then, and a program loaded from
-// it returns that same binary forever (3.1; hence `launch` in the key).
+// Writes the program to the cache unless it came from there. Call it after the first launch has ended,
+// because PoCL compiles a kernel at its first launch, a binary holds only the kernels launched by then, and
+// a program loaded from it always returns that same binary (3.1; hence `launch` in the key).
 void program_store(Compute *compute, const ProgramRequest *request, const Program *program);
-// Returns NULL if it failed. clReleaseKernel releases it.
+// Creates a kernel, which clReleaseKernel releases. Returns NULL on failure.
 cl_kernel program_kernel(Compute *compute, const Program *program, const char *name);
 void program_close(Program *program);
 
 // Returns the key of the cache for a request's program. The caller frees it.
 char *program_key(const Device *device, const ProgramRequest *request);
 
-// Composes only, for tests and hashes. Returns NULL if `root` or an include is not embedded. The caller frees
-// it.
+// Composes the text for tests and hashes. Returns NULL if `root` or an include is not embedded. The caller
+// frees it.
 char *program_text(const char *root, const char *prelude);
 
-// Creates a buffer of at least one byte, not initialized if `bytes` is NULL. Returns NULL if that failed; the
-// detail then compares the size with the device's memory. buffer_release releases it.
+// Creates a buffer of at least one byte, uninitialized if `bytes` is NULL. Returns NULL on failure, with a
+// detail that compares the size with the device's memory. buffer_release releases it.
 cl_mem buffer_create(Compute *compute, size_t size, const void *bytes, cl_mem_flags flags);
 void buffer_release(cl_mem buffer); // accepts NULL
-// Copies the first `size` bytes and waits. On failure buffer_read leaves `bytes` undefined.
+// Copy the first `size` bytes and wait. On failure buffer_read leaves `bytes` undefined.
 bool buffer_read(Compute *compute, cl_mem buffer, size_t size, void *bytes);
 bool buffer_write(Compute *compute, cl_mem buffer, size_t size, const void *bytes);
 
-// Returns memory to which to write `size` bytes of a buffer's new contents, at least 1, from `begin`, or NULL
-// if the device failed. buffer_write_mapped hands them over.
+// Maps at least one byte of a buffer from `begin` on for writing `size` bytes of new contents. Returns NULL
+// if the device failed. buffer_write_mapped transfers the contents.
 void *buffer_map(Compute *compute, cl_mem buffer, size_t begin, size_t size);
 void buffer_write_mapped(Compute *compute, cl_mem buffer, void *mapped);
 
-// Creates a read-only buffer of bytes of memory_allocate_large and takes ownership of them, even on failure:
-// a CPU may read large contents in place, other devices get a copy. Fails as buffer_create does.
+// Creates a read-only buffer of bytes from memory_allocate_large and takes ownership of them, even on
+// failure. A CPU may read large contents in place; other devices use a copy. Returns NULL on failure.
 cl_mem buffer_adopt(Compute *compute, size_t size, void *bytes);
 
-// One command's time by its event and by the host's clock.
+// The time of a command by its event and by the host's clock.
 typedef struct {
     const Device *device; // the next four are times of its clock, which starts at an arbitrary moment
     double queued_seconds, submitted_seconds, start_seconds, end_seconds; // 0: the runtime has none
@@ -146,32 +145,32 @@ typedef struct {
     double host_seconds;       // from enqueue until the host sees it complete
     double host_start_seconds; // clock_seconds() before the enqueue
     bool trusted;       // false: zeros, a mere counter, end before start, or event longer than host_seconds
-    const char *fault;  // of the device's timer, as its passport has it; NULL: none. Not trusted with one
+    const char *fault;  // of the device's timer by its passport, which makes the time untrusted; NULL: none
     cl_uint dimensions; // 0: not a kernel
     size_t global[3], local[3]; // work-items, and those of a group; local 0: the runtime's choice
 } LaunchTime;
 
-// Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. An event may
-// exceed those by the timer's resolution and 1 %.
+// Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. The event's time
+// may exceed the host's by the timer's resolution and 1 %.
 LaunchTime launch_time_classify(cl_ulong start, cl_ulong end, double host_seconds, double resolution_seconds);
 
 // Returns why the event's times are not trusted, or NULL if they are.
 const char *launch_clock_fault(const LaunchTime *time);
 
 // Halves the longest side of a work-group, the last among equals, until it has at most `largest` work-items
-// and no side exceeds its own limit.
+// and no side exceeds its limit.
 void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const size_t *longest_sides);
 
-// Enqueues over `items` and waits. Returns zeros if that failed. `group`, the preferred work-group, is
-// reduced to fit the device and the kernel, and the work-items are rounded up to whole groups, so a kernel
-// must not rely on either. With NULL the runtime chooses, and nothing is rounded.
+// Launches the kernel over `items` and waits. Returns zeros on failure. Reduces `group`, the preferred
+// work-group, to fit the device and the kernel, and rounds the work-items up to whole groups, so a kernel
+// must not rely on either. If `group` is NULL, the runtime chooses and nothing is rounded.
 LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
                          const size_t *group);
-// Launches as kernel_launch does, with global ids that begin at `first`, or at 0 if it is NULL.
+// Launches the kernel like kernel_launch, with global ids from `first` on, or from 0 if `first` is NULL.
 LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
                               const size_t *items, const size_t *group);
 // Waits for the event of `command`, the OpenCL function that enqueued it, reads and releases it. `host_start`
-// is clock_seconds() before the enqueue. Returns zeros if that failed.
+// is clock_seconds() before the enqueue. Returns zeros on failure.
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start);
 
 // Set argument `index` to a value or a buffer, which may be NULL, with the kernel's name in the detail of a

@@ -1,5 +1,5 @@
-// Devices as their platforms describe them. A query that fails leaves its field zero or its text empty: one
-// faulty runtime must not make the other devices unusable.
+// Queries devices from their platforms. A query that fails leaves its field zero or its text empty, so that
+// one faulty runtime does not make the other devices unusable.
 #include "host/opencl/device.h"
 
 #include "host/base/array.h"
@@ -12,9 +12,9 @@
 #include <string.h>
 #include <strings.h>
 
-// Returns whether a call succeeded, and keeps the first failure. That there is no device or platform is not a
-// failure, and neither is a property that the runtime does not know (CL_INVALID_VALUE), such as the format of
-// double without fp64.
+// Returns whether a call succeeded, and keeps the first failure. A missing device or platform is not a
+// failure, nor is a property that the runtime does not know (CL_INVALID_VALUE), such as double's format
+// without fp64.
 static bool list_check(DeviceList *list, cl_int status, const char *call)
 {
     fault_record_call(NULL);
@@ -91,7 +91,7 @@ static bool extensions_have(const char *extensions, const char *name)
     return false;
 }
 
-// The values that the extensions' specifications give their queries.
+// The extensions' queries by their specifications.
 enum {
     QUERY_NV_PCI_BUS = 0x4008,
     QUERY_NV_PCI_SLOT = 0x4009, // device and function
@@ -351,7 +351,7 @@ const char *device_selector(const char *option)
     return selector && selector[0] != '\0' ? selector : NULL;
 }
 
-// Ranks GPUs before CPUs before the rest.
+// Ranks GPUs before CPUs before other devices.
 static int device_rank(const Device *device)
 {
     return device->type & CL_DEVICE_TYPE_GPU ? 2 : device->type & CL_DEVICE_TYPE_CPU ? 1 : 0;
@@ -362,8 +362,8 @@ static bool is_number(const char *selector)
     return selector[0] != '\0' && selector[strspn(selector, "0123456789")] == '\0';
 }
 
-// Returns whether the name contains the selector. A number must match a whole number of the name: the index
-// 51 does not match "haswell-avx512".
+// Returns whether the name contains the selector. A number must match a whole number there, so 51 does not
+// match "haswell-avx512".
 static bool name_matches(const char *name, const char *selector)
 {
     if (!is_number(selector)) return strcasestr(name, selector) != NULL;
@@ -375,7 +375,7 @@ static bool name_matches(const char *name, const char *selector)
     return false;
 }
 
-// The domain may be left out.
+// Returns whether the selector is the PCI place, with or without its domain.
 static bool pci_matches(const char *pci, const char *selector)
 {
     const char *bus = strchr(pci, ':');
@@ -392,7 +392,7 @@ static bool device_matches(const Device *device, const char *selector)
            (selector[0] != '\0' && strcasecmp(device->uuid, selector) == 0);
 }
 
-// Returns whether the selector is the index of a device: "3090" may be a part of a name instead.
+// Returns whether the selector is a device's index. A number such as "3090" can be part of a name instead.
 static bool selector_is_index(const DeviceList *list, const char *selector, size_t *index)
 {
     if (!selector || !is_number(selector)) return false;
@@ -500,7 +500,7 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
 {
     const Device **chosen = *devices = memory_allocate_zeroed(list->count + 1, sizeof *chosen);
     if (selector && strcasecmp(selector, "all") == 0) return devices_choose_all(list, chosen, messages);
-    // a name may have a comma, as llvmpipe's has
+    // a name may contain a comma, such as llvmpipe's
     bool is_single = !selector || !strchr(selector, ',') || any_matches(list, selector);
     size_t count = 0;
     for (const char *at = selector, *end;; at = end + 1) {

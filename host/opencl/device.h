@@ -1,4 +1,4 @@
-// Every OpenCL device of every platform, and the choice of one.
+// Lists the OpenCL devices of all platforms and selects among them.
 #pragma once
 
 #define CL_TARGET_OPENCL_VERSION 120
@@ -11,12 +11,12 @@
 typedef struct {
     cl_platform_id platform;
     cl_device_id id;
-    unsigned index;           // as `glint devices` numbers it, from 0 over all platforms
+    unsigned index;           // from 0 over all platforms, as in `glint devices`
     unsigned same_name_index; // 0 for the first device of this platform and name, 1 for the next …
     cl_device_type type;
     char *name, *vendor, *version, *driver, *platform_name, *platform_version;
     char *extensions;
-    // What tells devices of one name apart, where the driver has the extensions; else empty texts.
+    // Identify devices of one name if the driver has the extensions; else empty texts.
     char *board; // "AMD Radeon RX 6800"
     char *pci;   // "0000:65:00.0": domain, bus, device, function
     char *uuid;  // 32 hexadecimal digits
@@ -33,9 +33,8 @@ typedef struct {
     bool rounds_toward_zero, lacks_infinity;
     bool compiler, available, little_endian;
     struct DevicePassports *passports; // host/opencl/passport.h
-    const char
-        *build_options;   // of --build-options, after those of every program; outlive the device; or NULL
-    size_t work_group[2]; // of --work-group, for kernels that trace rays; 0: glint chooses
+    const char *build_options; // of --build-options, appended to each program's; outlive the device; or NULL
+    size_t work_group[2];      // of --work-group, for kernels that trace rays; 0: glint chooses
     // The folder that receives the text and the build log of each kernel that is built; outlives the device;
     // or NULL.
     const char *kernel_folder;
@@ -50,8 +49,8 @@ typedef struct {
     cl_int failed_status;
 } DeviceList;
 
-// Queries all platforms. Without any the list is empty, which is not a failure. Sets PoCL's environment
-// variable POCL_WORK_GROUP_SPECIALIZATION unless it is set.
+// Queries all platforms. The list is empty if there are none, which is not a failure. Sets PoCL's
+// environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set.
 void device_list_open(DeviceList *list);
 void device_list_close(DeviceList *list);
 // Returns "CALL: STATUS (CODE)", or NULL if no call failed. The caller frees it.
@@ -70,32 +69,31 @@ const Device *device_choose(const DeviceList *list, const char *selector, Messag
 size_t devices_choose(const DeviceList *list, const char *selector, const Device ***devices,
                       MessageList *messages);
 
-// Returns the device that works in double for one that cannot: that of `selector`, or for NULL the default
-// among those with 64-bit floating point. Returns NULL with an error message about the selector if there is
-// none.
+// Returns the device that computes in double for a device that cannot. It is the one that `selector` names,
+// or for NULL the default among those with 64-bit floating point. Returns NULL with an error message about
+// the selector if none qualifies.
 const Device *device_choose_reference(const DeviceList *list, const char *selector, MessageList *messages);
 
 // Returns the selector that the user gave: `option`, else the environment variable GLINT_DEVICE if it is not
 // empty, else NULL.
 const char *device_selector(const char *option);
 
-// Returns whether the device can build and run kernels, and its arithmetic is what they need. Otherwise sets
-// *why, which may be NULL, to what is missing.
+// Returns whether the device can build and run kernels and has the arithmetic that they need. Otherwise sets
+// *why to the missing feature unless `why` is NULL.
 bool device_usable(const Device *device, const char **why);
 
-// Returns the number of rays per work-item, 1, 4, 8 or 16. If 0 are requested: on a CPU the native vector
-// width of float, or of double where `is_double`, rounded down, elsewhere 1. Otherwise as many as requested,
-// but no more than fit the vectors of a CPU that has them. PoCL 4 and newer inline every function whose
-// vectors are wider: kernels took minutes to compile, and in one version had wrong hits. No scene was faster
-// with two vectors per value.
+// Returns the number of rays per work-item, 1, 4, 8 or 16. If 0 are requested, it is the native vector width
+// on a CPU, of double if `is_double` is set, else of float, rounded down, and 1 on other devices. Otherwise
+// it is the requested number, limited to the width of a CPU's vectors if it has them. PoCL 4 and newer
+// inline every function whose vectors are wider: kernels took minutes to compile, and in one version had
+// wrong hits. No scene was faster with two vectors per value.
 unsigned device_lanes(const Device *device, bool is_double, unsigned requested);
 
-// Returns what may give the device 64-bit floating point, to be appended to a message that it has none,
-// otherwise "".
+// Returns a hint on enabling 64-bit floating point, to append to a message that the device lacks it, or "".
 const char *device_fp64_hint(const Device *device);
 
 const char *device_type_name(cl_device_type type); // "cpu", "gpu", "accelerator", "other"
 
 const char *cl_status_name(cl_int status); // "CL_SUCCESS", …
-// Returns the meaning of a status of an OpenCL function in words, or NULL if there is no more than its name.
+// Returns the meaning of an OpenCL function's status in words, or NULL if only its name is known.
 const char *cl_status_meaning(const char *function, cl_int status);

@@ -1,5 +1,5 @@
 // Floats are computed in double, which holds their sums and products without error, and quotients and roots
-// closely enough that rounding twice is rounding once (Figueroa, When is double rounding innocuous?, SIGNUM
+// closely enough that double rounding is innocuous (Figueroa, When is double rounding innocuous?, SIGNUM
 // Newsletter 30(3), 1995). Doubles are computed by fma, which the C library rounds once.
 #include "host/opencl/exact.h"
 
@@ -75,7 +75,7 @@ static double ulp_of(bool is_double, double value)
     return real_value(true, real_bits(true, value) & exponent_bits) * (is_double ? 0x1p-52 : 0x1p-23);
 }
 
-// No quotient and no root lies halfway between two reals: what is not the nearest is off by more than half.
+// Returns 0.5 for the nearest real, otherwise more. Quotients and roots never lie halfway between reals.
 static double error_of(double error, bool is_nearest)
 {
     return is_nearest ? 0.5 : fmax(error, nextafter(0.5, 1));

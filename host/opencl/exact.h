@@ -1,5 +1,5 @@
-// Exact results of one operation in float or double, whatever the host's own evaluation method. Every value
-// is a double; `is_double` is the format to which it is rounded.
+// Computes exact results of one operation in float or double, whatever the host's evaluation method. Every
+// value is a double; `is_double` is the format to which it is rounded.
 #pragma once
 
 #include <stdbool.h>
@@ -13,20 +13,21 @@ typedef enum {
     ROUNDING_OTHER
 } RoundingMode;
 
-// A value as nearest + rest without error; nearest is rounded to nearest.
+// An exact value, the sum of its nearest real and the rest.
 typedef struct {
     double nearest, rest;
 } Exact;
 
-// In float the exponents differ by 28 at most; in neither format anything overflows or is subnormal.
+// Return the exact sum and product. The exponents of floats may differ by 28 at most. No value may overflow
+// or be subnormal.
 Exact exact_sum(bool is_double, double a, double b);
 Exact exact_product(bool is_double, double a, double b);
 double exact_fma(bool is_double, double a, double b, double c); // rounded once, to nearest
-// Returns the result of rounding in that mode, which is not ROUNDING_OTHER.
+// Returns the value rounded in the given mode, which must not be ROUNDING_OTHER.
 double exact_rounded(bool is_double, Exact exact, RoundingMode rounding);
 
-// Returns the error in ulp of the result: 0.5 if it is correctly rounded, otherwise more. Operands are
-// positive and normal. Returns infinity for a result that is not.
+// Return the error of a result in ulp, which is 0.5 if it is correctly rounded and otherwise more. Operands
+// must be positive and normal. The error is infinite if the result is not positive and finite.
 double quotient_error(bool is_double, double a, double b, double quotient);
 double root_error(bool is_double, double a, double root);
 

@@ -1,4 +1,4 @@
-// Launches and the times of their events.
+// Launches kernels and times their events.
 #include "host/base/clock.h"
 #include "host/opencl/passport.h"
 #include <string.h>
@@ -28,7 +28,7 @@ const char *launch_clock_fault(const LaunchTime *time)
     return "the event is longer than the host waited for it";
 }
 
-// Reads a time of the event, zero where the runtime has none.
+// Returns a timestamp of the event, or zero if the runtime has none.
 static cl_ulong event_timestamp(cl_event event, cl_profiling_info what)
 {
     cl_ulong nanoseconds = 0;
@@ -79,7 +79,8 @@ void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const siz
     }
 }
 
-// A device may limit groups to a single work-item, and a kernel with many variables to fewer than its device.
+// Fits a work-group to the device and the kernel. A device may limit groups to a single work-item, and a
+// kernel with many variables to fewer than its device.
 static void work_group_fit_kernel(const Device *device, cl_kernel kernel, cl_uint dimensions, size_t *sides)
 {
     size_t largest = 0;

@@ -1,4 +1,4 @@
-// Passports: acquired, cached, and described.
+// Acquires, caches and describes passports.
 #include "host/opencl/passport.h"
 
 #include "host/base/array.h"
@@ -22,7 +22,7 @@ const char *const property_names[PROPERTY_COUNT] = {
     [PROPERTY_TIMERS] = "event timers"};
 
 struct DevicePassports {
-    Passport **items; // each in one place for good
+    Passport **items; // each keeps its address
     size_t count, capacity;
 };
 
@@ -57,7 +57,7 @@ const char *passport_build_options(const Device *device, PassportMode mode)
     return "-cl-std=CL1.2";
 }
 
-// Raised when a Passport or what is measured changes, other than the kernel's text.
+// Increment when the Passport struct or the measurement changes. The kernel's text is in the key.
 enum { PASSPORT_FORMAT = 2 };
 
 static char *passport_key(const Device *device, PassportMode mode, uint32_t lanes)
@@ -199,7 +199,8 @@ static Finding fma_finding(const Passport *passport, Text *text)
     return passport->fma_is_exact ? FINDING_UNUSUAL : FINDING_BROKEN;
 }
 
-// allowed_ulp: what OpenCL allows at `single`, and what the bounds of `certified` count on.
+// Appends the finding about quotients or roots. `allowed_ulp` is the error that OpenCL allows at `single`
+// and that the bounds of `certified` assume.
 static Finding results_finding(const Passport *passport, const RoundedResults *results, double allowed_ulp,
                                Text *text)
 {

@@ -1,5 +1,5 @@
-// What a device's arithmetic and its event timers really do: measured by kernels/passport.cl, which is built
-// as the renderer's kernels are, judged against exact results on the host, and cached for the device, its
+// Measures a device's arithmetic and event timers with kernels/passport.cl, which is built like the
+// renderer's kernels. Compares the results with exact ones on the host, and caches them by the device, its
 // driver and the text of that kernel.
 #pragma once
 
@@ -7,13 +7,13 @@
 #include "host/opencl/compute.h"
 #include "host/opencl/exact.h"
 
-// The build options and functions that a precision's kernels share.
+// The sets of build options and functions that kernels of a precision share.
 typedef enum { PASSPORT_SINGLE, PASSPORT_STRICT, PASSPORT_DOUBLE, PASSPORT_MODE_COUNT } PassportMode;
 extern const char *const passport_mode_names[PASSPORT_MODE_COUNT];
 
 typedef enum { SUBNORMALS_KEPT, SUBNORMALS_FLUSHED, SUBNORMALS_MIXED } Subnormals;
 
-// Results of division or of the square root.
+// The results of division or of the square root.
 typedef struct {
     double largest_ulp;          // the largest error; infinite where a result is not finite
     uint64_t count, wrong_count; // wrong: not correctly rounded
@@ -39,15 +39,15 @@ typedef struct {
 typedef struct {
     PassportMode mode;
     uint32_t lanes;
-    bool is_thorough;  // divided and took roots of all mantissas, as far as PASSPORT_SECONDS_MAX allowed
-    bool uses_fma;     // HAS_FMA of kernels: fma is fused, and its cost below the limit
-    bool fma_is_fused; // the device's own
-    bool fma_is_exact; // as kernels have it, perhaps emulated
+    bool is_thorough;  // covered all mantissas, as far as PASSPORT_SECONDS_MAX allowed
+    bool uses_fma;     // HAS_FMA of kernels, set if fma is fused and its cost below the limit
+    bool fma_is_fused; // fma of the device
+    bool fma_is_exact; // fma of the kernels, perhaps emulated
     double fma_cost;   // its time over that of a product and a sum; 0: not fused, not measured
     bool contracts, two_sum_is_exact, two_product_is_exact;
     RoundingMode rounding;
     RoundedResults quotients, roots;
-    bool has_promised_rounding; // of quotients and roots: built with an option that asks for it
+    bool has_promised_rounding; // of quotients and roots: the build has an option that asks for it
     Subnormals subnormals;
     bool has_promised_subnormals;
     bool has_infinities_and_nans, converts_exactly;
@@ -55,27 +55,27 @@ typedef struct {
     double build_seconds, seconds; // of the kernel; of the measurement
 } Passport;
 
-// A measurement's seconds at most, except on devices that are too slow even for the fewest operands: three,
-// one of each mode, take less than a second.
+// The maximum seconds of a measurement, except on devices that are too slow even for the fewest operands.
+// Three measurements, one of each mode, take less than a second.
 #define PASSPORT_SECONDS_MAX 0.3
-// Fused hardware takes about half of the time of a product and a sum, an emulation dozens of times that. The
-// second is the limit where the device does not claim the hardware: Intel's runtime for CPUs does not, and
-// rusticl's emulation was once timed at 7.9 on a busy machine.
+// Fused hardware takes about half the time of a product and a sum, an emulation dozens of times that. The
+// second limit is for devices that do not report the hardware. Intel's runtime for CPUs does not report it,
+// and rusticl's emulation once measured 7.9 on a busy machine.
 #define PASSPORT_FMA_COST_MAX           8.0
 #define PASSPORT_UNCLAIMED_FMA_COST_MAX 2.0
 
 // Returns the compiler's options of a mode on a device.
 const char *passport_build_options(const Device *device, PassportMode mode);
 
-// Returns the passport of a mode and width: measured before in this process, loaded from the cache, or
-// measured now. Thorough ones take up to PASSPORT_SECONDS_MAX, the others some hundredths, and both a build.
-// Returns NULL if the device failed. It lives as long as the device's list. Two threads must not call this
-// for one device.
+// Returns the passport of a mode and width, measured earlier in this process, loaded from the cache, or
+// measured now. A thorough measurement takes up to PASSPORT_SECONDS_MAX, others some hundredths of a second,
+// and both a build. Returns NULL if the device failed. The passport lives as long as the device's list. Two
+// threads must not call this for one device.
 const Passport *passport_acquire(Compute *compute, PassportMode mode, uint32_t lanes, bool is_thorough,
                                  bool no_cache);
-// Measures all modes that the device has at their default widths thoroughly, and replaces those of the cache.
+// Thoroughly measures all modes of the device at their default widths and replaces the cached passports.
 bool passports_measure(Compute *compute);
-// Loads what the cache has of all modes at the default widths; measures nothing.
+// Loads the cached passports of all modes at the default widths. Measures nothing.
 void passports_recall(const Device *device);
 
 // The passports of a device that are known, in the order in which they were acquired.
@@ -91,8 +91,8 @@ bool passport_rounds_correctly(const Passport *passport);
 // Returns why the events' times of the device are not trusted, or NULL if they are or nothing is known.
 const char *passport_timer_fault(const Device *device);
 
-// Each property has a finding: as it should be; unusual, which glint allows for; or broken, which the
-// precisions of the mode other than `single` rely on.
+// The finding about a property. It is sound, unusual in a way that glint allows for, or broken although the
+// precisions of the mode other than `single` rely on it.
 typedef enum { FINDING_SOUND, FINDING_UNUSUAL, FINDING_BROKEN } Finding;
 extern const char *const finding_names[];
 
@@ -112,9 +112,9 @@ typedef enum {
 } Property;
 extern const char *const property_names[PROPERTY_COUNT];
 
-// Appends what was found.
+// Appends a description of the property and returns its finding.
 Finding passport_finding(const Passport *passport, Property property, Text *text);
-// Appends the first broken property and what was found. Returns false if none is broken.
+// Appends the first broken property and its description. Returns false if none is broken.
 bool passport_broken(const Passport *passport, Text *text);
-// Appends everything that is not sound, for a line of a report. Returns false if there is nothing.
+// Appends all properties that are not sound, for a line of a report. Returns false if all are sound.
 bool passports_abnormal(const Device *device, Text *text);

@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-// Leaves the modes in which a result may have been rounded.
+// Keeps only the rounding modes that yield the result.
 static void roundings_narrow(bool is_double, bool *modes, Exact exact, double result)
 {
     for (RoundingMode mode = 0; mode < ROUNDING_OTHER; mode++)
@@ -51,7 +51,8 @@ static void sums_measure(Measurement *measurement)
     }
 }
 
-// The sum of a product and its negative: its rounding error where contracted, which shows.
+// Measures whether products and sums are contracted. The sum of a product and its rounded negative is then
+// its rounding error.
 static void contraction_measure(Measurement *measurement)
 {
     Reals reals[OPERANDS_MAX];
@@ -71,8 +72,8 @@ static void contraction_measure(Measurement *measurement)
     }
 }
 
-// Returns whether real_fma of the kernel in use rounds once, also where the product nearly cancels, or the
-// addend is half an ulp of it, or far below.
+// Returns whether the current kernel's real_fma rounds once, even if the product nearly cancels, or the
+// addend is half an ulp of it or far below.
 static bool fma_is_exact(Measurement *measurement)
 {
     const bool is_double = measurement->is_double;
@@ -130,7 +131,7 @@ static bool same_value(double a, double b)
     return a == b || (isnan(a) && isnan(b));
 }
 
-// Runs the cases; returns for each what the probe returned, an integer for the first result of PROBE_COMPARE.
+// Runs the cases and sets `values` to the results. PROBE_COMPARE's first result is an integer.
 static void cases_run(Measurement *measurement, const Case *cases, size_t count, double *values)
 {
     for (size_t begin = 0, end; begin < count; begin = end) {
@@ -231,7 +232,7 @@ static void conversions_measure(Measurement *measurement)
     double reals[OPERANDS_MAX];
     int64_t integers[OPERANDS_MAX];
     for (size_t i = 0; i < OPERANDS_MAX; i++) {
-        // of any length, so that some are beyond the mantissa
+        // of any length, so that some exceed the mantissa
         const uint64_t bits = probe_random_bits(measurement) >> (64 - sign) >> (i % sign);
         integers[i] = i % 2 == 0 ? (int64_t)bits : -(int64_t)bits - 1;
         reals[i] = value_of(measurement, bits_of(measurement, ldexp(probe_random_real(measurement, 0),

@@ -3,6 +3,6 @@
 
 #include "host/opencl/passport.h"
 
-// Returns false if the device failed.
+// Measures the passport. Returns false if the device failed.
 bool passport_measure(Passport *passport, Compute *compute, PassportMode mode, uint32_t lanes,
                       bool is_thorough, bool no_cache);

@@ -22,8 +22,8 @@ ProgramRequest passport_request(const Device *device, PassportMode mode, uint32_
                             .no_cache = no_cache};
 }
 
-// The program is not stored: its passport is, and a driver that crashes when asked for a binary would spoil a
-// render that has not begun.
+// Releases the kernel and its program without storing the program. The passport is stored instead, and a
+// driver that crashes when asked for a binary would prevent the render.
 void probe_kernel_close(Measurement *measurement)
 {
     if (measurement->kernel) clReleaseKernel(measurement->kernel);
@@ -95,7 +95,7 @@ bool probe_run(Measurement *measurement, cl_uint probe, const Operands *operands
     return is_read;
 }
 
-// Sebastiano Vigna's splitmix64.
+// Implements Sebastiano Vigna's splitmix64.
 uint64_t probe_random_bits(Measurement *measurement)
 {
     uint64_t bits = measurement->random += 0x9e3779b97f4a7c15U;

@@ -1,5 +1,4 @@
-// Launches the probes of kernels/passport.cl, whose results the host judges: nothing that the device computes
-// is taken as exact.
+// Launches the probes of kernels/passport.cl. The host checks all results of the device.
 #pragma once
 
 #include "host/opencl/exact.h"
@@ -11,7 +10,7 @@ enum {
     RESULTS_MAX = 1 << 19 // of a launch
 };
 
-// Bits of reals or integers of the kernel's size.
+// The bits of reals or integers of the kernel's size.
 typedef struct {
     uint64_t a, b, c;
 } Operands;
@@ -42,14 +41,14 @@ typedef struct {
     double a, b, c;
 } Reals;
 
-// Returns the program of passport.cl for a mode and a width. The caller frees the prelude.
+// Returns the request of passport.cl's program for a mode and a width. The caller frees the prelude.
 ProgramRequest passport_request(const Device *device, PassportMode mode, uint32_t lanes, bool has_fma,
                                 bool no_cache, Text *prelude);
 
-// Builds the kernel, and launches it once, since a driver may finish the build only then.
+// Builds the kernel and launches it once, since a driver may finish the build only then.
 void probe_kernel_open(Measurement *measurement, bool has_fma);
 void probe_kernel_close(Measurement *measurement);
-// The buffers of operands and results; closing also frees the list of launches.
+// Open and close the buffers of operands and results. Closing also frees the list of launches.
 void probe_buffers_open(Measurement *measurement);
 void probe_buffers_close(Measurement *measurement);
 
@@ -62,10 +61,10 @@ bool probe_run(Measurement *measurement, cl_uint probe, const Operands *operands
                Results *results);
 
 uint64_t probe_random_bits(Measurement *measurement); // 64 random bits
-// Returns a random real of either sign, with an exponent of -span to span: a random mantissa, a short one,
-// whose product with another may lie halfway between two reals, or one near 1 or 2.
+// Returns a random real of either sign with an exponent of -span to span. Its mantissa is random, short, so
+// that a product may lie halfway between two reals, or near 1 or 2.
 double probe_random_real(Measurement *measurement, int span);
-// Makes OPERANDS_MAX pairs of random reals, for sums also such that cancel and such that end in half an ulp.
+// Makes OPERANDS_MAX pairs of random reals, some of whose sums cancel or end in half an ulp.
 void reals_make(Measurement *measurement, Reals *reals, Operands *operands);
 
 static inline size_t scalar_size(const Measurement *measurement)

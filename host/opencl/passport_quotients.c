@@ -8,7 +8,7 @@
 #include <pthread.h>
 #include <stdlib.h>
 
-// Numbers of mantissas.
+// Counts of mantissas.
 enum {
     SWEEP_MIN = 1 << 8, // of the first launch: Oclgrind interprets some hundred thousand operations a second
     QUICK_SWEEP = 1 << 14,  // of a sweep that is not thorough
@@ -16,7 +16,7 @@ enum {
     FLOAT_MANTISSAS = 1 << 23
 };
 
-// Quotients or roots to judge in several threads.
+// Quotients or roots that several threads check.
 typedef struct {
     const Measurement *measurement;
     RoundedResults *results;
@@ -75,8 +75,8 @@ static void sweep_classify(void *context, size_t begin, size_t end)
     pthread_mutex_unlock(&sweep->mutex);
 }
 
-// Sweeps the first `count` mantissas in turn, as many as fit before `deadline`, but QUICK_SWEEP even on a
-// busy machine. Returns whether all did.
+// Sweeps the first `count` mantissas in order until `deadline`, but at least QUICK_SWEEP of them. Returns
+// whether it swept all.
 static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint probe, double operand,
                       uint32_t count, double deadline)
 {
@@ -109,7 +109,7 @@ static bool sweep_run(Measurement *measurement, RoundedResults *results, cl_uint
     return done == count;
 }
 
-// Measures random operands, whose exponents differ.
+// Measures quotients and roots of random operands with different exponents.
 static void quotients_probe(Measurement *measurement)
 {
     Passport *passport = measurement->passport;
@@ -135,8 +135,8 @@ static void quotients_probe(Measurement *measurement)
     }
 }
 
-// In float the reciprocals and the roots of both binades are exhaustive. Quotients by what is next to 1 and
-// 2, and of it, lie near the midpoints of two floats.
+// Measures quotients and roots. In float, reciprocals and the roots of both binades are exhaustive.
+// Quotients with an operand next to 1 or 2 lie near the midpoints of two floats.
 void quotients_measure(Measurement *measurement)
 {
     Passport *passport = measurement->passport;

@@ -3,5 +3,5 @@
 
 #include "host/opencl/passport_probe.h"
 
-// Sets the passport's quotients and roots. Takes the rest of PASSPORT_SECONDS_MAX where it is thorough.
+// Sets the passport's quotients and roots. A thorough measurement uses the rest of PASSPORT_SECONDS_MAX.
 void quotients_measure(Measurement *measurement);

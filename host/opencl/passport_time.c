@@ -5,7 +5,7 @@
 enum { TIMED_ITEMS = 64, TIMED_ROUNDS_MAX = 1 << 26 };
 static const double timed_seconds_wanted = 2e-3;
 
-// Returns the least time by the host's clock that a chain takes in several launches.
+// Returns the least time of a chain over several launches by the host's clock.
 static double chain_seconds(Measurement *measurement, cl_uint probe, cl_uint rounds, int launches)
 {
     const cl_uint count = TIMED_ITEMS * measurement->passport->lanes;
@@ -20,7 +20,7 @@ typedef struct {
     double fused, separate;
 } ChainTimes;
 
-// Doubles the rounds until the slower chain seems to take `wanted` seconds more than an empty launch.
+// Doubles the rounds until the slower chain seems `wanted` seconds slower than an empty launch.
 static cl_uint rounds_find(Measurement *measurement, cl_uint rounds, double launch, double wanted)
 {
     for (; compute_ok(measurement->compute) && rounds < TIMED_ROUNDS_MAX; rounds *= 2) {
@@ -31,7 +31,7 @@ static cl_uint rounds_find(Measurement *measurement, cl_uint rounds, double laun
     return rounds;
 }
 
-// Times both chains in turn, longer where fma seems slow.
+// Times both chains in turn, with more turns if fma seems slow.
 static ChainTimes chains_time(Measurement *measurement, cl_uint rounds, double launch, double wanted)
 {
     enum { TURNS_MIN = 4, TURNS_MAX = 16 };
@@ -64,7 +64,7 @@ double fma_cost(Measurement *measurement)
         times = chains_time(measurement, rounds, launch, wanted);
     }
     measurement->timed_rounds = rounds;
-    const double separate_min = 0.01 * wanted; // what is less is the launches' noise
+    const double separate_min = 0.01 * wanted; // smaller times are noise of the launches
     return (times.fused - launch) / fmax(times.separate - launch, separate_min);
 }
 
@@ -78,8 +78,7 @@ static uint64_t greatest_divisor(uint64_t a, uint64_t b)
     return a;
 }
 
-// Returns the largest share of the host's seconds that an event has, among launches that are long enough for
-// that.
+// Returns the largest ratio of an event's time to the host's among launches that are long enough to compare.
 static double timer_ratio(const Measurement *measurement)
 {
     double ratio = 0;
@@ -93,7 +92,7 @@ static double timer_ratio(const Measurement *measurement)
 
 void timer_measure(Measurement *measurement)
 {
-    const double sure = 1e-6; // more than what a double loses of the nanoseconds since 1970
+    const double sure = 1e-6; // exceeds the rounding error of a double of the seconds since 1970
     TimerFindings *timer = &measurement->passport->timer;
     // on a busy machine the host may wait much longer than an event lasts, but hardly each time or for long
     // ones

@@ -1,12 +1,12 @@
-// Measures the cost of fma, and what a device's event timers do.
+// Measures the cost of fma and the behavior of a device's event timers.
 #pragma once
 
 #include "host/opencl/passport_probe.h"
 
-// Returns the time of fma over that of a product and a sum, without the time of an empty launch. Each is the
-// least of launches that take turns, with more of them where fma seems slow, which may be chance. Sets
-// timed_rounds.
+// Returns the ratio of fma's time to that of a product and a sum, each without the time of an empty launch.
+// Each time is the least of alternating launches, with more of them if fma seems slow, which may be chance.
+// Sets timed_rounds.
 double fma_cost(Measurement *measurement);
 
-// Sets the passport's timer, from all launches so far and some more. Requires fma_cost.
+// Sets the passport's timer from all launches so far and some more. Call fma_cost first.
 void timer_measure(Measurement *measurement);

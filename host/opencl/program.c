@@ -1,4 +1,4 @@
-// Programs: composed, then loaded from the cache or built.
+// Composes programs and loads them from the cache or builds them.
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
@@ -25,8 +25,8 @@ void program_options_append(Text *text, const Device *device, const char *option
     if (device->build_options) text_appendf(text, " %s", device->build_options);
 }
 
-// Returns a key of all that the compiled program depends on. The native width distinguishes processors of the
-// same name. The caller frees it.
+// Returns a key of everything that the compiled program depends on. The native width distinguishes
+// processors of the same name. The caller frees it.
 static char *request_key(const Device *device, const ProgramRequest *request, const char *text)
 {
     Text key = {0};
@@ -61,8 +61,8 @@ static char *build_log(const Compute *compute, cl_program program)
     return log;
 }
 
-// Saves the text for the reader of the build log. The caller frees the path, or what replaces it in a
-// message.
+// Saves the text for readers of the build log. Returns its path, or a replacement for messages. The caller
+// frees it.
 static char *save_text(const char *text)
 {
     char path[4096];
@@ -75,7 +75,7 @@ static char *save_text(const char *text)
     return memory_copy_text(written ? path : "could not be saved");
 }
 
-// Describes the disk where drivers keep what they compile: PoCL's variable, then the XDG Base Directory
+// Describes the disk of the drivers' caches, found by PoCL's variable, then by the XDG Base Directory
 // Specification.
 static void describe_cache_disk(Text *text)
 {
@@ -90,7 +90,7 @@ static void describe_cache_disk(Text *text)
                      free_kibi);
 }
 
-// A build and, where one is requested, its kernel.
+// A build and its kernel if one is requested.
 typedef struct {
     cl_program program;
     cl_kernel kernel;
@@ -114,7 +114,7 @@ static bool build_check(Build *build, const char *call, cl_int status, bool is_t
     return false;
 }
 
-// Releases the build.
+// Records a failed build as the Compute's failure and releases it.
 static void build_report(Compute *compute, Build *build, const char *text, const char *options)
 {
     if (build->program && strcmp(build->failed_call, "clBuildProgram") == 0) {
@@ -135,7 +135,7 @@ static void build_report(Compute *compute, Build *build, const char *text, const
     build_release(build);
 }
 
-// Adds an option that was never used before, which makes PoCL build: its cache has the options in its key.
+// Adds a unique option, which makes PoCL build, because the key of its cache contains the options.
 static void append_unused_option(Text *options)
 {
     struct timespec now;
@@ -152,9 +152,8 @@ static void kernel_create(Build *build, const char *name)
     build_check(build, "clCreateKernel", status, build->kernel);
 }
 
-// Writes `contents` to a file of the device's kernel folder that is named by the hash of the kernel's text,
-// unless the mode is "wx" and the file exists. A file that cannot be written is only reported, since no
-// result depends on it.
+// Writes `contents` to a file of the device's kernel folder named by the hash of the kernel's text, unless
+// the mode is "wx" and the file exists. Only warns on failure, since no result depends on it.
 static void kernel_file_write(const Device *device, const char *text, const char *ending, const char *mode,
                               const char *contents)
 {
@@ -184,7 +183,7 @@ static void build_log_keep(const Compute *compute, cl_program program, const cha
     text_free(&entry);
 }
 
-// Builds `text`, which a driver that has a cache builds again if `afresh`.
+// Builds `text`. If `afresh` is set, bypasses the driver's cache.
 static Build build_from_source(Compute *compute, const char *text, const ProgramRequest *request, bool afresh)
 {
     Build build = {0};
@@ -207,8 +206,8 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     return build;
 }
 
-// Builds the program. Processes that build the same one at once can fail in PoCL's cache (3.1: one removes
-// the file that another reads), so a build counts as failed only if it also fails outside that cache.
+// Builds the program. Simultaneous builds of the same one can fail in PoCL's cache (3.1: one removes the
+// file that another reads), so a build counts as failed only if it also fails outside that cache.
 static Build build_with_retry(Compute *compute, const char *text, const ProgramRequest *request)
 {
     Build build = {0};
@@ -220,7 +219,7 @@ static Build build_with_retry(Compute *compute, const char *text, const ProgramR
     return build_from_source(compute, text, request, true);
 }
 
-// Loads a binary. Leaves no program if the driver refuses it.
+// Loads a binary. The build has no program if the driver rejects the binary.
 static Build build_from_binary(const Compute *compute, const Text *binary, const ProgramRequest *request)
 {
     Build build = {0};
@@ -262,7 +261,7 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
          *easy_text = request->easy_prelude ? program_text(request->root, request->easy_prelude) : NULL;
     Build build = build_from_cache(compute, request, text);
     if (!build.program) {
-        // it is there where the text itself could not be built
+        // the cache has it if the normal text could not be built
         build = build_from_cache(compute, request, easy_text);
         program->is_easy = build.program != NULL;
     }

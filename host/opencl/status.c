@@ -1,4 +1,4 @@
-// OpenCL's status codes by name.
+// Names OpenCL's status codes.
 #include "host/base/array.h"
 #include "host/opencl/device.h"
 #include <CL/cl_ext.h>

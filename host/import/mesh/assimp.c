@@ -1,6 +1,6 @@
-// Meshes by assimp, without its post-processing: joining vertices and generating normals there use absolute
-// distances, which distorts small meshes; its triangulation reads missing vertices and drops parts of concave
-// polygons.
+// Reads meshes through assimp without its post-processing. Its vertex joining and normal generation use
+// absolute distances, which distorts small meshes. Its triangulation reads missing vertices and drops parts
+// of concave polygons.
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
@@ -14,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// A material. Meshes that have its set of texture coordinates show its texture.
+// A material of the file. Only meshes that have its set of texture coordinates show its texture.
 typedef struct {
     uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
     uint32_t texture;        // of the scene; 0: none
@@ -22,7 +22,7 @@ typedef struct {
     struct aiUVTransform uv_transform;
 } ImportedMaterial;
 
-// What glint does not show. Each gets one warning.
+// Features that glint does not show. Each causes one warning.
 enum {
     LOSES_SKINS,
     LOSES_MORPHS,
@@ -77,7 +77,7 @@ static void warn_default(const Importer *importer, const struct aiMaterial *mate
                name.data);
 }
 
-// Key, type and index: what assimp's AI_MATKEY_… expand to.
+// Returns a material's color, or `otherwise`. assimp's AI_MATKEY_… macros expand to key, type and index.
 static Color color_of(const Importer *importer, const struct aiMaterial *material, const char *key,
                       unsigned type, unsigned index, Color otherwise)
 {
@@ -99,7 +99,7 @@ static double number_of(const Importer *importer, const struct aiMaterial *mater
     return otherwise;
 }
 
-// Returns the image within the file that has a name, or NULL.
+// Returns the image embedded in the file under the name, or NULL.
 static const struct aiTexture *embedded_texture(const struct aiScene *file, const char *name)
 {
     if (name[0] == '*') {
@@ -117,7 +117,7 @@ static uint32_t texture_add(const Importer *importer, const char *name, const ch
     MeshDraft *draft = importer->draft;
     const struct aiTexture *embedded = embedded_texture(importer->file, name);
     if (embedded) {
-        // glint reads no image that is not compressed
+        // glint reads only compressed images
         const Source bytes = {.bytes = (const char *)embedded->pcData,
                               .length = embedded->mHeight == 0 ? embedded->mWidth : 0};
         return draft_add_embedded_texture(draft, &bytes, TEXTURE_COLORS, name);
@@ -137,7 +137,7 @@ static TextureWrap wrap_of(enum aiTextureMapMode mode)
                                              : TEXTURE_REPEATED;
 }
 
-// Reads the texture of the color, and warns about all others.
+// Reads the color texture and warns about all other textures.
 static void textures_read(Importer *importer, const struct aiMaterial *from, const char *name,
                           ImportedMaterial *to, TextureWrap wraps[2])
 {
@@ -163,14 +163,14 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
     to->texture = texture_add(importer, path.data, name);
 }
 
-// glint's highlights have the light's color; only the strength of the file's specular color is kept.
+// Converts a material. Keeps only its specular strength, because glint's highlights have the light's color.
 static Material material_of(Importer *importer, const struct aiMaterial *from)
 {
     Material material = material_default();
     const Color specular = color_of(importer, from, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
     material.emission = color_of(importer, from, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
     material.color = color_of(importer, from, AI_MATKEY_COLOR_DIFFUSE, material.color);
-    // assimp gives Lambertian materials a specular color, which they do not have
+    // assimp sets a specular color even for Lambertian materials, which have none
     int shading = aiShadingMode_Phong;
     aiGetMaterialIntegerArray(from, AI_MATKEY_SHADING_MODEL, &shading, NULL);
     if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
@@ -236,7 +236,7 @@ static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affi
     }
 }
 
-// Tested before the node's transform, whose rounding could give a degenerate triangle an area.
+// Returns false for a triangle without an area before the node's transform, whose rounding could create one.
 static bool face_has_area(const struct aiMesh *mesh, const struct aiFace *face)
 {
     if (face->mNumIndices != 3) return true;
@@ -291,7 +291,7 @@ static bool mesh_add(Importer *importer, const struct aiMesh *from, const Affine
     return true;
 }
 
-// Adds the cameras and lights that have the node's name, which are in its space.
+// Adds the cameras and lights that have the node's name. They lie in the node's space.
 static void view_add(Importer *importer, const struct aiNode *node, const Affine *affine)
 {
     const struct aiScene *file = importer->file;

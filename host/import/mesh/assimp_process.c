@@ -27,7 +27,7 @@ typedef struct {
     uint64_t counts[6]; // of the arrays
 } ReplyHeader;
 
-// The bytes of an image within the file follow.
+// Describes a texture. The bytes of an image embedded in the file follow.
 typedef struct {
     char path[1024];
     uint64_t byte_count;
@@ -76,13 +76,13 @@ static void limit(__rlimit_resource_t resource, rlim_t most)
 
 void assimp_process_limit(void)
 {
-#ifndef __SANITIZE_ADDRESS__ // whose shadow is larger
+#ifndef __SANITIZE_ADDRESS__ // its shadow memory exceeds the limit
     limit(RLIMIT_AS, (rlim_t)ASSIMP_MEBIBYTES_MAX << 20);
 #endif
     limit(RLIMIT_CPU, ASSIMP_PROCESSOR_SECONDS_MAX);
     limit(RLIMIT_CORE, 0);
     alarm(ASSIMP_SECONDS_MAX);
-    // a terminal's go to the parent too, which ends this process when it ends
+    // a terminal also signals the parent, which ends this process when it ends
     signal(SIGINT, SIG_IGN);
     signal(SIGHUP, SIG_IGN);
     prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -178,7 +178,7 @@ int assimp_process_main(int argument_count, char **arguments)
     const bool is_read = assimp_read(&draft);
     report_close(&report);
     reply_write(reply, &draft, is_read);
-    // what assimp's destructors would still do is of no use
+    // assimp's destructors are not needed
     _exit(fflush(reply) == 0 ? EXIT_SUCCESS : EXIT_FAILURE);
 }
 
@@ -207,7 +207,7 @@ static bool color_is_sound(Color color)
     return number_is_sound(color.x) && number_is_sound(color.y) && number_is_sound(color.z);
 }
 
-// Sets `textures` to the scene's index of each. Memory grows with what arrives.
+// Sets `textures` to the scene's index of each texture. Memory grows only with the bytes that arrive.
 static bool textures_read(MeshDraft *draft, FILE *reply, uint64_t count,
                           uint32_t textures[SCENE_TEXTURES_MAX])
 {
@@ -269,7 +269,7 @@ static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count, const 
     return true;
 }
 
-// mesh_scene.c checks them.
+// Reads the camera and the lights, whose values mesh_scene.c checks.
 static bool view_read(MeshDraft *draft, FILE *reply, const ReplyHeader *header)
 {
     MeshView *view = draft->import->view;
@@ -287,7 +287,7 @@ static bool view_read(MeshDraft *draft, FILE *reply, const ReplyHeader *header)
     return true;
 }
 
-// Memory grows with what arrives.
+// Reads the arrays. Memory grows only with the bytes that arrive.
 static bool arrays_read(MeshDraft *draft, FILE *reply, const uint64_t counts[6])
 {
     enum { CHUNK = 1 << 16 };
@@ -309,7 +309,7 @@ static bool arrays_read(MeshDraft *draft, FILE *reply, const uint64_t counts[6])
     return true;
 }
 
-// Each follows the one before, and whole triangles lie between them.
+// Returns whether the polygons are in order, within the corners, and separated by whole triangles.
 static bool polygons_are_sound(const MeshDraft *draft)
 {
     const size_t corner_count = draft->corners[DRAFT_POSITION].count;
@@ -372,7 +372,7 @@ bool assimp_reply_read(MeshDraft *draft, FILE *reply, bool *read)
     return true;
 }
 
-// Starts the process. Returns an error of errno, or 0 and its end of the pipe.
+// Starts the process. Returns 0 and sets *reply to the reading end of the pipe, or returns an errno value.
 static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
 {
     char *arguments[] = {"glint", (char *)command, (char *)draft->import->path,
@@ -393,7 +393,7 @@ static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
         sigaddset(&defaults, ending[i]);
     posix_spawn_file_actions_init(&actions);
     posix_spawnattr_init(&attributes);
-    // first: the pipe has one of the standard descriptors where that was closed
+    // first, because the pipe may have a standard descriptor that was closed
     posix_spawn_file_actions_adddup2(&actions, ends[1], REPLY_DESCRIPTOR);
     posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);

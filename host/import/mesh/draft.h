@@ -5,7 +5,7 @@
 #include "host/base/array.h"
 #include "host/import/mesh/mesh_import.h"
 
-// The index of a corner that has no normal, or no texture coordinates.
+// Marks a corner without a normal or without texture coordinates.
 #define DRAFT_NONE UINT32_MAX
 
 typedef enum { DRAFT_POSITION, DRAFT_UV, DRAFT_NORMAL, DRAFT_PART_COUNT } DraftPart;
@@ -15,7 +15,7 @@ typedef struct {
     size_t count, capacity;
 } DraftIndices;
 
-// From this corner on, triangles have this material.
+// The material of all triangles from a corner on.
 typedef struct {
     size_t first_corner;
     uint32_t material; // of the scene
@@ -28,12 +28,12 @@ typedef struct {
     size_t first_corner, corner_count;
 } DraftPolygon;
 
-// An index, and the offset at which the file has it.
+// An index and its offset in the file.
 typedef struct {
     size_t index, offset;
 } DraftPlace;
 
-// What messages name: the lines of a text, the bytes of a binary file, or neither.
+// The places that messages name, which are the lines of a text, the bytes of a binary file, or none.
 typedef enum { DRAFT_LINES, DRAFT_BYTES, DRAFT_NO_PLACES } DraftPlaces;
 
 typedef struct {
@@ -52,8 +52,8 @@ typedef struct {
         double (*items)[2];
         size_t count, capacity;
     } uvs;
-    // The corners of all faces: for each part one index. None for a part that no corner has, or whose indices
-    // are those of the positions, of which each has one then.
+    // One index per part for each corner of all faces. The list is empty for a part that no corner has, or
+    // that shares the indices of the positions and has one value for each of them.
     DraftIndices corners[DRAFT_PART_COUNT];
     bool is_shared[DRAFT_PART_COUNT];
     struct {
@@ -64,15 +64,15 @@ typedef struct {
         DraftMaterialRun *items;
         size_t count, capacity;
     } materials;
-    // Positions that are not numbers, which is an error only where a face uses them.
+    // Positions that are not numbers. They are an error only if a face uses them.
     struct {
         DraftPlace *items;
         size_t count, capacity;
     } unread;
-    // For each part one more than the largest index that a corner names before the file has that position, uv
-    // or normal. draft_check compares it with the final number.
+    // One more than the largest index per part that a corner names before the file defines it. draft_check
+    // compares it with the final count.
     DraftPlace needed[DRAFT_PART_COUNT];
-    size_t first_index;   // from which the file counts them, for messages: 0 or 1
+    size_t first_index;   // the first index in the file, 0 or 1, for messages
     size_t face_start;    // the first corner of the face that is being added
     size_t crossed_count; // polygons that cross themselves, for a warning
 } MeshDraft;
@@ -82,20 +82,20 @@ extern const char *const draft_part_names[DRAFT_PART_COUNT];
 // Reports an error at an offset of the file and returns false.
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Report an error or a warning about the whole file, at its name in the scene. The first returns false.
+// Reports an error or a warning about the whole file at its name in the scene. draft_refuse returns false.
 bool draft_refuse(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 void draft_warn(MeshDraft *draft, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 size_t draft_part_count(const MeshDraft *draft, DraftPart part);
-// Sets a part in all corners from this one on, and in none before.
+// Starts a part's list, with DRAFT_NONE for all corners before `corner`.
 void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
 void draft_record_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
-// Makes the part share the indices of the positions, and gives each of the first `count` positions that lacks
-// one a value of 0. A reader calls it before it adds values and after the last position.
+// Makes the part share the indices of the positions, and adds a value of 0 for each of the first `count`
+// positions that has none. A reader calls it before it adds values and after the last position.
 void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
 
-// Drops the indices of texture coordinates and normals that the file lacks, with a warning. A part is gone if
-// no index of it remains.
+// Drops the indices of texture coordinates and normals that the file lacks, with a warning. Removes a part
+// that has no remaining index.
 void draft_drop_missing(MeshDraft *draft);
 
 // Adds the index of the next corner, position first; `offset` is its place in the file. An index that the
@@ -119,12 +119,12 @@ static inline bool draft_has(const MeshDraft *draft, DraftPart part)
     return draft->is_shared[part] || draft->corners[part].count > 0;
 }
 
-// Returns the path of a file that the file `from` names, relative to its folder. Files often hold paths of
-// another machine: if only a file of that name next to `from` exists, returns its path
-// and sets *is_moved. The caller frees it.
+// Returns the path of a file that the file `from` names relative to its folder. Files often hold paths of
+// another machine. If only a file of that name in the folder of `from` exists, returns its path and sets
+// *is_moved. The caller frees it.
 char *draft_find_file(const char *from, const char *name, size_t length, bool *is_moved);
 
-// Returns what is used in place of a texture, for messages.
+// Describes the replacement of a missing texture, for messages.
 const char *texture_fallback(TextureContent content);
 
 // Adds an image to the scene's textures, from a file or from bytes, which are copied. Returns 0 with a
@@ -133,21 +133,21 @@ uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent co
 uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, TextureContent content,
                                     const char *owner);
 
-// Ends the face at the corners since the last one; points and lines are skipped. Returns false if there are
-// too many corners.
+// Ends the face, which consists of the corners since the last face. Skips points and lines. Returns false if
+// there are too many corners.
 bool draft_end_face(MeshDraft *draft, size_t offset);
 
 // Checks the draft. Returns false with an error if a face has corners that are missing or not numbers, or if
 // there are no triangles or too many.
 bool draft_check(MeshDraft *draft);
-// Turns a checked draft into a mesh in the world and uses up its arrays.
+// Turns a checked draft into a mesh in the world and consumes its arrays.
 void draft_finish(MeshDraft *draft, Mesh *mesh);
 void draft_free(MeshDraft *draft);
 
-// The readers return false with an error.
+// Each of these readers returns false with an error on failure.
 bool obj_read(MeshDraft *draft);
 bool ply_read(MeshDraft *draft);
 bool stl_read(MeshDraft *draft);
 bool gltf_read(MeshDraft *draft);
-// Reads a file by assimp.
+// Reads a file with assimp in a separate process.
 bool assimp_process_read(MeshDraft *draft);

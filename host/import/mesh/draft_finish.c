@@ -1,5 +1,5 @@
-// Turns a draft into a mesh: checked, its polygons cut into triangles, placed in the world, with one vertex
-// for each combination of position, normal and texture coordinates.
+// Turns a draft into a mesh. Checks it, cuts its polygons into triangles, places it in the world and makes
+// one vertex for each combination of position, normal and texture coordinates.
 #include "host/base/memory.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/scan.h"
@@ -12,7 +12,7 @@
 
 enum { TRIANGLES_MAX = 1 << 28 };
 
-// Cutting a polygon takes time with the square of its corners: some 30 s for this sum.
+// Cutting a polygon takes time proportional to the square of its corners, some 30 s for this sum.
 static const size_t squared_corners_max = (size_t)1 << 31;
 
 static bool indices_are_sound(MeshDraft *draft)
@@ -52,7 +52,7 @@ static bool position_fails(MeshDraft *draft, uint32_t position)
                        word_shown(word), word.text, NUMBER_MAX);
 }
 
-// Vertices that no face has are not checked.
+// Checks the positions that faces use.
 static bool positions_are_sound(MeshDraft *draft)
 {
     bool all = true;
@@ -65,7 +65,7 @@ static bool positions_are_sound(MeshDraft *draft)
     return true;
 }
 
-// Replaces texture coordinates that are not numbers by 0, and such normals by no normal.
+// Replaces texture coordinates that are not numbers with 0 and removes normals that are not numbers.
 static void parts_repair(MeshDraft *draft)
 {
     size_t uv_count = 0, normal_count = 0;
@@ -86,11 +86,11 @@ static void parts_repair(MeshDraft *draft)
         draft_warn(draft, "normals that are not finite or too large, not used: %zu", normal_count);
 }
 
-// The corners of triangles alone.
+// Collects the corners after polygons are cut into triangles.
 typedef struct {
     MeshDraft *draft;
     DraftIndices corners[DRAFT_PART_COUNT];
-    size_t run; // of materials, that comes next
+    size_t run; // the next one of the materials
     struct {
         Vector3 *items;
         size_t count, capacity;
@@ -105,8 +105,8 @@ static void corner_copy(Cutter *cutter, size_t corner)
             array_push(cutter->corners[part], cutter->draft->corners[part].items[corner]);
 }
 
-// Copies the corners of triangles, from one up to another, behind which no polygon's corners are: the runs
-// of materials that begin there move as far.
+// Copies a range of corners that belong to triangles, and shifts the runs of materials that begin there by
+// the same amount.
 static void triangles_copy(Cutter *cutter, size_t first, size_t end)
 {
     const size_t shift = cutter->corners[DRAFT_POSITION].count - first;
@@ -125,8 +125,8 @@ static void triangles_copy(Cutter *cutter, size_t first, size_t end)
     }
 }
 
-// Triangulated from the second corner, so that a convex quadrilateral is cut as a fan cuts it: by the
-// diagonal from the first. A polygon without area becomes a fan.
+// Triangulates a polygon from its second corner, so that a convex quadrilateral is cut by the diagonal from
+// its first corner, as in a fan. A polygon without area becomes a fan.
 static void polygon_cut(Cutter *cutter, size_t first, size_t count)
 {
     const MeshDraft *draft = cutter->draft;
@@ -167,15 +167,15 @@ static void polygons_cut(MeshDraft *draft)
     free(cutter.cut.items);
 }
 
-// Tested before the transform, whose rounding could give a degenerate triangle an area.
+// Returns whether a triangle has an area before the transform, whose rounding could create one.
 static bool corners_have_area(const MeshDraft *draft, const uint32_t *corners)
 {
     const Vector3 *positions = draft->positions.items;
     return triangle_has_area(positions[corners[0]], positions[corners[1]], positions[corners[2]]);
 }
 
-// A mirroring transform inverts the winding; inverting it back keeps the triangles' outer side. Degenerate
-// triangles collapse to a point, which no ray hits.
+// Reverses the winding after a mirroring transform, which keeps the triangles' outer side. Collapses
+// degenerate triangles to a point, which no ray hits.
 static void triangles_orient(MeshDraft *draft, bool mirrored)
 {
     const DraftIndices *positions = &draft->corners[DRAFT_POSITION];
@@ -203,14 +203,14 @@ static void vectors_transform(MeshDraft *draft, const Affine *affine)
     }
 }
 
-// A vertex of the mesh in the list of those with one position.
+// A vertex of the mesh in a linked list of all vertices with the same position.
 typedef struct {
     uint32_t uv, normal, next;
 } Combination;
 
 typedef struct {
     MeshDraft *draft;
-    uint32_t *first; // of each position, DRAFT_NONE: not yet
+    uint32_t *first; // vertex of each position; DRAFT_NONE: none yet
     struct {
         Combination *items;
         size_t count, capacity;
@@ -250,8 +250,8 @@ static uint32_t combination_add(Combiner *combiner, uint32_t position, Combinati
     return index;
 }
 
-// A position may have many combinations in a hostile file: only the latest are compared, mesh_join_vertices
-// finds the rest.
+// Returns the vertex of a corner. Compares only the latest combinations, because a position may have many in
+// a hostile file; mesh_join_vertices joins the remainder.
 static uint32_t vertex_of_corner(Combiner *combiner, size_t corner)
 {
     enum { COMPARED_MAX = 64 };
@@ -268,7 +268,7 @@ static uint32_t vertex_of_corner(Combiner *combiner, size_t corner)
     return combiner->first[position] = combination_add(combiner, position, wanted);
 }
 
-// Where all parts have the indices of the positions, those are the vertices.
+// Combines the corners into vertices. Uses the positions as vertices if all parts share their indices.
 static void corners_combine(MeshDraft *draft, Mesh *mesh)
 {
     DraftIndices *corners = &draft->corners[DRAFT_POSITION];

@@ -1,4 +1,4 @@
-// glTF: the JSON text, its values, and the warnings about what is not shown.
+// Reads the JSON text of glTF and its values, and warns of features that are not shown.
 #include "host/import/mesh/gltf.h"
 #include "host/base/array.h"
 #include "host/base/memory.h"
@@ -222,7 +222,7 @@ static bool json_read(Gltf *gltf, const char *text, size_t length, size_t offset
     if (length > JSON_BYTES_MAX)
         return draft_refuse(gltf->draft, "a JSON text of %zu bytes; %d is the most", length, JSON_BYTES_MAX);
     gltf->root = json_loadb(text, length, JSON_REJECT_DUPLICATES, &error);
-    // the position is behind the word that is wrong
+    // the position is past the faulty word
     const size_t position = error.position > 0 ? (size_t)error.position - 1 : 0;
     if (!gltf->root) return draft_fails(gltf->draft, offset + position, "%s", error.text);
     return json_is_object(gltf->root) || draft_fails(gltf->draft, offset, "not a JSON object");
@@ -234,8 +234,8 @@ static uint32_t word_at(const char *bytes)
     return (uint32_t)byte[0] | (uint32_t)byte[1] << 8 | (uint32_t)byte[2] << 16 | (uint32_t)byte[3] << 24;
 }
 
-// A GLB file has a header of 12 bytes and then chunks of a length, a type and bytes: JSON first, then an
-// optional BIN.
+// Reads a GLB file, which has a header of 12 bytes and then chunks of a length, a type and bytes. The first
+// chunk is JSON and the optional second one BIN.
 static bool glb_read(Gltf *gltf, const Source *source)
 {
     enum { HEADER_BYTES = 12, CHUNK_BYTES = 8, CHUNK_JSON = 0x4E4F534A, CHUNK_BINARY = 0x004E4942 };

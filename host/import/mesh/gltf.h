@@ -1,5 +1,5 @@
-// A glTF 2.0 file being read (Khronos Group, glTF 2.0 Specification, 2021), .gltf or .glb. Its JSON is read
-// by jansson; what glint makes of each member is written here.
+// Reads glTF 2.0 files, .gltf or .glb (Khronos Group, glTF 2.0 Specification, 2021). jansson parses the JSON
+// and glint interprets its members.
 #pragma once
 
 #include "host/import/mesh/draft.h"
@@ -7,7 +7,7 @@
 
 #include <jansson.h>
 
-// A value of the JSON text, which is NULL where it is missing, and its path for messages: "nodes[3].mesh".
+// A value of the JSON text, NULL if it is missing, and its path for messages, such as "nodes[3].mesh".
 typedef struct {
     const json_t *json;
     char path[112];
@@ -22,7 +22,7 @@ typedef struct {
 
 enum { UV_SETS_MAX = 255 };
 
-// Where a material's texture lies.
+// A material's texture and its mapping.
 typedef struct {
     uint32_t number; // of the scene; 0: none
     size_t uv_set;
@@ -30,7 +30,7 @@ typedef struct {
     TextureWrap wraps[2]; // along u and v
 } GltfTexture;
 
-// A material. Primitives that have its set of texture coordinates show its texture.
+// A material of the file. Only primitives that have its set of texture coordinates show its texture.
 typedef struct {
     Material look;
     bool is_read;
@@ -40,7 +40,7 @@ typedef struct {
     uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
 } GltfMaterial;
 
-// What glint does not show. Each gets one warning, which names the first place in the file.
+// Features that glint does not show. Each causes one warning, which names the first place in the file.
 typedef enum {
     GLTF_SKIN,
     GLTF_MORPH,
@@ -67,7 +67,7 @@ typedef enum {
 typedef struct {
     MeshDraft *draft;
     json_t *root;
-    GltfBuffer binary;   // GLB's
+    GltfBuffer binary;   // the BIN chunk of a GLB file
     GltfBuffer *buffers; // one for each of the file's; not read yet where `bytes` is NULL
     size_t buffer_count;
     size_t byte_count, element_count; // of the buffers, and of the accessors as often as they are read
@@ -86,7 +86,7 @@ void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
 // Warns about a loss the first time that it occurs.
 void gltf_lose(Gltf *gltf, GltfLoss loss, const GltfItem *item);
 
-// Return a member of an object and an element of an array.
+// Returns a member of an object or an element of an array.
 GltfItem gltf_member(const GltfItem *item, const char *key);
 GltfItem gltf_element(const GltfItem *item, size_t index);
 // Returns an element of one of the file's arrays, such as "nodes".
@@ -95,25 +95,25 @@ size_t gltf_count(const Gltf *gltf, const char *array);
 // Returns an extension of the item.
 GltfItem gltf_extension(const GltfItem *item, const char *name);
 
-// These read a member. A missing one leaves the value unchanged. Each returns false with an error where the
-// member is something else.
+// Each of these reads a member and leaves the value unchanged if it is missing. Returns false with an error
+// if the member has another type or is out of range.
 bool gltf_integer(Gltf *gltf, const GltfItem *item, const char *key, size_t low, size_t high, size_t *value);
 // Reads an index into one of the file's arrays.
 bool gltf_index(Gltf *gltf, const GltfItem *item, const char *key, const char *array, size_t *index);
 // Reads an element of an array that is an index into one of the file's arrays. A missing element is an error.
 bool gltf_element_index(Gltf *gltf, const GltfItem *list, size_t element, const char *array, size_t *index);
-// Reads one number where `count` is 1, else an array of `count` numbers, each of at most NUMBER_MAX.
+// Reads one number if `count` is 1, else an array of `count` numbers. Magnitudes are at most NUMBER_MAX.
 bool gltf_numbers(Gltf *gltf, const GltfItem *item, const char *key, size_t count, double *values);
 
 // gltf_structure.c
 
-// Checks that the members that glint reads have the JSON types of the format. Warns about those that it can
-// do without, which read as missing. Returns false with an error about another.
+// Checks that the members that glint reads have the JSON types of the format. Warns about an optional member
+// of another type, which then reads as missing. Returns false with an error about a required one.
 bool gltf_structure_check(Gltf *gltf);
 
 // gltf_accessor.c
 
-// Rows of `width` numbers each.
+// Numbers in rows of `width`.
 typedef struct {
     double *items;
     size_t count, width;
@@ -133,9 +133,9 @@ char *gltf_path(Gltf *gltf, const GltfItem *uri);
 
 // gltf_material.c
 
-// Returns the primitive's material, or the default where it names none or a missing one.
+// Returns the primitive's material, or the default if it names none or a missing one.
 GltfMaterial *gltf_material(Gltf *gltf, const GltfItem *primitive);
-// Returns the material's index in the scene, to which it is added on its first use.
+// Returns the material's index in the scene. Adds the material on its first use.
 uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_textured);
 
 // gltf_node.c

@@ -1,5 +1,5 @@
-// glTF: buffers, views of them and accessors. Whatever the file claims, nothing outside a buffer is read, and
-// memory grows with what the buffers have.
+// Reads glTF's buffers, buffer views and accessors. Whatever the file claims, nothing outside a buffer is
+// read, and memory grows only with the size of the buffers.
 #include "host/base/base64.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
@@ -9,11 +9,11 @@
 #include <string.h>
 #include <sys/stat.h>
 
-// The largest length and offset that a file may have. The sum of three fits a size_t.
+// Bounds the lengths and offsets of a file. The sum of three fits a size_t.
 static const size_t size_max = SIZE_MAX >> 2;
 
-// Numbers that accessors may have beyond the bytes of the buffers: accessors may overlap, have no buffer, or
-// be of a mesh that stands at many nodes.
+// Bounds the numbers of accessors beyond the bytes of the buffers. Accessors may overlap, have no buffer, or
+// belong to a mesh that many nodes use.
 enum { ELEMENTS_MAX = 1 << 26 };
 
 static int hex_digit(char character)
@@ -23,7 +23,7 @@ static int hex_digit(char character)
     return letter >= 'a' && letter <= 'f' ? letter - 'a' + 10 : -1;
 }
 
-// Decodes %xx (RFC 3986, Uniform Resource Identifier, 2005, section 2.1); other text stays.
+// Decodes %xx (RFC 3986, Uniform Resource Identifier, 2005, section 2.1) and keeps other text.
 static void percent_decode(Text *bytes, const char *text)
 {
     for (const char *at = text; *at; at++) {
@@ -56,7 +56,7 @@ char *gltf_path(Gltf *gltf, const GltfItem *uri)
     const bool is_file = strncmp(text, file_scheme, sizeof file_scheme - 1) == 0;
     if (is_file) text += sizeof file_scheme - 1;
     const size_t scheme = strspn(text, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
-    // one letter is a drive
+    // a scheme of one letter is a drive
     if (text[0] == '\0' || (scheme != 1 && text[scheme] == ':')) return NULL;
     Text name = {0};
     percent_decode(&name, text);
@@ -70,7 +70,7 @@ char *gltf_path(Gltf *gltf, const GltfItem *uri)
     return path;
 }
 
-// Reads the buffer's file, or shares the bytes of another buffer that has it.
+// Reads the buffer's file, or shares the bytes of another buffer with the same file.
 static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri)
 {
     char *path = gltf_path(gltf, uri);
@@ -118,7 +118,7 @@ static bool buffer_read(Gltf *gltf, const GltfItem *item, GltfBuffer *buffer, bo
     return true;
 }
 
-// Returns the buffer, which is read on its first use, or NULL with an error.
+// Returns the buffer, or NULL with an error. Reads it on its first use.
 static const GltfBuffer *buffer_open(Gltf *gltf, size_t index)
 {
     GltfBuffer *buffer = &gltf->buffers[index], read = {0};
@@ -169,7 +169,7 @@ static size_t component_size(size_t type)
     return type >= GLTF_INT8 && type <= GLTF_FLOAT ? sizes[type - GLTF_INT8] : 0;
 }
 
-// Reads a component. A normalized integer stands for -1 or 0 to 1.
+// Reads a component. A normalized integer becomes a value from -1 or 0 to 1.
 static double component_read(const char *bytes, size_t type, bool is_normalized)
 {
     int8_t int8;

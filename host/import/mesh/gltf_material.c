@@ -1,5 +1,4 @@
-// glTF: materials of metal and roughness, as far as glint's have it (docs/scene-format.md), and their
-// textures.
+// Converts glTF's metallic-roughness materials to glint's (docs/scene-format.md) and reads their textures.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/gltf.h"
@@ -20,7 +19,7 @@ typedef struct {
 // A writer's float may round 1 up.
 static const Range range_factor = {-1e-6, 1 + 1e-6, false, "from 0 to 1"};
 
-// Reads a member of up to 4 numbers. It leaves the defaults, with a warning, where one is beyond the range.
+// Reads a member of up to 4 numbers. Warns and keeps the defaults if one is out of range.
 static void factors_read(Gltf *gltf, const GltfItem *item, const char *key, size_t count, const Range *range,
                          double *values)
 {
@@ -128,9 +127,9 @@ static void sampler_read(Gltf *gltf, const GltfItem *texture, GltfTexture *place
     if (json_integer_value(filter.json) == NEAREST) gltf_lose(gltf, GLTF_NEAREST, &filter);
 }
 
-// KHR_texture_transform: scales, turns counterclockwise as the image is seen, with v downward, and moves. The
-// GLSL listing of its specification turns the other way (KhronosGroup/glTF, issue 1563); its text, its sample
-// model and other programs turn this way.
+// Reads KHR_texture_transform, which scales, rotates counterclockwise as the image is seen, with v downward,
+// and moves. The GLSL listing of its specification rotates the other way (KhronosGroup/glTF, issue 1563),
+// unlike its text, its sample model and other programs.
 static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfTexture *place)
 {
     const GltfItem transform = gltf_extension(info, "KHR_texture_transform");
@@ -146,7 +145,7 @@ static void uv_transform_read(Gltf *gltf, const GltfItem *info, GltfTexture *pla
     memcpy(place->uv_rows, rows, sizeof rows);
 }
 
-// Sets the texture that a material names, unless it cannot be used.
+// Sets the texture that a material names if it can be used.
 static void texture_read(Gltf *gltf, const GltfItem *info, TextureContent content, GltfTexture *place)
 {
     size_t index = SIZE_MAX, source = SIZE_MAX;
@@ -176,9 +175,9 @@ static double clamped(double value)
     return fmin(fmax(value, 0), 1);
 }
 
-// Phong's highlight with the peak and about the width of a GGX one whose light falls along the normal (Walter
-// et al., Microfacet models for refraction through rough surfaces, EGSR 2007). What a rough surface reflects
-// beyond a highlight looks diffuse, that of a smooth metal mirrors.
+// Sets a Phong highlight with the peak and about the width of a GGX highlight for light along the normal
+// (Walter et al., Microfacet models for refraction through rough surfaces, EGSR 2007). Beyond the highlight
+// a rough surface reflects diffusely and a smooth metal mirrors.
 static void gloss_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surface, Material *look)
 {
     enum { SHININESS_MAX = 1 << 20 };
@@ -197,8 +196,8 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surfa
     if (surface->base_texture.json) gltf_lose(gltf, GLTF_METAL_COLOR, item);
 }
 
-// Textures emit light as the reflection of an ambient light of 1, which no other material of the scene
-// reflects. Returns false with a warning for a mesh of a scene that has its own ambient light.
+// Makes a texture emit light by reflecting an ambient light of 1, which no other material of the scene
+// reflects. Returns false with a warning for a mesh of another scene, which has an ambient light.
 static bool texture_can_emit(Gltf *gltf, const GltfItem *item, GltfMaterial *material, double ambient)
 {
     material->texture_emits = gltf->draft->import->view != NULL;
@@ -229,7 +228,7 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
         return;
     }
     if (vector_is_zero(emission)) return;
-    // an emissive texture is shown if it is the only texture or gives the base color
+    // an emissive texture is shown if it is the only texture or the same as the base color texture
     const json_t *own = json_object_get(surface->emissive_texture.json, "index"),
                  *other = json_object_get(surface->base_texture.json, "index");
     if (!own) {
@@ -286,7 +285,7 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
     }
 }
 
-// Returns an affine map of the plane after another.
+// Composes two affine maps of the plane.
 static void rows_multiply(double (*after)[3], double (*first)[3], double (*product)[3])
 {
     for (int i = 0; i < 2; i++)
@@ -295,8 +294,8 @@ static void rows_multiply(double (*after)[3], double (*first)[3], double (*produ
                 after[i][0] * first[0][k] + after[i][1] * first[1][k] + (k == 2 ? after[i][2] : 0);
 }
 
-// Sets the normal texture. A mesh has the texture coordinates of the color's, upward, from which those of the
-// normals follow if both are in one set.
+// Sets the normal texture. A mesh stores the color texture's coordinates, with v upward. Those of the normal
+// texture follow from them if both use one set.
 static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
 {
     double upward[2][3] = {{1, 0, 0}, {0, -1, 1}};
@@ -361,7 +360,7 @@ GltfMaterial *gltf_material(Gltf *gltf, const GltfItem *primitive)
     return material;
 }
 
-// The texture is multiplied by the factors, which are the color of a primitive that does not show it.
+// Multiplies the texture by the factors, which are the color of a primitive that does not show it.
 uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_textured)
 {
     uint32_t *index = &material->scene_index[is_textured];

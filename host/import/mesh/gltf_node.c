@@ -1,4 +1,4 @@
-// glTF: nodes in the world, their meshes, cameras and lights.
+// Places glTF's nodes in the world, with their meshes, cameras and lights.
 #include "host/base/memory.h"
 #include "host/import/mesh/gltf.h"
 #include "host/import/number.h"
@@ -9,7 +9,7 @@
 
 enum { DEPTH_MAX = 1000 };
 
-// Reads the node's matrix, which lies by columns, or its translation, rotation (a quaternion) and scale.
+// Reads the node's matrix, stored by columns, or its translation, rotation (a quaternion) and scale.
 static bool transform_read(Gltf *gltf, const GltfItem *node, Affine *affine)
 {
     double m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -22,7 +22,7 @@ static bool transform_read(Gltf *gltf, const GltfItem *node, Affine *affine)
             (Affine){{{m[0], m[4], m[8], m[12]}, {m[1], m[5], m[9], m[13]}, {m[2], m[6], m[10], m[14]}}};
         return true;
     }
-    // files have unit quaternions to the precision of a float
+    // quaternions in files are unit to the precision of a float
     const double squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
     if (!(squared > 0)) return gltf_fails(gltf, node, "'rotation' must not be 0");
     const double s = 2 / squared, x = q[0], y = q[1], z = q[2], w = q[3];
@@ -58,7 +58,7 @@ static Vector3 vector_at(const GltfNumbers *numbers, size_t row)
     return (Vector3){values[0], values[1], values[2]};
 }
 
-// Reads an attribute that a primitive may lack. An invalid one is left out with a warning.
+// Reads an optional attribute of a primitive. Drops an invalid one with a warning.
 static void attribute_read(Gltf *gltf, const GltfItem *attributes, const char *key, size_t width,
                            const GltfNumbers *positions, GltfNumbers *numbers)
 {
@@ -93,7 +93,7 @@ static bool vertices_read(Gltf *gltf, const GltfItem *primitive, const GltfMater
            gltf_fails(gltf, primitive, "too many vertices");
 }
 
-// Adds the vertices in the world. v runs downward in glTF and upward in glint.
+// Adds the vertices, transformed to the world. v points downward in glTF and upward in glint.
 static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfMaterial *material,
                          const Affine *affine)
 {
@@ -115,7 +115,7 @@ static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfM
     }
 }
 
-// Tested before the node's transform, whose rounding could give a degenerate triangle an area.
+// Adds a triangle that has an area before the node's transform, whose rounding could create one.
 static void triangle_add(MeshDraft *draft, const Vertices *vertices, size_t a, size_t b, size_t c)
 {
     size_t corners[3] = {a, vertices->is_mirrored ? c : b, vertices->is_mirrored ? b : c};
@@ -294,7 +294,7 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     return true;
 }
 
-// Adds the roots of all nodes, in a file that has no scenes.
+// Adds all root nodes of a file that has no scenes.
 static bool roots_add(Gltf *gltf, const Affine *affine)
 {
     const size_t count = gltf_count(gltf, "nodes");

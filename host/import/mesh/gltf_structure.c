@@ -1,4 +1,4 @@
-// glTF: the JSON types of its members. What reads them takes a member of another type for a missing one.
+// Checks the JSON types of glTF's members. Readers treat a member of another type as missing.
 #include "host/base/array.h"
 #include "host/import/mesh/gltf.h"
 
@@ -6,8 +6,8 @@
 
 typedef enum { MEMBER_ARRAY, MEMBER_OBJECT, MEMBER_STRING, MEMBER_BOOLEAN } MemberType;
 
-// Members by their path, in which [] stands for every element. A file in which a needed one has another type
-// is refused; the others are not used.
+// Members by their path, in which [] stands for every element. A required member of another type makes the
+// file invalid. An optional one is ignored.
 static const struct {
     const char *path;
     MemberType type;

@@ -1,4 +1,4 @@
-// Chooses a mesh's reader, and makes what it read a mesh of the scene.
+// Chooses a mesh's reader and adds the resulting mesh to the scene.
 #include "host/import/mesh/mesh_import.h"
 #include "host/base/array.h"
 #include "host/base/file.h"
@@ -29,7 +29,7 @@ bool mesh_is_known(const char *path)
     return reader_of(path) != assimp_process_read || assimp_knows(path);
 }
 
-// Frees the text before the draft becomes a mesh, which also needs memory.
+// Reads the file, and frees its text before the draft becomes a mesh, which also needs memory.
 static bool file_read(MeshDraft *draft, Mesh *mesh)
 {
     bool (*read)(MeshDraft *) = reader_of(draft->import->path);
@@ -63,8 +63,8 @@ static void warn_of_triangles(MeshDraft *draft, const Mesh *mesh)
                    draft->crossed_count);
 }
 
-// The most triangles of mesh files that a scene names more than once, each of which has a copy. Bounds the
-// cost of a hostile file, as SCENE_TEXTURES_MAX does.
+// Bounds the triangles of all copies of mesh files that a scene names more than once, and so the cost of a
+// hostile file.
 enum { COPIED_TRIANGLES_MAX = 1 << 24 };
 
 static bool copies_fit(MeshDraft *draft, Mesh *mesh)

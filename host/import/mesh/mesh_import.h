@@ -1,11 +1,12 @@
-// Meshes read from files and placed in the world.
+// Reads meshes from files and places them in the world.
 #pragma once
 
 #include "host/import/load.h"
 #include "host/scene/affine.h"
 #include "host/scene/mesh.h"
 
-// Source of shading normals: the file if it has any; none; the file, else the triangles around each vertex.
+// The source of shading normals, which is the file if it has any, nothing, or the file and else the
+// triangles around each vertex.
 typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 
 // The camera and the lights of a file.
@@ -29,10 +30,10 @@ typedef struct {
     size_t offset;  // of the file's name in the scene, or MESSAGE_WHOLE_FILE where the file is the scene
 } MeshImport;
 
-// Returns whether glint reads meshes whose names end so.
+// Returns whether glint reads meshes with the name's ending.
 bool mesh_is_known(const char *path);
 
 // Adds the file's triangles to the scene as one mesh and sets *index to its index. Reports an error and
 // returns false if the file cannot be read as a mesh, or if a vertex of a face is missing, not finite or
-// beyond NUMBER_MAX. Where no triangle has a material of the file, the mesh has none.
+// beyond NUMBER_MAX. The mesh has no materials if no triangle has one of the file.
 bool mesh_import(Scene *scene, const MeshImport *import, uint32_t *index);

@@ -1,4 +1,4 @@
-// Scenes of one mesh, with the file's camera and lights, or a camera that frames the mesh and two lights.
+// Makes a scene of one mesh with the file's camera and lights, or a framing camera and two lights.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/mesh/mesh_import.h"
@@ -24,7 +24,7 @@ static Vector3 mesh_center(const Mesh *mesh)
     return bounds_center(mesh_bounds(mesh));
 }
 
-// Returns the upward direction: z in STL by custom, y in other formats.
+// Returns the upward direction, which is z in STL by custom and y in other formats.
 static Vector3 upward(const char *path)
 {
     const char *ending = strrchr(path, '.');
@@ -54,7 +54,7 @@ static Camera camera_around(const Mesh *mesh, Vector3 center, Vector3 up)
                     .half_tangent = half_tangent};
 }
 
-// Adds a light from above at the camera's left, and one a third as bright from its right.
+// Adds a light from above on the camera's left, and one a third as bright on its right.
 static void lights_around(Scene *scene)
 {
     const Camera *camera = &scene->camera;
@@ -80,7 +80,7 @@ static bool light_is_sound(const Light *light)
            (light->type != LIGHT_SPOT || has_cone);
 }
 
-// Clears a fading that is negative, out of range or zero.
+// Clears fading factors that are negative, out of range or all zero.
 static void fading_check(Light *light)
 {
     double sum = 0;
@@ -93,7 +93,8 @@ static void fading_check(Light *light)
     light_fold_fading(light);
 }
 
-// Returns the largest channel of what arrives at a point, or at `least` from the light if that is farther.
+// Returns the largest channel of the light that arrives at a point, whose distance counts as at least
+// `least`.
 static double light_arriving(const Light *light, Vector3 point, double least)
 {
     const double d = fmax(vector_length(vector_subtract(light->position, point)), least);
@@ -101,7 +102,7 @@ static double light_arriving(const Light *light, Vector3 point, double least)
     return vector_largest(light->color) / (light_fades(light) ? fmax(divisor, 1 / NUMBER_MAX) : 1);
 }
 
-// Adds the lights. If they would make the image white or black, they are scaled.
+// Adds the lights and scales them if they would make the image white or black.
 static void lights_add(Scene *scene, const MeshView *view, Report *report)
 {
     const double brightest = 4, darkest = 0x1p-6;

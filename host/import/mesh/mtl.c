@@ -1,5 +1,5 @@
-// Wavefront MTL (Alias|Wavefront, Advanced Visualizer manual, MTL material format, 1995), as far as materials
-// of scenes support it (docs/scene-format.md).
+// Wavefront MTL (Alias|Wavefront, Advanced Visualizer manual, MTL material format, 1995), as far as glint's
+// materials support it (docs/scene-format.md).
 #include "host/import/mesh/mtl.h"
 #include "host/base/array.h"
 #include "host/base/file.h"
@@ -17,11 +17,11 @@ typedef struct {
     char *image;           // of map_Kd, or NULL
     char *opacity_image;   // of map_d, or NULL
     char *normal_image;    // of norm or map_Bump, or NULL
-    bool has_bumps;        // it is that of map_Bump
+    bool has_bumps;        // normal_image is that of map_Bump
     uint32_t scene_index;  // DRAFT_NONE: not in the scene yet
     double dissolve;       // d: the opacity; NAN: not given
     double transparency;   // Tr: 1 - d; NAN: not given
-    size_t opacity_offset; // of the last of them
+    size_t opacity_offset; // of the last d or Tr
     Color filter;          // Tf: factors of the transmitted light
     double illumination;   // illum; NAN: not given
     size_t illumination_offset;
@@ -43,7 +43,7 @@ typedef struct {
     Scan scan;
     UnusedWords unused;
     size_t first_material;
-    bool has_reflection; // whether a warning named it
+    bool has_reflection; // whether reflection was warned of
 } MtlReader;
 
 static MtlMaterial *material_of(MtlReader *reader)
@@ -53,8 +53,8 @@ static MtlMaterial *material_of(MtlReader *reader)
                : NULL;
 }
 
-// Sets the opacity of a material that has all its lines. By its specification glass has highlights that are
-// not dimmed, and bends light only with illum 6 and 7; without illum Ni alone decides.
+// Sets the opacity of a material after its last line. By the specification, glass has undimmed highlights
+// and bends light only with illum 6 and 7. Without illum, Ni alone decides.
 static void material_end(MtlReader *reader, MtlMaterial *material)
 {
     const double illumination = material->illumination;
@@ -101,7 +101,7 @@ static void name_read(MtlReader *reader, MtlMaterial *previous)
     array_push(reader->materials, material);
 }
 
-// Reads a number. Returns false with a warning if it is not a number of the range.
+// Reads a number. Returns false with a warning if it is not a number in the range.
 static bool number_of_line(MtlReader *reader, const Range *range, double *value)
 {
     double number;
@@ -120,7 +120,7 @@ static bool number_of_line(MtlReader *reader, const Range *range, double *value)
     return true;
 }
 
-// Reads a color, of which one number stands for three.
+// Reads a color from three numbers, or from one for all channels.
 static bool color_of_line(MtlReader *reader, Color *color)
 {
     double numbers[3];
@@ -139,7 +139,7 @@ static void diffuse_read(MtlReader *reader, MtlMaterial *material)
     color_of_line(reader, &material->material.color);
 }
 
-// Highlights have the light's color; only the strength of the file's specular color is kept.
+// Reads the specular color and keeps only its strength, because highlights have the light's color.
 static void specular_read(MtlReader *reader, MtlMaterial *material)
 {
     Color color;
@@ -193,9 +193,9 @@ static void illumination_read(MtlReader *reader, MtlMaterial *material)
     number_of_line(reader, &range_illumination, &material->illumination);
 }
 
-// Reads an option of a texture, which starts with `-` and has up to three numbers or one word. Stores the
-// value of -bm in *multiplier unless that is NULL, and skips other options. Sets *is_used to whether the
-// value was stored.
+// Reads a texture's option, which starts with `-` and has up to three numbers or one word. Stores the value
+// of -bm in *multiplier unless `multiplier` is NULL, and skips other options. Sets *is_used to whether it
+// stored the value.
 static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
 {
     Scan ahead = *scan;
@@ -213,8 +213,8 @@ static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
     return true;
 }
 
-// Reads the name of an image. `otherwise` is what is used if it cannot be read, `multiplier` where the value
-// of -bm belongs, or NULL.
+// Reads the name of an image. `otherwise` describes its replacement if it cannot be read. `multiplier`
+// receives the value of -bm and may be NULL.
 static void image_read_name(MtlReader *reader, const char *otherwise, char **image, double *multiplier)
 {
     scan_more(&reader->scan);
@@ -317,7 +317,7 @@ static void line_read(MtlReader *reader)
     unused_record(&reader->unused, &reader->report, word, "is not used");
 }
 
-// Returns whether the file was read, by whatever name.
+// Returns whether the file was read under any name.
 static bool file_was_read(const MtlReader *reader, const struct stat *file)
 {
     for (size_t i = 0; i < reader->files.count; i++)
@@ -326,7 +326,7 @@ static bool file_was_read(const MtlReader *reader, const struct stat *file)
     return false;
 }
 
-// Reads each file once, however often it is named.
+// Reads an MTL file unless it was read before.
 static bool library_read(MtlReader *reader, const char *path)
 {
     struct stat file = {0};
@@ -372,7 +372,7 @@ static bool library_of_word_read(MtlReader *reader, Word name)
     return read;
 }
 
-// Reads a name that may have blanks, or several names.
+// Reads the files of a line, which is one name with blanks or several names.
 static bool libraries_of_line_read(MtlReader *reader, Word line)
 {
     bool read = library_of_word_read(reader, line);
@@ -383,7 +383,7 @@ static bool libraries_of_line_read(MtlReader *reader, Word line)
     return true;
 }
 
-// Reads the MTL file with the OBJ file's name in place of one that is missing.
+// Reads the MTL file that has the OBJ file's name, in place of a missing one.
 static bool fallback_read(MtlReader *reader)
 {
     const char *obj_path = reader->draft->import->path;
@@ -435,8 +435,8 @@ static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const c
     return texture;
 }
 
-// Multiplies the image by the diffuse color, as MTL defines. What the image of the opacity would blend is cut
-// out by its alpha or, as MTL defines, its luminance.
+// Sets the textures. Multiplies the image by the diffuse color, as MTL defines. Cuts out the parts that the
+// opacity image would blend, by its alpha or, as MTL defines, its luminance.
 static void textures_use(MeshDraft *draft, MtlMaterial *material)
 {
     Material *look = &material->material;

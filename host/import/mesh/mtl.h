@@ -1,10 +1,10 @@
-// The materials that an OBJ file names, from its MTL files.
+// Reads the materials that an OBJ file names from its MTL files.
 #pragma once
 
 #include "host/import/line.h"
 #include "host/import/mesh/draft.h"
 
-// `usemtl`: from this corner on.
+// A material that `usemtl` sets from a corner on.
 typedef struct {
     Word name;
     size_t first_corner;
@@ -21,5 +21,5 @@ typedef struct {
     } libraries; // `mtllib`
 } ObjMaterials;
 
-// Adds the materials to the scene and to the draft, with warnings for what is missing or cannot be used.
+// Adds the materials to the scene and to the draft. Warns of materials that are missing or cannot be used.
 void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials);

@@ -12,7 +12,7 @@ typedef struct {
     Scan scan;
     UnusedWords unused;
     bool has_colors;
-    bool lacks[DRAFT_PART_COUNT]; // whether a warning named an index of nothing
+    bool lacks[DRAFT_PART_COUNT]; // whether a missing index was warned of
     ObjMaterials materials;
 } ObjReader;
 
@@ -21,7 +21,7 @@ static size_t offset_of(const ObjReader *reader)
     return scan_offset(&reader->scan);
 }
 
-// Reads numbers up to the first word that is not one. Returns whether that is the line's end.
+// Reads numbers up to the first word that is not a number. Returns whether it reached the line's end.
 static bool numbers_read(ObjReader *reader, double *numbers, int most, int *count)
 {
     for (*count = 0; scan_more(&reader->scan); ++*count)
@@ -29,7 +29,7 @@ static bool numbers_read(ObjReader *reader, double *numbers, int most, int *coun
     return true;
 }
 
-// A fourth number is homogeneous, more are a color.
+// Reads a position. A fourth number is homogeneous, and further ones are a color.
 static bool position_read(ObjReader *reader)
 {
     MeshDraft *draft = reader->draft;
@@ -80,7 +80,8 @@ static bool corner_fails(ObjReader *reader, const char *start)
                        word.text);
 }
 
-// Reads an index that names nothing: an error for a vertex. A corner does without the other parts.
+// Handles an index of a missing element. Returns false with an error for a vertex. For other parts, warns
+// once and leaves the part out of the corner.
 static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t offset)
 {
     MeshDraft *draft = reader->draft;
@@ -96,7 +97,8 @@ static bool index_fails(ObjReader *reader, DraftPart part, int64_t index, size_t
     return true;
 }
 
-// Reads the next index, of a vertex or behind a slash: from 1, or below 0 back from the latest one.
+// Reads the next index, of a vertex or after a slash. Indices count from 1, or backward from the latest
+// element if they are below 0.
 static bool index_read(ObjReader *reader, DraftPart part, const char *corner)
 {
     enum { DIGITS_MAX = 18 };
@@ -166,7 +168,8 @@ static bool nothing_read(ObjReader *reader)
     return true;
 }
 
-// Names of groups and objects mean nothing here, and smoothing is the scene's matter.
+// Each `read` reads the words after its keyword. glint ignores the names of groups and objects, and the
+// scene controls smoothing.
 static const struct {
     const char *word;
     bool (*read)(ObjReader *reader);

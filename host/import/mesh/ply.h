@@ -1,4 +1,4 @@
-// A PLY file being read: its header and the read position.
+// Reads a PLY file's header and lines.
 #pragma once
 
 #include "host/import/mesh/draft.h"

@@ -45,7 +45,7 @@ static bool format_read(PlyHeader *header, PlyReading *reading, Scan line)
                        word.text);
 }
 
-// No file holds as many rows as a longer number says.
+// Reads a count of at most 18 digits. No file has as many rows as a longer number.
 static bool count_read(Word word, size_t *count)
 {
     enum { DIGITS_MAX = 18 };
@@ -109,7 +109,7 @@ static bool property_read(PlyHeader *header, PlyReading *reading, Scan line)
     return true;
 }
 
-// Lines with unknown keywords are ignored, like comments.
+// Reads a line of the header. Ignores lines with unknown keywords and comments.
 static bool header_line_read(PlyHeader *header, PlyReading *reading, Scan line)
 {
     Word keyword = ply_word(&line);

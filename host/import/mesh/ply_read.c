@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-// The use of a property by a mesh: a number of a vertex, or a list of a face.
+// The role of a property, which is a number of a vertex or a list of a face.
 typedef enum {
     ROLE_X,
     ROLE_Y,
@@ -30,7 +30,7 @@ typedef struct {
 typedef struct {
     PlyHeader header;
     PlyReading reading;
-    Scan line;                 // of text: what is left of the row's line
+    Scan line;                 // the unread part of the row's line, in text
     const PlyElement *element; // of the current row, and the row's index
     size_t row;
     struct {
@@ -90,7 +90,7 @@ static bool elements_are_sound(PlyReader *reader)
     return true;
 }
 
-// Warns once for each element, of all its properties if none is used.
+// Warns of an element that is not used, or of the unused properties of one that is.
 static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
 {
     Text unused = {0};
@@ -129,7 +129,7 @@ static bool value_missing(PlyReader *reader, const PlyProperty *property)
                        property->name.text);
 }
 
-// Whole numbers have 32 bits.
+// Reads a whole number of 32 bits.
 static bool whole_read(const char **text, const char *end, PlyNumberKind kind, double *value)
 {
     const char *at = *text;
@@ -145,7 +145,7 @@ static bool whole_read(const char **text, const char *end, PlyNumberKind kind, d
     return true;
 }
 
-// Replaces what is not finite or too large by NAN.
+// Reads a number. Replaces values that are not finite or too large with NAN.
 static bool real_read(const char **text, const char *end, double *value)
 {
     static const char *const not_finite[] = {"infinity", "inf", "nan"};
@@ -163,7 +163,7 @@ static bool real_read(const char **text, const char *end, double *value)
     return false;
 }
 
-// Reads the line's next word as a number of the type; `is_there` tells whether there is one.
+// Reads the line's next word as a number of the type; Sets *is_there to whether the line has one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
     ply_blanks_skip(&reader->line);
@@ -276,7 +276,7 @@ static bool property_read(PlyReader *reader, size_t index)
     return number_next(reader, property, property->type, &reader->numbers[role]);
 }
 
-// A row of text is a nonempty line; what follows its last property is ignored.
+// Starts a row. In text a row is a nonempty line, and words after its last property are ignored.
 static bool row_start(PlyReader *reader)
 {
     Word name = reader->element->name;
@@ -349,7 +349,7 @@ static void roles_find(PlyReader *reader, const PlyElement *element)
     }
 }
 
-// These come before the vertices'.
+// Returns whether a face's list has texture coordinates, which take precedence over the vertices'.
 static bool corners_have_uvs(const PlyReader *reader)
 {
     for (size_t i = 0; i < reader->header.elements.count; i++) {
@@ -386,7 +386,7 @@ static bool element_read(PlyReader *reader, const PlyElement *element)
     draft->places = DRAFT_LINES; // of the header
     if (!element_start(reader, element)) return false;
     if (is_binary(reader)) draft->places = DRAFT_BYTES;
-    // without properties there are no rows, whatever their number
+    // an element without properties has no rows, whatever its count
     const size_t count = element->property_count > 0 ? element->count : 0;
     for (reader->row = 0; reader->row < count; reader->row++) {
         stage_set(draft->stage, scan_offset(&reader->reading.left));

@@ -1,5 +1,4 @@
-// Reads words and numbers of the lines of a mesh file in one pass. A NUL stands behind the text and none
-// within.
+// Reads the words and numbers of a mesh file's lines in one pass. The text's only NUL is at its end.
 #pragma once
 
 #include "host/import/line.h"
@@ -33,14 +32,14 @@ static inline bool scan_is_blank(char character)
     return character == ' ' || character == '\t';
 }
 
-// Returns the bytes of a backslash at the end of a line, which continues on the next, otherwise 0.
+// Returns the length of a backslash and line end that continue the line on the next one, otherwise 0.
 static inline size_t scan_continuation(const char *at)
 {
     if (*at != '\\') return 0;
     return at[1] == '\n' ? 2 : at[1] == '\r' ? (at[2] == '\n' ? 3 : 2) : 0;
 }
 
-// Skips blanks and returns whether the line has more.
+// Skips blanks and returns whether more text follows on the line.
 static inline bool scan_more(Scan *scan)
 {
     for (;;) {
@@ -80,7 +79,7 @@ static inline Word scan_rest(Scan *scan)
     return (Word){start, (size_t)(start - scan->start), (size_t)(end - start)};
 }
 
-// Reads the next word if it is a number; otherwise the position stays.
+// Reads the next word if it is a number. Otherwise leaves the position unchanged.
 static inline NumberStatus scan_number(Scan *scan, double *value)
 {
     scan_more(scan);
@@ -108,11 +107,11 @@ static inline bool scan_line(Scan *scan)
 // Returns whether the text has no NUL, and reports an error otherwise. Skips a byte order mark.
 bool scan_is_text(Scan *scan, Report *report);
 
-// Words that a warning was for, of which there is one for each.
+// Words that were warned of, so that each is warned of once.
 typedef struct {
     Word words[32];
     size_t count;
 } UnusedWords;
 
-// Warns that the word `what`, such as "is not used".
+// Warns once per word that the word `what`, such as "is not used".
 void unused_record(UnusedWords *unused, Report *report, Word word, const char *what);

@@ -1,5 +1,5 @@
-// STL (3D Systems, StereoLithography Interface Specification, 1989), in text or binary. The normals of its
-// facets are those of its triangles, so they are not read.
+// STL (3D Systems, StereoLithography Interface Specification, 1989), in text or binary. Facet normals are
+// not read, since the triangles determine them.
 #include "host/base/array.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/scan.h"
@@ -139,8 +139,8 @@ static bool is_text(const Source *source)
     return false;
 }
 
-// The header of a binary file may start with `solid`, but only such a file has exactly the size of its
-// facets.
+// Reads an STL file. A binary file may start with `solid`, but only a binary file has exactly the size of
+// its facets.
 bool stl_read(MeshDraft *draft)
 {
     const Source *source = &draft->source;

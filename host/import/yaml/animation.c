@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// KEYS_MAX bounds the time that a document takes whose aliases name the same keys again and again.
+// KEYS_MAX bounds the time for a document whose aliases repeat the same keys many times.
 enum { NUMBERS_MAX = 16, KEYS_MAX = 1 << 20 };
 
 typedef enum { EASE_LINEAR, EASE_SMOOTH, EASE_STEP, EASE_COUNT } Ease;
@@ -33,7 +33,7 @@ static bool node_number(const YamlReader *reader, const YamlNode *node, double *
     return number_read(text, strlen(text), value) == NUMBER_READ;
 }
 
-// A material may be called `keys`, but its own keys are not numbers.
+// Requires the first key under `keys` to be a number, because a material may also be named `keys`.
 bool yaml_has_keys(const YamlReader *reader, const YamlNode *node)
 {
     const YamlTree *tree = &reader->tree;
@@ -48,7 +48,7 @@ bool yaml_has_keys(const YamlReader *reader, const YamlNode *node)
     return false;
 }
 
-// Returns whether two values are numbers, or lists of as many numbers.
+// Returns whether two values are numbers, or lists of equally many numbers.
 static bool values_match(YamlReader *reader, const YamlNode *a, const YamlNode *b)
 {
     const YamlTree *tree = &reader->tree;
@@ -68,7 +68,7 @@ static bool values_match(YamlReader *reader, const YamlNode *a, const YamlNode *
                NUMBERS_MAX);
 }
 
-// Reads the keys, which the caller frees.
+// Reads the keys. The caller frees them.
 static bool keys_read(YamlReader *reader, const YamlNode *frames, Keys *keys)
 {
     const YamlTree *tree = &reader->tree;
@@ -107,7 +107,7 @@ static bool read_ease(YamlReader *reader, const Field *field, const YamlNode *no
     return true;
 }
 
-// Adds a number, `part` of the way between two, and returns its index.
+// Adds the number at fraction `part` between two numbers and returns its index.
 static uint32_t number_between(YamlReader *reader, const YamlNode *a, const YamlNode *b, double part)
 {
     YamlTree *tree = &reader->tree;
@@ -123,7 +123,7 @@ static uint32_t number_between(YamlReader *reader, const YamlNode *a, const Yaml
     return (uint32_t)(tree->nodes.count - 1);
 }
 
-// Adds the value between two and returns its index.
+// Adds the value at fraction `part` between two values and returns its index.
 static uint32_t value_between(YamlReader *reader, uint32_t a, uint32_t b, double part)
 {
     if (node_at(reader, a)->type == YAML_SCALAR)
@@ -142,7 +142,7 @@ static uint32_t value_between(YamlReader *reader, uint32_t a, uint32_t b, double
     return index;
 }
 
-// Returns the index of the value at a frame: that of the first or the last key beyond them.
+// Returns the index of the value at a frame. Beyond the keys it is that of the first or the last one.
 static uint32_t keys_value(YamlReader *reader, const Keys *keys, Ease ease, double frame)
 {
     size_t next = 0;
@@ -178,8 +178,8 @@ static bool value_animate(YamlReader *reader, uint32_t index)
     return is_read;
 }
 
-// Animates the values in a node. `visited` has a bit for each node, which is set where aliases may share
-// children, or is NULL.
+// Animates the values in a node. `visited` has a bit per node, which is set once the children that begin
+// there are animated, since aliases may share them. It is NULL if there are no aliases.
 static bool node_animate(YamlReader *reader, uint32_t index, uint8_t *visited)
 {
     if (yaml_has_keys(reader, node_at(reader, index))) return value_animate(reader, index);

@@ -1,12 +1,11 @@
-// Values of a YAML document that change from frame to frame, each given as `{keys: {FRAME: VALUE, …}}`.
+// Evaluates YAML values that change from frame to frame, written `{keys: {FRAME: VALUE, …}}`.
 #pragma once
 
 #include "host/import/yaml/fields.h"
 
-// Replaces each such mapping of the reader's tree by its value at the frame that the options name, a number
-// or a list of numbers, and notes in the scene that it is animated. Reports errors and returns false if one
-// cannot be read.
+// Replaces each such mapping of the reader's tree with its value at the options' frame, a number or a list
+// of numbers, and marks the scene as animated. Reports errors and returns false if a mapping cannot be read.
 bool yaml_animate(YamlReader *reader);
 
-// Returns whether a node of the tree is such a mapping.
+// Returns whether a node of the tree is a mapping whose `keys` are frames.
 bool yaml_has_keys(const YamlReader *reader, const YamlNode *node);

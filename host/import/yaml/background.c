@@ -13,7 +13,7 @@ static bool is_leap(int year)
     return year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
 }
 
-// Takes a day as in 2026-06-21. The target is a double, the days from the epoch.
+// Reads a date such as 2026-06-21 into a double, the days since the epoch.
 static bool read_date(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const int lengths[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
@@ -37,7 +37,7 @@ static bool read_date(YamlReader *reader, const Field *field, const YamlNode *no
     return true;
 }
 
-// Takes the sun's direction, or a place and a time.
+// Reads the sun's direction, or a place and a time.
 static bool read_sun(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     typedef struct {
@@ -106,7 +106,7 @@ static Color background_mean(const Background *background)
     return vector_add(vector_scale(background->horizon, 0.5), vector_scale(poles, 0.25));
 }
 
-// Adds the light of the sun, for the level direction towards it.
+// Adds the light of the sun. `forward` is the horizontal direction towards it.
 static void sun_add(Scene *scene, const Background *background, Vector3 forward, Vector3 up)
 {
     const double elevation = background->sun.position.elevation * (M_PI / 180);
@@ -131,7 +131,7 @@ void yaml_set_background(YamlReader *reader, const Background *background, Color
     scene->ambient = has_ambient ? ambient : background_mean(background);
     scene->sky.is_light = background->is_light;
     if (vector_is_zero(background->up) || reader->report.error_count > 0) return;
-    // -z, or where that lies along `up`, -x
+    // -z, or -x if -z is parallel to `up`
     const Vector3 up = vector_normalize(background->up);
     Vector3 right = vector_cross((Vector3){0, 0, -1}, up);
     if (vector_length(right) < 1e-6) right = vector_cross((Vector3){-1, 0, 0}, up);

@@ -1,4 +1,4 @@
-// Colors of YAML scenes: linear numbers, sRGB in hexadecimal, or names.
+// Reads the colors of YAML scenes, which are linear numbers, sRGB in hexadecimal, or names.
 #include "host/base/array.h"
 #include "host/image/srgb.h"
 #include "host/import/yaml/fields.h"
@@ -23,8 +23,8 @@ static const struct {
 
 enum { NAMED_COUNT = COUNT_OF(named_colors) };
 
-// Rounds to float, so that the last bits of the host's pow() do not matter: no value lies
-// within a relative 2e-10 of the middle between two floats.
+// Returns the linear value of an 8-bit channel. Rounds to float, so that the last bits of the host's pow()
+// do not matter, since no value lies within a relative 2e-10 of the middle between two floats.
 static double channel_decode(uint32_t value)
 {
     return (double)(float)srgb_decode((value & 255) / 255.0);
@@ -86,15 +86,15 @@ static bool not_a_color_report(YamlReader *reader, const Field *field, const Yam
     return expected_report(reader, field->name, expected, node);
 }
 
-// Whether a number of the file, without its sign, is written as display values are: digits alone, at most
-// 255.
+// Returns whether a number of the file, without its sign, is written like a display value, with only digits
+// and at most 255.
 static bool is_display_value(const char *text, double value)
 {
     return text[strspn(text, "0123456789")] == '\0' && value <= 255;
 }
 
-// Reports three values from 0 to 255 (one, if the node is a scalar) that exceed `most`, which is
-// unlikely for a linear color. Returns whether there are none.
+// Returns false with an error if the three values (one if the node is a scalar) are whole numbers from 0 to
+// 255 and one exceeds `most`, which is unlikely for a linear color.
 static bool color_is_linear(YamlReader *reader, const Field *field, const YamlNode *node, double most,
                             const Color *color)
 {

@@ -26,7 +26,7 @@ bool expected_report(YamlReader *reader, const char *name, const char *expected,
     return report_error(&reader->report, node->offset, "'%s' must be %s, not %s", name, expected, found);
 }
 
-// Words that other programs use for what glint calls by another name.
+// Words of other programs and glint's names for them.
 static const struct {
     const char *word, *known;
 } synonyms[] = {
@@ -106,7 +106,8 @@ static size_t field_find(const YamlReader *reader, const YamlNode *key, const Fi
     return index;
 }
 
-// Keeps in `forms` those that the key allows. `seen` are the fields before it.
+// Restricts `forms` to those that the key allows. Reports an error and returns false if none remains; `seen`
+// marks the fields before the key.
 static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *field, const Field *fields,
                         const bool *seen, unsigned *forms)
 {

@@ -1,4 +1,4 @@
-// Typed access to the mappings of a YAML scene by tables of fields, with a message for every mistake.
+// Reads the mappings of a YAML scene by tables of typed fields, with a message for every mistake.
 #pragma once
 
 #include "host/import/load.h"
@@ -13,7 +13,7 @@ typedef struct {
     size_t offset;
 } MaterialName;
 
-// What `define` gives a name. The objects' meshes are those of the definition.
+// The objects that `define` names. Their meshes belong to the definition.
 typedef struct {
     const char *name; // in the tree's texts
     size_t offset;
@@ -40,9 +40,9 @@ typedef struct {
         Definition *items;
         size_t count, capacity;
     } definitions;
-    bool warned_of_pattern; // that a transform does not move
-    size_t copy_count;      // see COPIES_MAX in groups.c
-    size_t key_count;       // see KEYS_MAX in animation.c
+    bool warned_of_pattern; // warned once that a transform does not move a pattern
+    size_t copy_count;      // objects of definitions, instances and repeated groups
+    size_t key_count;       // animation keys that were read
 } YamlReader;
 
 typedef struct Field Field;
@@ -50,7 +50,7 @@ typedef struct Field Field;
 // Reads the value of `field` at `node` into `target`; reports an error and returns false if it is invalid.
 typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode *node, void *target);
 
-// Alternative forms of a mapping, as bits; keys of different forms exclude each other.
+// A bit set of a mapping's alternative forms. Keys of different forms exclude each other.
 typedef unsigned Form;
 enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_FOURTH = 8, FORM_ANY = 15 };
 
@@ -65,8 +65,8 @@ struct Field {
     const Range *range; // of its values; NULL: any
 };
 
-// Fills `target` from a mapping, called `what` in messages. `form`, which may be NULL, receives the mapping's
-// form. Missing fields leave their members unchanged. Returns true if nothing was reported.
+// Fills `target` from a mapping, called `what` in messages. Sets *form, unless `form` is NULL, to the
+// mapping's form. Missing fields leave their members unchanged. Returns true if it reported nothing.
 bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
                  size_t field_count, void *target, Form *form);
 
@@ -81,29 +81,28 @@ bool key_is_word(YamlReader *reader, const YamlNode *key);
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value);
 
-// Target types: `const YamlNode *`, double, Vector3, nonzero Vector3, bool. Numbers must lie in the field's
-// range.
+// Read a YamlNode pointer, double, Vector3, nonzero Vector3, Vector3[3] or bool. Numbers must be in the
+// field's range.
 FieldReader read_node, read_number, read_vector, read_direction, read_three_points, read_boolean;
 
 // Read a Color from three numbers, from one for a gray, or from sRGB as "#rrggbb", "#rgb" or a name. Whole
-// numbers that look like values from 0 to 255 are an error: those above 1 of a surface's color, and those
-// above 31 of a strength, such as a light's.
+// numbers that look like values from 0 to 255 are an error if one is above 1 in a surface's color, or above
+// 31 in a strength, such as a light's.
 FieldReader read_color, read_strength;
 // Returns whether a color may be written as the text: a name or "#rrggbb".
 bool is_color_text(const char *text);
 
-// Reads a list of exactly `count` values of `size` bytes, each by `read`; `what` as in "three numbers".
+// Reads a list of exactly `count` values of `size` bytes with `read`; `what` is like "three numbers".
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
                 FieldReader *read, size_t size, void *target);
 
-// Reports at an offset that the name of a `type`, such as a material, was given before, and in which file.
+// Reports at an offset that the name of a `type`, such as a material, was defined before, and in which file.
 void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before);
 // Reports `must be …, not 'text'` at the node and returns false.
 bool expected_report(YamlReader *reader, const char *name, const char *expected, const YamlNode *node);
-// Appends the known word that `word` may stand for, if there is one, and the known words unless they are
-// many.
+// Appends the known word that `word` may stand for, if any, and the list of known words unless it is long.
 void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count);
-// Reports `unknown type 'word'`, with a suggestion if a known word is similar or means the same, and with the
-// known words unless they are many.
+// Reports `unknown type 'word'`, with a suggestion if a known word is similar or means the same, and with
+// the list of known words unless it is long.
 void unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
                     size_t known_count);

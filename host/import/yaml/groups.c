@@ -1,4 +1,4 @@
-// `define:`, `group:` and `instance:` of YAML scenes.
+// Reads `define:`, `group:` and `instance:` of YAML scenes.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/import/yaml/yaml.h"
@@ -8,14 +8,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The most objects that definitions have and instances repeat. A mesh counts as one object, a box as four,
-// and a member of a group that is read again, through an alias, as GROUP_COST of them. Bounds the cost of a
-// hostile file, as DEFINITIONS_MAX does.
+// Bound the cost of a hostile file. COPIES_MAX bounds the objects of definitions and their instances. A mesh
+// counts as one object, a box as four, and a member of a group that an alias repeats as GROUP_COST.
 enum { COPIES_MAX = 1 << 22, GROUP_COST = 16, DEFINITIONS_MAX = 1000 };
 
 static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
 {
-    // a group's first reading is paid for by the file's size
+    // the file's size bounds the first reading of each group
     const size_t largest = COPIES_MAX + GROUP_COST * reader->tree.nodes.count;
     if (reader->copy_count > largest) return false; // was reported
     reader->copy_count += count;
@@ -24,8 +23,8 @@ static bool copies_add(YamlReader *reader, size_t count, const YamlNode *node)
                         "definitions, instances and repeated groups have more than %d objects", COPIES_MAX);
 }
 
-// Returns whether the look of the object depends on where or how it lies in the world, so that a transform
-// leaves it behind: images on spheres have poles along y, other patterns fixed places.
+// Returns whether a transform moves the object but not its pattern. Images on spheres have poles along y,
+// and other patterns are fixed in the world.
 static bool pattern_ignores_transform(const Scene *scene, const Object *object, const Affine *affine)
 {
     const Material *material = &scene->materials.items[object->material];
@@ -76,8 +75,7 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
     if (transform != mapping) yaml_transform_objects(reader, first, &group.transform, transform);
 }
 
-// Moves the scene's objects from the given index on to a definition, named by a key. Their meshes stay in the
-// scene.
+// Moves the scene's objects from `first_object` on to a definition of the key's name, except their meshes.
 static Definition definition_move(YamlReader *reader, const YamlNode *key, size_t first_object)
 {
     Scene *scene = reader->scene;
@@ -104,7 +102,7 @@ static const Definition *definition_find(const YamlReader *reader, const char *n
     return NULL;
 }
 
-// A box may become a mesh of 12 triangles.
+// Returns the cost of a copy. A box counts as four objects, because it may become a mesh of 12 triangles.
 static size_t definition_cost(const Definition *definition)
 {
     size_t cost = 1;
@@ -146,7 +144,7 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
     }
 }
 
-// Frees the meshes that no object of the scene has, and leaves them empty.
+// Frees the meshes that no object of the scene uses and leaves them empty.
 static void unused_meshes_free(Scene *scene)
 {
     bool *is_used = memory_allocate_zeroed(scene->meshes.count + 1, sizeof *is_used);
@@ -165,7 +163,7 @@ void yaml_definitions_free(YamlReader *reader)
     free(reader->definitions.items);
 }
 
-// Returns NULL after an error if nothing before the node defines the name.
+// Returns the named definition. Reports an error and returns NULL if it is not defined before the node.
 static const Definition *definition_named(YamlReader *reader, const YamlNode *node)
 {
     if (node->type != YAML_SCALAR) {

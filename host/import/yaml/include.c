@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-// Bounds the depth of files that include each other.
+// Bounds the number of included files, and so the depth of their includes.
 enum { FILES_MAX = 100 };
 
 typedef struct {
@@ -20,15 +20,15 @@ typedef struct {
 
 typedef struct {
     YamlReader *reader;
-    Source *last; // of the files so far
-    size_t base;  // of the next file's offsets
+    Source *last; // source of the latest file
+    size_t base;  // base of the next file's offsets
     KnownFile files[1 + FILES_MAX];
     size_t file_count;
     bool is_full; // more than FILES_MAX were named
 } Includes;
 
-// The keys of a scene that an included file may have. Collections are joined; other values count only where
-// the scene has none.
+// The keys of a scene that an included file may have. Collections are joined. Other values apply only if the
+// scene has none.
 enum { SECTION_COUNT = 9 };
 static const struct {
     const char *name;
@@ -43,7 +43,7 @@ static const struct {
     {"shutter", false, YAML_SCALAR, NULL},
 };
 
-// A mapping to which files are added.
+// A mapping to which included files are added.
 typedef struct {
     uint32_t root, last;            // child
     uint32_t values[SECTION_COUNT]; // 0: it has none
@@ -79,7 +79,7 @@ static Joined joined_open(const Includes *includes, uint32_t root)
     return joined;
 }
 
-// Appends the pair of a key to the mapping.
+// Appends a key and its value to the mapping.
 static void pair_append(const Includes *includes, Joined *joined, uint32_t key)
 {
     YamlNode *root = node_at(includes, joined->root);
@@ -90,7 +90,7 @@ static void pair_append(const Includes *includes, Joined *joined, uint32_t key)
     joined->last = value;
 }
 
-// Returns the last child of a collection, which has children.
+// Returns the last child of a nonempty collection.
 static uint32_t last_child(const Includes *includes, uint32_t node)
 {
     uint32_t last = node_at(includes, node)->first;
@@ -99,8 +99,8 @@ static uint32_t last_child(const Includes *includes, uint32_t node)
     return last;
 }
 
-// Adds the children of an included collection to that of the mapping: behind those of earlier files, and
-// before its own.
+// Adds the children of an included collection to the mapping's collection, after those of earlier files and
+// before the mapping's.
 static void children_join(const Includes *includes, Joined *joined, size_t section, uint32_t from)
 {
     if (node_at(includes, from)->child_count == 0) return;
@@ -134,7 +134,7 @@ static void pair_join(const Includes *includes, Joined *joined, size_t section, 
     }
 }
 
-// Adds the pairs of an included file's mapping.
+// Adds the pairs of an included file's mapping to the mapping.
 static void file_join(const Includes *includes, Joined *joined, uint32_t root)
 {
     YamlReader *reader = includes->reader;
@@ -168,7 +168,7 @@ static Source *source_add(Includes *includes, const char *path, Text *text)
     return source;
 }
 
-// Reads the file's text to the tree and sets the index of its root. Messages point into the text.
+// Parses the file's text into the tree and sets the index of its root. Messages point into the text.
 static bool text_parse(Includes *includes, Source *source, uint32_t *root)
 {
     YamlReader *reader = includes->reader;
@@ -186,7 +186,7 @@ static bool text_parse(Includes *includes, Source *source, uint32_t *root)
 
 static bool includes_read(Includes *includes, uint32_t root);
 
-// Reads a file that was not read before, and adds it.
+// Reads a file for the first time and adds it to the mapping.
 static bool file_read(Includes *includes, Joined *joined, const char *path, const YamlNode *node)
 {
     YamlReader *reader = includes->reader;
@@ -242,7 +242,7 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
     return is_read;
 }
 
-// Removes the `include` of a mapping and returns its value's index, or 0 if it has none.
+// Removes the `include` of a mapping. Returns the index of its value, or 0 if there is none.
 static uint32_t include_remove(const Includes *includes, uint32_t root)
 {
     YamlReader *reader = includes->reader;

@@ -14,7 +14,7 @@ typedef struct {
     Vector3 edges[2], normal, vertices[3];
 } LightFields;
 
-// Takes `inverse_square`, or what divides the strength at a distance d: constant + linear d + quadratic d^2.
+// Reads `inverse_square`, or the divisor constant + linear d + quadratic d^2 of the strength at distance d.
 static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
@@ -57,7 +57,7 @@ static const Field directional_fields[] = {
     COLOR,
 };
 
-// `look_at` and `direction` share a member: a target becomes a direction at the end.
+// `look_at` and `direction` share a member, in which a target finally becomes a direction.
 static const Field spot_fields[] = {
     {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
     {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED, NULL},
@@ -123,7 +123,7 @@ static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
     return true;
 }
 
-// Two vectors of this length across a direction and each other.
+// Sets two vectors of the given length, perpendicular to a direction and to each other.
 static void across_set(Vector3 across[2], Vector3 direction, double length)
 {
     const Vector3 axis = vector_normalize(direction);

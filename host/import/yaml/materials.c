@@ -72,7 +72,7 @@ static bool read_channels(YamlReader *reader, const Field *field, const YamlNode
     return true;
 }
 
-// The indices of refraction at 650, 550 and 450 nm, between neighbors of the tables of Johnson, Christy,
+// The indices of refraction at 650, 550 and 450 nm, interpolated from the tables of Johnson, Christy,
 // Optical constants of the noble metals, Phys. Rev. B 6(12), 1972, and for aluminium of Rakic, Algorithm for
 // the determination of intrinsic optical constants of metal films, Applied Optics 34(22), 1995.
 static const struct {
@@ -115,7 +115,7 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
     return true;
 }
 
-// Returns the file that has the node: of a value of --set the scene's.
+// Returns the path of the node's file, which is the scene's for a value of --set.
 static const char *node_file(const YamlReader *reader, const YamlNode *node)
 {
     const Source *scene_source = reader->report.source;
@@ -141,7 +141,7 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     return path;
 }
 
-// Reads the name of a file, or a mapping of a file and its layer.
+// Reads a file's name, or a mapping of a file and its layer.
 static bool content_read(YamlReader *reader, const Field *field, const YamlNode *node, TextureContent content,
                          uint32_t *target)
 {
@@ -180,7 +180,7 @@ static bool read_normal_map(YamlReader *reader, const Field *field, const YamlNo
     return content_read(reader, field, node, TEXTURE_NORMALS, target);
 }
 
-// Takes a factor or a color in the field's range. Sets the largest channel and the tint.
+// Reads a factor or a color in the field's range. Sets the largest channel and the tint.
 static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *node, double *largest,
                         Color *tint)
 {
@@ -221,8 +221,8 @@ static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *
     return true;
 }
 
-// Warns of a surface that sends on more light than arrives, which each bounce multiplies. Diffuse light is
-// not counted, since what reflects by the angle, as plastic does, leaves most of it. Sums of decimals round.
+// Warns of a surface that passes on more light than it receives, which each bounce multiplies. Ignores
+// diffuse light, most of which remains under reflection by angle, as in plastic. Sums of decimals round.
 static void energy_check(YamlReader *reader, const Material *material, const YamlNode *node)
 {
     const double reflection = material->reflection, transmission = material->transmission;
@@ -235,7 +235,7 @@ static void energy_check(YamlReader *reader, const Material *material, const Yam
                                                : "");
 }
 
-// Reports keys that only textures give a meaning.
+// Reports keys that have a meaning only with textures.
 static void textures_check(YamlReader *reader, const Material *material, const YamlNode *node)
 {
     const YamlNode *size = field_node(reader, node, "size"),
@@ -274,7 +274,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     };
     Material material = material_default();
     const YamlNode *conductor = node ? field_node(reader, node, "conductor") : NULL;
-    if (conductor != node) { // a metal's default
+    if (conductor != node) { // the default of a metal
         material.reflection = 1;
         material.ambient = 0;
         material.diffuse = vector_all(0);

@@ -1,4 +1,4 @@
-// `mesh:` of YAML scenes.
+// Reads `mesh:` of YAML scenes.
 #include "host/base/array.h"
 #include "host/import/mesh/mesh_import.h"
 #include "host/import/yaml/yaml.h"

@@ -58,7 +58,7 @@ static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, O
                         "'max' must not be below 'min'");
 }
 
-// `from` and `to` share members with `point` and `axis`: until cylinder_finish the axis holds the finite
+// `from` and `to` share members with `point` and `axis`. Until cylinder_finish the axis holds the finite
 // form's `to`.
 static const Field cylinder_fields[] = {
     {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FINITE, REQUIRED, NULL},
@@ -91,7 +91,8 @@ static bool read_two_radii(YamlReader *reader, const Field *field, const YamlNod
     return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
 }
 
-// As of cylinders; and until cone_finish the slope holds the infinite form's angle in degrees.
+// `from` and `to` share members with `apex` and `axis`. Until cone_finish the axis holds the finite form's
+// `to`, and the slope the infinite form's angle in degrees.
 static const Field cone_fields[] = {
     {"from", read_vector, offsetof(Object, as.cone.from), FORM_FINITE, REQUIRED, NULL},
     {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FINITE, REQUIRED, NULL},
@@ -146,7 +147,7 @@ static const Field torus_fields[] = {
     MATERIAL_AND_TRANSFORM,
 };
 
-// `radius` is that of the rim: until paraboloid_finish the focal length holds it.
+// Until paraboloid_finish the focal length holds `radius`, the radius of the rim.
 static const Field paraboloid_fields[] = {
     {"apex", read_vector, offsetof(Object, as.paraboloid.apex), FORM_ANY, REQUIRED, NULL},
     {"axis", read_direction, offsetof(Object, as.paraboloid.axis), FORM_ANY, REQUIRED, NULL},
@@ -179,12 +180,12 @@ typedef struct {
     // Checks fields against each other and derives members. Reports an error and returns false if they do not
     // fit. May be NULL.
     bool (*finish)(YamlReader *reader, const YamlNode *mapping, Form form, Object *object);
-    bool takes_texture; // of its material
+    bool takes_texture; // whether its material may have a texture
 } Shape;
 
 #define FIELDS(fields) fields, COUNT_OF(fields)
 
-// Indexed by ShapeType; a mesh has its own reader.
+// The shapes by ShapeType, except meshes, which have a separate reader.
 static const Shape shapes[SHAPE_OVAL] = {
     {{.type = SHAPE_SPHERE}, FIELDS(sphere_fields), NULL, true},
     {{.type = SHAPE_PLANE}, FIELDS(plane_fields), NULL, true},

@@ -8,13 +8,13 @@
 // Bounds the cost of a wrong name.
 enum { NAMES_COMPARED = 1000 };
 
-// The way from the document's root to a node, as far as an override's PATH was read.
+// The path from the document's root to a node, as far as an override's PATH has been read.
 typedef struct {
     YamlTree *tree;
     Report *report; // of the override's text
     const char *text;
-    size_t at;         // behind the parts that were read
-    size_t parent_end; // behind the parts before the last one
+    size_t at;         // past the parts that were read
+    size_t parent_end; // past the parts before the last one
     size_t base;       // of the text's offsets among those of the document's source
     uint32_t node, parent;
     uint32_t previous; // the parent's child before the node and its key; 0: none
@@ -30,7 +30,7 @@ static YamlNode *node_at(const Path *path, uint32_t index)
     return &path->tree->nodes.items[index];
 }
 
-// Adds a scalar without a parent, which stands at the offset of the override's text.
+// Adds a scalar without a parent, at an offset of the override's text.
 static uint32_t scalar_add(const Path *path, const char *text, size_t offset)
 {
     Text *texts = &path->tree->texts;
@@ -51,7 +51,7 @@ static void child_append(const Path *path, uint32_t last, uint32_t child)
     node_at(path, path->node)->child_count++;
 }
 
-// Returns whether the path's node is of a type, and reports an error if it is not.
+// Returns whether the path's node has the type. Reports an error if it does not.
 static bool node_is(const Path *path, YamlType type)
 {
     static const char *const names[] = {
@@ -78,13 +78,13 @@ static bool is_blank(const char *text)
     return text[strspn(text, " ")] == '\0';
 }
 
-// Returns whether the part that was read may name something new: it is the last one, with a value.
+// Returns whether the current part may name a new node, because it is the last part and a value follows.
 static bool can_add(const Path *path)
 {
     return is_last(path) && !is_blank(path->text + path->at + 1);
 }
 
-// Within a path a new name is more likely a mistake.
+// Reports a missing name. A new name within a path is probably a mistake.
 static bool missing_report(const Path *path, const char *name, size_t start)
 {
     const char *known[NAMES_COMPARED];
@@ -162,7 +162,7 @@ static bool index_read(Path *path)
     return index_follow(path, (uint32_t)strtoul(path->text + start + 1, NULL, 10), start);
 }
 
-// Reads a name up to the next part. One in quotes may have any characters but these quotes.
+// Reads a name up to the next part. A quoted name may have any characters but the quote.
 static bool name_read(Path *path)
 {
     const char first = path->text[path->at];
@@ -178,7 +178,7 @@ static bool name_read(Path *path)
     return followed;
 }
 
-// Moves the path to the node that the override's PATH names, and `at` behind its `=`.
+// Moves the path to the node that the override's PATH names, and `at` past its `=`.
 static bool path_follow(Path *path)
 {
     do {
@@ -194,8 +194,7 @@ static bool path_follow(Path *path)
     return true;
 }
 
-// Adds the nodes of the VALUE and sets the index of their root. A # there begins a color, since a comment
-// would be of no use.
+// Adds the nodes of the VALUE and sets the index of their root. A # begins a color, not a comment.
 static bool value_read(const Path *path, uint32_t *root)
 {
     const size_t start = path->at + strspn(path->text + path->at, " ");

@@ -1,4 +1,4 @@
-// `transform:` of YAML scenes.
+// Reads `transform:` of YAML scenes.
 #include "host/base/array.h"
 #include "host/import/yaml/yaml.h"
 
@@ -21,7 +21,7 @@ typedef struct {
     Affine matrix;
 } Steps;
 
-// Takes one number for all axes or three. None may be 0.
+// Reads one number for all axes or three numbers. None may be 0.
 static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     Vector3 *scale = target;
@@ -35,7 +35,7 @@ static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *n
     return report_error(&reader->report, node->offset, "'%s' must not be zero", field->name);
 }
 
-// Takes the angles about x, y and z, or an axis and an angle.
+// Reads the angles about x, y and z, or an axis and an angle.
 static bool read_rotation(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
@@ -85,7 +85,7 @@ static bool step_read(YamlReader *reader, const Field *field, const YamlNode *no
     return true;
 }
 
-// Whether each number is at most NUMBER_MAX and no row is nearly within the plane of the other two.
+// Returns whether each number is at most NUMBER_MAX and no row lies nearly in the plane of the other two.
 static bool has_inverse(const Affine *affine)
 {
     double lengths = 1;

@@ -9,7 +9,7 @@
 
 enum { DEPTH_MAX = 32, ANCHORS_MAX = 1000 };
 
-// Offsets are of 32 bits, of texts too, which may be twice as long with the NUL behind each.
+// Bounds the offsets to 32 bits. Those of texts may be twice as large, because a NUL ends each text.
 static const size_t source_length_max = (size_t)1 << 31;
 
 typedef struct {
@@ -53,8 +53,8 @@ static void node_append(TreeBuilder *builder, YamlNode node)
     parent->last_child = index;
 }
 
-// Chunk by chunk: libfyaml 0.7's fy_token_get_text leaks on some quoted texts of several lines, and its
-// fy_token_iter_read returns chunks in the wrong order.
+// Appends a token's text by chunks, because libfyaml 0.7's fy_token_get_text leaks on some quoted texts of
+// several lines, and its fy_token_iter_read returns chunks in the wrong order.
 static bool token_append_text(Text *text, struct fy_token *token)
 {
     struct fy_token_iter *iterator = fy_token_iter_create(token);
@@ -99,7 +99,7 @@ static void collection_close(TreeBuilder *builder)
     node->end = (uint32_t)(builder->base + builder->value_end);
 }
 
-// Later anchors of a name hide earlier ones (YAML 1.2.2, section 7.1).
+// Returns the anchor of a name. Later anchors hide earlier ones of the same name (YAML 1.2.2, section 7.1).
 static const Anchor *anchor_find(const TreeBuilder *builder, const char *name, size_t length)
 {
     for (size_t i = builder->anchors.count; i-- > 0;) {
@@ -197,7 +197,8 @@ static size_t place_offset(const Source *source, int line, int column)
     return at;
 }
 
-// `parsed` is what the parser read, and `end` how far it came, for the few errors it does not describe.
+// Reports the parser's first error. `parsed` is the parsed text and `end` the parser's position, for the few
+// errors that it does not describe.
 static void syntax_report(struct fy_diag *diagnostics, Report *report, const Source *parsed, size_t end)
 {
     if (errno == ENOMEM) fault("out of memory: reading %s%s", report->source->file, fault_limits());
@@ -236,7 +237,8 @@ static bool tree_build(TreeBuilder *builder, struct fy_parser *parser, struct fy
     return true;
 }
 
-// Checked first: libfyaml 0.7 stops at other bytes or never returns.
+// Returns whether the source is UTF-8 without NUL, and reports an error otherwise. On other bytes libfyaml
+// 0.7 stops or never returns.
 static bool source_is_text(const Source *source, Report *report)
 {
     for (size_t at = 0, size; at < source->length; at += size) {
@@ -246,7 +248,7 @@ static bool source_is_text(const Source *source, Report *report)
     return true;
 }
 
-// Reads `parsed`, which is the report's source or as long.
+// Parses `parsed`, which is the report's source or a text of the same length.
 static bool source_read(YamlTree *tree, Report *report, size_t base, const Source *parsed, Stage *stage)
 {
     if (base > source_length_max || parsed->length > source_length_max - base)
@@ -280,7 +282,7 @@ bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage)
 bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start)
 {
     const Source *source = report->source;
-    Text blanked = {0}; // in which all offsets are those of the source
+    Text blanked = {0}; // has the same offsets as the source
     text_append(&blanked, source->bytes, source->length);
     memset(blanked.items, ' ', start);
     const bool is_read =

@@ -1,5 +1,5 @@
-// A YAML document as a tree of nodes with byte offsets. libfyaml parses; this tree keeps offsets, and aliases
-// share their target, so that no document expands while it is read.
+// A YAML document as a tree of nodes with byte offsets. libfyaml parses it. Aliases share their target's
+// children, so that no document expands while it is read.
 #pragma once
 
 #include "host/base/stage.h"
@@ -8,9 +8,9 @@
 
 typedef enum { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING } YamlType;
 
-// A scene of ten million spheres has 120 million nodes.
+// A node, which is small because a scene of ten million spheres has 120 million of them.
 typedef struct {
-    uint32_t offset, end; // of the first byte, in the source, and behind the last
+    uint32_t offset, end; // of the first byte in the source, and past the last
     uint32_t next;        // sibling; 0: none
     union {
         uint32_t first; // child; 0: none
@@ -38,7 +38,7 @@ bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage);
 bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start);
 void yaml_tree_free(YamlTree *tree);
 
-// Copies the children of a node if they may be those of another one, which an alias makes share them.
+// Copies the children of a node if an alias may share them.
 void yaml_children_unshare(YamlTree *tree, uint32_t node);
 
 // Returns the next child, or NULL at the end. A mapping's children are key, value, key, value …

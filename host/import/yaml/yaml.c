@@ -1,4 +1,4 @@
-// YAML scenes: the document and its camera. Reference: docs/scene-format.md.
+// Reads the document of a YAML scene and its camera (docs/scene-format.md).
 #include "host/import/yaml/yaml.h"
 #include "host/base/array.h"
 #include "host/base/memory.h"
@@ -28,7 +28,7 @@ static bool read_projection(YamlReader *reader, const Field *field, const YamlNo
            expected_report(reader, field->name, "equirectangular", node);
 }
 
-// Takes a distance or a point.
+// Reads a distance or a point.
 static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     CameraFields *read = target;
@@ -96,7 +96,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
     }
 }
 
-// Takes what --set adds, since files are included before values are set.
+// Rejects an `include` that --set adds, because files are included before values are set.
 static bool read_include(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     (void)target;

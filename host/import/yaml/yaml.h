@@ -1,4 +1,4 @@
-// The parts of a YAML scene, one file each.
+// The readers of the parts of a YAML scene, one file each.
 #pragma once
 
 #include "host/import/load.h"
@@ -6,13 +6,13 @@
 #include "host/scene/affine.h"
 #include "host/scene/daylight.h"
 
-// Reads the `materials` mapping; read_material then knows their names.
+// Reads the `materials` mapping, whose names read_material accepts from then on.
 void yaml_read_materials(YamlReader *reader, const YamlNode *node);
 
-// Reads a material's name or an inline material; the target is a uint32_t, the material's index.
+// Reads a material's name or an inline material into a uint32_t, the material's index.
 FieldReader read_material;
 
-// Reads the name of an image, or a mapping with its layer; the target is a uint32_t, as in Material.texture.
+// Reads an image's name, or a mapping of an image and its layer, into a uint32_t like Material.texture.
 FieldReader read_texture;
 
 // Returns the default material's index.
@@ -47,28 +47,29 @@ typedef struct {
 // Reads a color or a sky into a Background.
 FieldReader read_background;
 
-// Sets the scene's background, adds the light of its sun and, where `ambient` is NaN, sets the ambient light,
-// to 0 where the sky is a light. Nothing after an error.
+// Sets the scene's background, ambient light and sky, and adds the light of its sun. If `ambient` is NaN,
+// the ambient light is the background's mean, or 0 if the sky is a light. Adds no image or sun after an
+// error.
 void yaml_set_background(YamlReader *reader, const Background *background, Color ambient);
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node);
 void yaml_read_lights(YamlReader *reader, const YamlNode *node);
 extern const Range range_disc_angle;
-// Makes a directional light that of a disc in the sky, of an angle in degrees, unless that is 0.
+// Turns a directional light into that of a disc in the sky, of an angle in degrees, unless the angle is 0.
 void light_set_angle(Light *light, double degrees);
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping); // the value of `mesh:`
 
 // Reads the list of objects of a scene, which shows progress, of a group or of a definition.
 void yaml_read_object_list(YamlReader *reader, const YamlNode *list, bool shows_progress);
 
-// Reads the `define` mapping; its names are then known to yaml_read_instance.
+// Reads the `define` mapping, whose names yaml_read_instance accepts from then on.
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node);
 void yaml_definitions_free(YamlReader *reader);
 void yaml_read_group(YamlReader *reader, const YamlNode *mapping);    // the value of `group:`
 void yaml_read_instance(YamlReader *reader, const YamlNode *mapping); // the value of `instance:`
 
-// Transforms the scene's objects from the index `first` on. Reports an error at the node `transform` if it
-// does not suit one of them.
+// Transforms the scene's objects from the index `first` on. Reports an error at the node `transform` if an
+// object does not support it.
 void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine,
                             const YamlNode *transform);
 
