@@ -1,6 +1,6 @@
 #!/bin/bash
-# The code that docs/adding-a-shape.md shows is the sources': each of its blocks, spaces aside, stands in a file named before
-# it, and every file it names is there.
+# The code that docs/adding-a-shape.md shows is that of the sources. Each of its blocks, spaces aside, is in a file named before
+# it, and every file it names exists.
 . "$(dirname "$0")/support.bash"
 
 command -v python3 >/dev/null || skip_all "there is no python3"

@@ -1,5 +1,5 @@
-// Tests are programs, too, that are started again to read a mesh by assimp. Those whose file has one of these
-// names misbehave as assimp might.
+// glint restarts its own program, here a test, to read a mesh by assimp. If the mesh's file has one of these
+// names, the new process misbehaves as assimp might.
 #include "host/import/mesh/assimp_process.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"

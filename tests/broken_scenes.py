@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def scenes(ending):
-    """The name and the bytes of each scene."""
+    """Yields the name and the bytes of each scene."""
     table = Path(__file__).with_name("broken") / f"{ending}.txt"
     start, *sections = re.split(r"(?m)^#### scene ", table.read_text(encoding="utf-8"))
     for section in sections:
@@ -21,7 +21,7 @@ def scenes(ending):
 
 
 def write(ending, folder):
-    """The files written."""
+    """Writes the scenes as files and returns their paths."""
     paths = [Path(folder, name) for name, _ in scenes(ending)]
     for path, (_, content) in zip(paths, scenes(ending)):
         path.write_bytes(content)

@@ -91,7 +91,7 @@ static inline size_t check_small(Scene *scene, uint32_t bounce_count, const char
     return check_image(scene, &settings, what, number);
 }
 
-// A scene seen along -z from a point, `half_tangent` up and down.
+// Returns an empty scene seen along -z from a point, with `tangent` as the camera's half_tangent.
 static inline Scene scene_seen_from(Vector3 from, double tangent)
 {
     Scene scene = {.camera = {.position = from,

@@ -1,5 +1,5 @@
 #!/bin/bash
-# The short run of tools/chaos: what glint relies on fails, and glint keeps its promises (docs/design.md). With
+# The short run of tools/chaos, in which what glint relies on fails and glint keeps its promises (docs/design.md). With
 # GLINT_LONG_TESTS=1 it runs tools/chaos --long. A sanitized build replaces the allocators and handlers.
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,4 +1,4 @@
-// What each test program of cmocka begins with.
+// The includes and macros that each test program of cmocka begins with.
 #pragma once
 
 #include "host/base/array.h"

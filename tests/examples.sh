@@ -1,9 +1,9 @@
 #!/bin/bash
-# What the documents show a command print is what it prints today: exactly where nothing is timed, else line for line with
-# other numbers, hashes and device names. GLINT_LONG_TESTS=1 also runs commands that measure.
+# Commands print what the documents show, exactly if nothing is timed, else line for line with other numbers, hashes and device
+# names. GLINT_LONG_TESTS=1 also runs commands that measure.
 . "$(dirname "$0")/support.bash"
 
-# example DOCUMENT COMMAND: the lines below "$ COMMAND" in the document, without their indentation.
+# example DOCUMENT COMMAND: prints the lines below "$ COMMAND" in the document, without their indentation.
 example() {
     awk -v command="    \$ $2" '
         $0 == command { within = 1; next }
@@ -12,7 +12,7 @@ example() {
         within { sub(/^    /, ""); lines[++count] = $0 }
         END { while (count && lines[count] == "") count--; for (i = 1; i <= count; i++) print lines[i] }' "$1"
 }
-# Numbers, hashes, devices and columns made alike.
+# Makes numbers, hashes, devices and columns alike.
 shape() {
     sed -E 's/\(kernel [0-9a-f]+\)/(kernel H)/; s/\b[0-9a-f]{16}\b/H/g; s/[-+]?[0-9.]+(e[-+]?[0-9]+)?|inf/N/g; s/ on .* \(/ on D (/; s/ +/ /g; s/ $//' |
         grep -v -e 'Portable Computing Language' -e '^ for an error of' -e 'fastest rows' -e 'crossed out' | sort -u

@@ -12,12 +12,11 @@ int folder_close(void **state);
 // Returns the number of files in the working folder that have `part` in their names.
 unsigned folder_count(const char *part);
 
-// Creates an empty folder and sets XDG_CACHE_HOME, POCL_CACHE_DIR and TMPDIR to it; the second function
-// removes it.
+// Creates an empty folder for XDG_CACHE_HOME, POCL_CACHE_DIR and TMPDIR, which scratch_close removes.
 char *scratch_open(void);
 void scratch_close(char *folder);
 
-// The same for cmocka's setup and teardown.
+// The folder that cmocka's setup and teardown below open and close.
 extern char *scratch;
 int scratch_set_up(void **state);
 int scratch_tear_down(void **state);

@@ -21,8 +21,8 @@ const uint32_t *tested_lanes(const Device *device);
      FEATURE_TRANSMISSION | FEATURE_EYE_POWERS | FEATURE_BVH)
 
 // Returns settings for the whole image, one sample per pixel, with the defaults of glint render except for
-// the features: unless tests are long, all are built in, at certified CERTIFIED_FEATURES, so that all tests
-// of a run share one program per precision.
+// the features. Unless tests are long, all are built in, or CERTIFIED_FEATURES at certified, so that all
+// tests of a run share one program per precision.
 RenderSettings film_settings(uint32_t width, uint32_t height, Precision precision);
 
 // Returns true, after printing the reason, if a passport of the device's arithmetic refuses the precision of
@@ -38,7 +38,7 @@ Film film_render(Compute *compute, const Scene *scene, const RenderSettings *set
 
 // Returns the color of the part of a film that starts at x, y.
 Film film_cut(const Film *film, uint32_t x, uint32_t y, uint32_t width, uint32_t height);
-// Returns its color with the columns from right to left.
+// Returns the color of a film with its columns from right to left.
 Film film_flipped(const Film *film);
 
 // Fails the test, naming the first pixel that differs, unless the layers that both have are equal in value

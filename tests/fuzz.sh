@@ -1,6 +1,7 @@
 #!/bin/bash
-# 20,000 runs of libFuzzer on each reader, 100,000 on those of meshes, at length only; for more: tools/fuzz. Built
-# with clang's sanitizers, whatever the rest is. The same whatever is under test. run_tests: sanitize-long-only
+# Runs libFuzzer 20,000 times on each reader, 100,000 on those of meshes, in long tests only. tools/fuzz does more. Always built
+# with clang's sanitizers, and the same whatever is under test.
+# run_tests: sanitize-long-only
 . "$(dirname "$0")/support.bash"
 is_long || skip_all "only with GLINT_LONG_TESTS=1"
 fuzzes() { echo 'int LLVMFuzzerTestOneInput(void) { return 0; }' | "$1" -fsanitize=fuzzer -x c - -o /dev/null 2>/dev/null; }

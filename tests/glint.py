@@ -1,4 +1,4 @@
-"""Shared by the Python tests: runs the program in a separate folder and reads the files that it writes.
+"""Runs the program in a separate folder for the Python tests, and reads the files that it writes.
 
 Tests are the executable tests/test_*.py; other Python files are helpers. A test finds the program in GLINT and its build
 folder in BUILD, and exits with 77 when it skips. Kernel caches are those of XDG_CACHE_HOME, shared by the tests of a run.
@@ -50,7 +50,7 @@ BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
 
 
 def plain(name, folder="."):
-    """One of scenes/; unless tests are long a copy with the features of BALLS, so that the same kernels serve both."""
+    """Returns one of scenes/, or unless tests are long a copy with the features of BALLS, so that the same kernels serve both."""
     if IS_LONG:
         return ROOT / "scenes" / name
     others = "plane:", "box:", "cylinder:", "directional:"
@@ -67,7 +67,7 @@ def skip_all(reason):
 
 
 def run(command, wrapper=(), env=None, **options):
-    """The finished process of `glint COMMAND`; a wrapper is the command that starts the program."""
+    """Runs `glint COMMAND` and returns the finished process. A wrapper is the command that starts the program."""
     options = {"stdin": subprocess.DEVNULL} | options if "input" not in options else options
     options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
     environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"} | {"LC_ALL": "C"}
@@ -75,7 +75,7 @@ def run(command, wrapper=(), env=None, **options):
 
 
 def terminal_run(command):
-    """What `glint COMMAND`, whose report goes to a file, prints on the terminal."""
+    """Returns what `glint COMMAND`, whose report goes to a file, prints on the terminal."""
     terminal, end = pty.openpty()
     with open("report.json", "w", encoding="utf-8") as report:
         process = run(command, stdout=report, stderr=end)
@@ -100,7 +100,7 @@ def shim_build(name, source, *flags):
 
 
 def need_device():
-    """Skips the whole test where there is no OpenCL device; returns the default device."""
+    """Skips the whole test if there is no OpenCL device. Returns the default device."""
     process = run("devices --json")
     if process.returncode != 0:
         skip_all(f"no OpenCL device: {process.stderr}")
@@ -109,7 +109,7 @@ def need_device():
 
 @functools.cache
 def probed_device():
-    """The default device with its passports, measured without any test's shim."""
+    """Returns the default device with its passports, measured without any test's shim."""
     return next(device for device in json.loads(run("devices --probe --json").stdout)["devices"] if device["default"])
 
 
@@ -125,7 +125,7 @@ def broken_at_single():
 
 
 def need_clang(tool):
-    """Builds what one of tools/ needs to compile kernels by clang; returns the version of clang. Skips the whole test if
+    """Builds what one of tools/ needs to compile kernels by clang. Returns the version of clang. Skips the whole test if
     clang is missing, and for a sanitized build, which has the same kernels as the plain one."""
     if IS_SANITIZED:
         skip_all("the plain build's kernels are the same")
@@ -148,7 +148,7 @@ def find_python(*modules):
 
 
 def need_modules(*modules):
-    """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip; skips it where there is none."""
+    """Restarts the test in a Python that has the modules, MODULE=REQUIREMENT of pip. Skips it if there is none."""
     if all(importlib.util.find_spec(module.partition("=")[0]) for module in modules):
         return
     python = find_python(*modules)
@@ -158,7 +158,7 @@ def need_modules(*modules):
 
 
 def find_icd(name):
-    """The file by which the OpenCL loader finds an implementation, as OCL_ICD_VENDORS takes it."""
+    """Returns the file by which the OpenCL loader finds an implementation, as OCL_ICD_VENDORS takes it."""
     return next(map(str, Path("/etc/OpenCL/vendors").glob(f"*{name}*.icd")), "/not-installed.icd")
 
 
@@ -194,7 +194,7 @@ class TestCase(unittest.TestCase):
         return process
 
     def refuses(self, command, pattern, status=1, **options):
-        """`glint COMMAND` must exit with the status, say why on standard error and print nothing."""
+        """Checks that `glint COMMAND` exits with the status, reports why on standard error and prints nothing."""
         process = self.glint(command, status, **options)
         if not re.search(pattern, process.stderr, re.MULTILINE):
             self.skip_if_refused(process.stderr)
@@ -220,7 +220,7 @@ def read(path):
 
 
 def npy_read(path):
-    """Shape, type and pixels of an image of float, double or unsigned: numbers, or tuples where it has channels."""
+    """Returns shape, type and pixels of an image of float, double or unsigned. Pixels are numbers, or tuples if it has channels."""
     data = Path(path).read_bytes()
     assert data[:8] == b"\x93NUMPY\x01\x00", path
     (length,) = struct.unpack("<H", data[8:10])
@@ -233,7 +233,7 @@ def npy_read(path):
 
 
 def png_read(path):
-    """(width, height, bits, color type), raw rows, texts by keyword, and the kinds of chunk; checks every checksum."""
+    """Returns (width, height, bits, color type), raw rows, texts by keyword, and the types of chunks. Checks every checksum."""
     data = Path(path).read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n", path
     at, chunks = 8, []
@@ -250,7 +250,7 @@ def png_read(path):
 
 
 def checkpoint_rows(path):
-    """The rows of all whole records; 0 where there is no such file."""
+    """Returns the number of rows of all whole records, or 0 if there is no such file."""
     data = Path(path).read_bytes() if Path(path).exists() else b""
     head, record = struct.Struct("<16sQQ16s"), struct.Struct("<6IQQQQ16s")
     if len(data) < head.size:
@@ -264,7 +264,7 @@ def checkpoint_rows(path):
 
 
 def csv_rows(text):
-    """Lists of numbers below the head, None where a cell is empty."""
+    """Returns lists of the numbers below the head, with None for an empty cell."""
     head, *rows = csv.reader(text.splitlines())
     return head, [[float(cell) if cell else None for cell in row] for row in rows]
 

@@ -1,7 +1,7 @@
 #!/bin/sh
-# Includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene, then image; opencl}, base. A room
-# includes itself and the rooms below it; only compile, render and opencl include the kernels' shared headers, each its own;
-# only opencl and render include OpenCL's, only view those of the window, only mpi MPI's.
+# Includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene, then image;
+# opencl}, base. A room includes itself and the rooms below it. Only compile, render and opencl include the kernels' shared
+# headers, each its set, only opencl and render include OpenCL's, only view those of the window, and only mpi MPI's.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -40,7 +40,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 failed=0
 
-# The check itself: a tree with one include is as allowed as the first argument says.
+# Tests the check itself. A tree with one include must be as allowed as the first argument states.
 expect() {
     rm -rf "$scratch/tree"
     mkdir -p "$scratch/tree/kernels" "$scratch/tree/host" "$scratch/tree/$(dirname "$2")"

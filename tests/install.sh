@@ -6,7 +6,7 @@ make=${MAKE:-make}
 build=${BUILD:-build}
 version=$(sed -n 's/^VERSION := //p' Makefile)
 
-# AppStream 1.0 asks for a homepage, which glint does not have; 0.16 does not know the name of that question.
+# AppStream 1.0 asks for a homepage, which glint does not have. Version 0.16 does not know the name of that question.
 metadata_validate() {
     appstreamcli validate --no-net --override=url-homepage-missing=info "$1" || appstreamcli validate --no-net "$1"
 }

@@ -401,7 +401,7 @@ MEANINGS = {
 
 
 def alternatives(name):
-    """a.{b,c} stands for a.b and a.c."""
+    """Returns the names that a name with braces stands for, as a.{b,c} stands for a.b and a.c."""
     if not (group := re.search(r"\{([^}]*)\}", name)):
         return [name]
     return [way for word in group[1].split(",") for way in alternatives(name[:group.start()] + word + name[group.end():])]
@@ -412,7 +412,7 @@ PATTERNS = {way: (name, *(meaning + "; ").split("; ", 1))
 
 
 def meaning_of(path):
-    """The rule, type and words of a member; None if there are none."""
+    """Returns the rule, type and words of a member, or None if there are none."""
     parts = path.split(".")
     for start in range(len(parts)):
         end = parts[start:]
@@ -424,7 +424,7 @@ def meaning_of(path):
 
 
 class Shape:
-    """What reports hold at one place: how often which types, and what is within."""
+    """The values of reports at one place, with the count of each type and the members within."""
     def __init__(self):
         self.types, self.members, self.elements = {}, {}, None
 
@@ -472,7 +472,7 @@ SCALARS["figure"] = {"anyOf": [SCALARS["number"], {"$ref": "#/$defs/unavailable"
 
 
 def schema_of(reports):
-    """The JSON Schema of reports of one command, which are together of every kind that it prints."""
+    """Returns the JSON Schema of reports of one command, which together are of every type that it prints."""
     shape = Shape()
     for report in reports:
         shape.add(report)
@@ -484,7 +484,7 @@ def braced(words):
 
 
 def merged(rows):
-    """Rows of one type and meaning whose paths differ in one part become one row with alternatives."""
+    """Merges rows of one type and meaning whose paths differ in one part into one row with alternatives."""
     kept = []
     for parts, kind, words in rows:
         for row in kept:
@@ -499,18 +499,18 @@ def merged(rows):
 
 
 def roff(text):
-    """As roff prints it; `words` are bold."""
+    """Returns the text in roff, with `words` in bold."""
     text = re.sub("[^\0-~]", lambda character: f"\\[u{ord(character[0]):04X}]", text.replace("\\", r"\e").replace("-", r"\-"))
     return re.sub("`([^`]*)`", r"\\fB\1\\fR", text)
 
 
 def breakable(path):
-    """A line may end after a comma or a point."""
+    """Returns the path in roff, where a line may end after a comma or a point."""
     return re.sub(r"([,.])(?=.)", r"\1\:", path)
 
 
 def section(heading, schema, paths):
-    """The entries of a command's members, in the order printed."""
+    """Returns the entries of a command's members, in the order printed."""
     rows = []
     for path in paths:
         rule, kind, words = meaning_of(path)

@@ -4,7 +4,7 @@
 
 command -v python3 >/dev/null || skip_all "there is no python3"
 
-# found FILE LINES: the lines with findings are these.
+# found FILE LINES: checks that these are the lines with findings.
 found() {
     check "$1: lines $2" test "$(tools/lint-words "$scratch/$1" | sed -E 's/^[^:]*:([0-9]+):.*/\1/' | sort -nu | xargs)" = "$2"
 }

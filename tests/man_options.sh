@@ -1,5 +1,6 @@
 #!/bin/bash
-# The options of each command and the keys of the window are the same in its --help and in the manual pages, which tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
+# The options of each command and the keys of the window are the same in its --help and in the manual pages, which
+# tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 GLINT=${GLINT:-build/glint}
@@ -32,7 +33,7 @@ if [ "$listed" != "$subcommands" ]; then
     failed=1
 fi
 
-# bash's completion at work: $1 is what stands on the line, $2 what it should offer.
+# Checks what bash's completion offers, where $1 is on the line and $2 is what it should offer.
 offers() {
     local offered
     offered=$(

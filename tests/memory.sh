@@ -1,5 +1,5 @@
 #!/bin/bash
-# Memory is that of a band, not of the image. GLINT_LONG_TESTS=1 renders the whole 32768x32768 as well (minutes).
+# Memory is that of a band, not of the image. GLINT_LONG_TESTS=1 also renders the whole 32768x32768 (minutes).
 . "$(dirname "$0")/support.bash"
 is_sanitized && skip_all 'a sanitized program needs more memory'
 cd "$scratch" || exit 1
@@ -11,8 +11,7 @@ objects:
   - plane: {point: [0, -1, 0], normal: [0, 1, 0]}
 E2
 
-# peak WIDTHxHEIGHT OPTIONS…: the largest memory of a render, of its ranks the largest one's, in MiB, with its seconds, on
-# standard output.
+# peak WIDTHxHEIGHT OPTIONS…: prints the largest memory of a render, or of its largest rank, in MiB, with its seconds.
 program=("$GLINT")
 scene=ball.yaml
 peak() {
@@ -37,7 +36,7 @@ bounded() {
     fi
 }
 
-# builds the kernels of these options: the memory of the driver's compiler, half a GiB in PoCL 7.1, does not count
+# builds the kernels of these options, since the memory of the driver's compiler, half a GiB in PoCL 7.1, does not count
 built() { check "64x64 $*" "$GLINT" render "$scene" --quiet --size 64x64 "$@"; }
 
 # 10,000 instances of a mesh of 20,000 triangles, which share it
@@ -71,7 +70,7 @@ built --samples 4 --aov t,normal -o deep.exr
 # PoCL 6.0 takes 55 MiB more than PoCL 3.1; the whole image would take 235 MiB
 bounded 240 4096x2048 --samples 4 --aov t,normal -o deep.exr
 [ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 -o huge.png
-# PoCL as two devices: bands that wait for one above them are bounded, too, or in the checkpoint
+# PoCL as two devices: bands that wait for one above them are also bounded, or in the checkpoint
 export POCL_DEVICES='pthread pthread'
 bounded 300 8192x2048 --device portable,1 -o wide.png
 bounded 300 8192x2048 --device portable,1 --checkpoint saved -o wide.png

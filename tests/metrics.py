@@ -24,12 +24,12 @@ def percentile_99_9(values):
 
 
 def srgb8_distance(encoded_reference, encoded):
-    """Steps of 255 between display values."""
+    """Returns the distance of display values in steps of 1/255."""
     return np.abs(np.floor(255 * encoded_reference + 0.5) - np.floor(255 * encoded + 0.5))
 
 
 def flip(encoded_reference, encoded):
-    """FLIP's map and its mean, in float as flip-evaluator computes."""
+    """Returns FLIP's map and its mean, in float as flip-evaluator computes them."""
     images = encoded_reference.astype(np.float32), encoded.astype(np.float32)
     return flip_evaluator.evaluate(*images, "LDR", inputsRGB=True, applyMagma=False, computeMeanError=True,
                                    parameters={"ppd": 67})[:2]

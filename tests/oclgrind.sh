@@ -1,7 +1,7 @@
 #!/bin/bash
-# Images and traces of every shape under Oclgrind: no access outside a buffer, no data race, no value used before it is
-# set, no wrong OpenCL call. Whatever it reports is a failure. It interprets kernels: more pixels, and each shape, light and
-# kind of material alone, with GLINT_LONG_TESTS=1.
+# Images and traces of every shape under Oclgrind have no access outside a buffer, no data race, no value used before it is
+# set, and no wrong OpenCL call. Whatever it reports is a failure. Since it interprets kernels, more pixels, and each shape,
+# light and type of material alone, need GLINT_LONG_TESTS=1.
 . "$(dirname "$0")/support.bash"
 command -v oclgrind >/dev/null || skip_all 'Oclgrind is not here'
 is_sanitized && skip_all 'a sanitized program does not run under Oclgrind'
@@ -13,7 +13,7 @@ oclgrind_run() {
         "$GLINT" "$@" >"$scratch/out" 2>&1
 }
 
-# clean WHAT ARGUMENTS…: glint succeeds and Oclgrind reports nothing.
+# clean WHAT ARGUMENTS…: checks that glint succeeds and Oclgrind reports nothing.
 clean() {
     local what=$1
     shift
@@ -50,7 +50,7 @@ done
 clean 'double' render $scene --size $small --precision double --lanes 1 --quiet -o "$scratch/d.npy"
 is_long || finish
 
-# alone LIGHT OBJECT OPTION…: a scene of both, and what the materials of every_shape.yaml are.
+# alone LIGHT OBJECT OPTION…: renders a scene of both, with the materials of every_shape.yaml.
 alone() {
     local light=$1 object=$2
     shift 2

@@ -1,7 +1,7 @@
 #!/bin/bash
-# The reference that glint verify and the tests compare with, in quadruple precision, against exact arithmetic: the rays of
-# the hard cases, and random ones at every shape. Needs python-flint, from PyPI.
-# With GLINT_LONG_TESTS=1 ten times as many. For the first build alone: the plain build computes the same.
+# Checks the reference that glint verify and the tests compare with, in quadruple precision, against exact arithmetic, for the
+# rays of the hard cases and random ones at every shape, ten times as many with GLINT_LONG_TESTS=1. Needs python-flint, from
+# PyPI. Only for the first build, since the plain build computes the same.
 . "$(dirname "$0")/support.bash"
 build=${BUILD:-build}
 

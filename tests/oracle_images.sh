@@ -1,8 +1,7 @@
 #!/bin/bash
-# Small images of every shape and light, of mirrors and glass, at each precision, pixel by pixel against the exact
-# oracle.
+# Compares small images of every shape and light, of mirrors and glass, at each precision, pixel by pixel with the exact oracle.
 # With GLINT_LONG_TESTS=1 also larger ones of each shape by itself (some minutes).
-# Takes the program from BUILD: the kernels are the same in every build, so that the first build's run is enough.
+# Takes the program from BUILD. The kernels are the same in every build, so that the first build's run is enough.
 . "$(dirname "$0")/support.bash"
 
 python_with flint=python-flint==0.9.0 yaml=PyYAML==6.0.3 numpy=numpy==2.4.6

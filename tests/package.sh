@@ -1,6 +1,6 @@
 #!/bin/bash
-# Tests tools/package: two clones of one commit in different folders, with other permissions for new files, give the same
-# packages and source package, in which lintian finds no error. Only at length. The same whatever is under test.
+# Tests tools/package. Two clones of one commit in different folders, with other permissions for new files, give the same
+# packages and source package, in which lintian finds no error. Only in long tests, and the same whatever is under test.
 # run_tests: sanitize-long-only
 . "$(dirname "$0")/support.bash"
 is_long || skip_all "only with GLINT_LONG_TESTS=1"
@@ -14,7 +14,7 @@ package() (
     umask "$2"
     git clone -q . "$1/glint" && "$1/glint/tools/package" deb "$1/out"
 )
-# AppStream 1.0 asks for a homepage, which glint does not have; older releases of lintian do not know this tag.
+# AppStream 1.0 asks for a homepage, which glint does not have. Older releases of lintian do not know this tag.
 packages_lint() {
     lintian --fail-on error,warning --suppress-tags appstream-metadata-validation-failed "$1" || lintian --fail-on error,warning "$1"
 }

@@ -1,6 +1,6 @@
 #!/bin/bash
-# tools/peers/bench at a small size: the renderer on Embree draws what glint draws, and an image that is of other work
-# is reported; so do Tachyon and POV-Ray of an NFF file, where they are installed. Needs libembree-dev, and PyYAML.
+# tools/peers/bench at a small size reports an image that is of other work. The renderer on Embree draws what glint draws, and
+# so do Tachyon and POV-Ray for an NFF file, where they are installed. Needs libembree-dev and PyYAML.
 . "$(dirname "$0")/support.bash"
 
 is_long || skip_all "only with GLINT_LONG_TESTS=1"
@@ -28,7 +28,7 @@ for row in sys.argv[3:]:
 PYTHON
 }
 
-# Another eye: line 2 of a description is the camera.
+# Moves the eye. Line 2 of a description is the camera.
 cat >"$scratch/moved" <<SH
 #!/bin/sh
 sed '2s/^[^ ]*/0.3/' "\$1" >"$scratch/moved.embree"

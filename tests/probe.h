@@ -60,9 +60,9 @@ static inline Precision probe_sound_from(void)
     return is_sound ? PRECISION_SINGLE : PRECISION_STRICT;
 }
 
-// Returns the least precision at which every build of a kernel must give the same bits: probe_sound_from's,
+// Returns the least precision at which every build of a kernel must give the same bits, probe_sound_from's
 // unless the device's quotients or roots are inexact. Then a compiler may choose another approximation in
-// another build: at `single` an NVIDIA H100 gives other bits at one lane than at four.
+// another build. At `single` an NVIDIA H100 gives other bits at one lane than at four.
 static inline Precision probe_same_bits_from(void)
 {
     const Passport *passport = probe_passport();
@@ -134,8 +134,8 @@ static inline bool probe_keep_band(void *context, const Film *band, double fract
     return true;
 }
 
-// Renders the whole image with one sample per pixel, as glint does: built for the features that the scene
-// needs, seen from the eye.
+// Renders the whole image with one sample per pixel as glint does, by kernels that are built for the
+// features that the scene needs, seen from the eye.
 static inline bool probe_render(const Scene *scene, uint32_t width, uint32_t height, Precision precision,
                                 float *colors)
 {

@@ -72,7 +72,7 @@ RandomRay random_ray(const RandomShape *shape, Random *random)
         eye = vector_subtract(near, vector_scale(vector_normalize(axis), distance));
         return (RandomRay){eye, axis};
     case 3: {
-        // What a sphere of that radius shows as its outline, a little inside or outside.
+        // a point slightly inside or outside of the outline of a sphere of that radius
         Vector3 across =
             vector_normalize(vector_cross(vector_subtract(eye, center), random_unit_vector(random)));
         double miss = random_power(random, -6, -1) * (random_coin(random) ? 1 : -1);

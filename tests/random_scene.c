@@ -29,7 +29,7 @@ static Material random_material(Random *random, size_t index)
         material.reflection_tint = (Color){1, random_between(random, 0, 1), random_between(random, 0, 1)};
     }
     if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
-    // from numbers that are drawn anyway: others would change all scenes
+    // from numbers that are drawn anyway, since others would change all scenes
     if (index == 2) material.transmission_tint = color_tint(material.color);
     if (index == 0) material.emission = (Color){material.diffuse.y, 0, 1.5 * material.diffuse.x};
     if (index == 3) {

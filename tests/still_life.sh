@@ -1,6 +1,7 @@
 #!/bin/bash
-# tools/peers/still-life at a small size: errors fall with the samples, glint's image is POV-Ray's, and an image of another
-# scene is reported. Needs POV-Ray, PyYAML and NumPy. run_tests: sanitize-long-only
+# In tools/peers/still-life at a small size errors fall with the samples, glint's image is POV-Ray's, and an image of another
+# scene is reported. Needs POV-Ray, PyYAML and NumPy.
+# run_tests: sanitize-long-only
 . "$(dirname "$0")/support.bash"
 
 command -v povray >/dev/null || skip_all "POV-Ray is not installed"

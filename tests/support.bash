@@ -30,7 +30,7 @@ check() {
         sed 's/^/    /' "$scratch/check.log" | head -20
     fi
 }
-# Ends the test: with 1 if a check failed or none was made.
+# Ends the test, with status 1 if a check failed or none was made.
 finish() {
     echo "$passed checks passed, $failed failed"
     [ $failed = 0 ] && [ $passed -gt 0 ]
@@ -42,8 +42,8 @@ skip_all() {
 }
 # python_with MODULE[=REQUIREMENT]…: sets `python` to a Python that has the modules: $PYTHON or python3, the system's, else
 # a virtual environment above the system's, which the tests of a run share. There pip installs what is missing, by the
-# module's own name where no requirement is given; a requirement may be several, with spaces between. Skips the test where that fails; once pip had no network, no test
-# asks it for ten minutes.
+# module's name if no requirement is given. A requirement may be several, with spaces between. Skips the test if that fails.
+# Once pip had no network, no test asks it for ten minutes.
 python_with() {
     local import module missing=() folder=$XDG_CACHE_HOME/glint-tests
     local log=$scratch/pip.log offline=$folder/offline lock

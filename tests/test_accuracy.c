@@ -18,8 +18,8 @@ static size_t at(size_t x, size_t y)
     return y * WIDTH + x;
 }
 
-// Object 0 in the left half, 1 in the right one, nothing from column NOTHING_FROM on; the lower half lies in
-// the shadow of light 0. Gray 0.5, 8 away, seen along z.
+// Returns a film of object 0 in the left half, 1 in the right one, and nothing from column NOTHING_FROM on.
+// The lower half lies in the shadow of light 0. All of it is gray 0.5, 8 away and seen along z.
 static Film film_make(void)
 {
     Film film = film_allocate(WIDTH, HEIGHT, LIGHTS, ACCURACY_AOVS);

@@ -29,7 +29,7 @@ def arrays_load(prefix, light_count):
 
 
 def edges_of(values):
-    """Pixels that differ from a 4-neighbor, and the 8 pixels around each of these."""
+    """Returns the pixels that differ from a 4-neighbor, and the 8 pixels around each of these."""
     differs = np.zeros(values.shape, bool)
     across, down = values[:, 1:] != values[:, :-1], values[1:] != values[:-1]
     differs[:, 1:] |= across
@@ -42,7 +42,7 @@ def edges_of(values):
 
 
 def wrong_pixels(reference, variant):
-    """Pixels of another object, and, where the object is the same, of another shadow and of another path."""
+    """Returns the pixels of another object, and, where the object is the same, of another shadow and of another path."""
     same = variant["object"] == reference["object"]
     return {"object": ~same, "shadow": (variant["shadow"] != reference["shadow"]) & same[:, :, None],
             "path": (variant["path"] != reference["path"]) & same}
@@ -56,7 +56,7 @@ def color_error(reference, variant):
 
 
 def worst_candidates(wrong, edges):
-    """Wrong pixels away from edges if there are any, else at edges."""
+    """Returns the wrong pixels away from edges if there are any, else those at edges."""
     away = wrong & ~edges
     candidates = away if away.any() else wrong
     return candidates.any(axis=2) if candidates.ndim == 3 else candidates
@@ -86,13 +86,13 @@ def image_errors(reference, variant):
 
 
 def normal_angles(a, b):
-    """Kahan's angle between unit vectors, not the cross product's; its own errors are of the last place of 1."""
+    """Returns Kahan's angle between unit vectors, not the cross product's. Its errors are of the last place of 1."""
     a, b = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in (a, b))
     return 2 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
 
 
 def expected_variant(reference, variant, edges):
-    """The members of a measured variant that follow from its arrays and the reference's."""
+    """Returns the members of a measured variant that follow from its arrays and the reference's."""
     color, wrong = variant["color"], wrong_pixels(reference, variant)
     errors = {kind: {"edge": int((wrong[kind] & edges[kind]).sum()), "away": int((wrong[kind] & ~edges[kind]).sum())}
               for kind in wrong}
@@ -127,7 +127,7 @@ def plotted(variant, kind):
 
 
 def expected_judgement(scene):
-    """Which variants lie on the Pareto front of each kind of error and time, and the fastest within each budget."""
+    """Returns the variants on the Pareto front of each type of error and time, and the fastest within each budget."""
     variants = scene["variants"]
     times = [variant["frame_ms"]["median"] if "frame_ms" in variant else math.inf for variant in variants]
     sound = [i for i, v in enumerate(variants) if v["status"] == "measured" and not v["crossed_out"]]
@@ -161,7 +161,7 @@ class Accuracy(TestCase):
         cls.reference = f"{cls.saved}/0-mirror-glass-reference"
 
     def check(self, where, reported, expected):
-        """Every member of what is expected; JSON has null for what is not finite."""
+        """Checks every member of what is expected. JSON has null for what is not finite."""
         if isinstance(expected, dict):
             for key, value in expected.items():
                 self.check(f"{where}.{key}", reported[key], value)
@@ -219,7 +219,7 @@ class Accuracy(TestCase):
             self.assertLess(single["errors"]["shading"]["rmse"], 1e-6)
 
     def test_reference_from_a_file(self):
-        """Only colors are compared, with the same result; nothing else gets a figure."""
+        """Only colors are compared, with the same result, and nothing else gets a figure."""
         options = f"{SMALL} --precision single,double --json --reference {self.reference}.color.npy"
         scene = self.json(f"accuracy {GLASS} {options}")["scenes"][0]
         single, double = (variant["errors"] for variant in scene["variants"])
@@ -230,7 +230,7 @@ class Accuracy(TestCase):
         self.assertEqual((double["image"]["rmse"], double["image"]["psnr"]), (0, None))
 
     def test_larger_reference(self):
-        """Three times as wide and high: its squares' means are compared."""
+        """The reference is three times as wide and high, and the means of its squares are compared."""
         small = np.load(f"{self.reference}.color.npy")
         random = np.random.default_rng(5)
         parts = random.uniform(-1, 1, (64, 3, 96, 3, 3))
@@ -256,7 +256,7 @@ class Accuracy(TestCase):
         self.assertRegex(table, "(?m)^    for an error of at most 1e-06: double, .* ms, the reference itself; no other is within it$")
 
     def test_ties(self):
-        """Each pick lists the other rows within its budget; two runs tell nothing of their times, and a sentence says so."""
+        """Each pick lists the other rows within its budget. A sentence states that two runs tell nothing of their times."""
         for scene in self.report["scenes"]:
             for pick in scene["picks"]:
                 within = [i for i, v in enumerate(scene["variants"]) if i != pick["variant"] and
@@ -274,14 +274,14 @@ class Accuracy(TestCase):
         self.assertEqual(double["frame_ms"]["runs"], single["frame_ms"]["runs"])
 
     def test_progress(self):
-        """On a terminal alone, on standard error, even where a report is written to a file: rows, and the time left."""
+        """Rows and the time left are shown only on a terminal, on standard error, even if a report is written to a file."""
         errors = terminal_run(f"accuracy {self.spheres} --size 1280x800 --bounces 16 --seconds 2.6 --precision single,double --json")
         # the time left is known after two seconds, which may be at any step
         for step in "measuring rows 1 to 2 of 2", r"[a-z]+ (the reference for )?rows? [^\r]*, \d+ seconds? left", "comparing row 2 of 2":
             self.assertRegex(errors, rf"\r *\d+ % \x1b\[K {step}")
 
     def test_budgets(self):
-        """Each of the list, in its order: none is kept by all that err, and the largest by the fastest."""
+        """Budgets are reported in the list's order. All that err exceed the smallest, and the fastest keeps the largest."""
         scene = self.json(f"accuracy {self.spheres} {SMALL} --precision single,strict --budget 1e-30,1e30,0.5 --json")["scenes"][0]
         self.assertEqual([pick["budget"] for pick in scene["picks"]], [1e-30, 1e30, 0.5])
         self.assertIsNone(scene["picks"][0]["variant"])
@@ -290,7 +290,7 @@ class Accuracy(TestCase):
             self.refuses(f"accuracy {self.spheres} {SMALL} --budget={wrong}", "--budget")
 
     def test_max_error(self):
-        """The budget is kept, by the reported choice; image and report name it."""
+        """The reported choice keeps the budget, which image and report name."""
         for budget, only in ("0.5", None), ("0.2:flip", None), ("1e-3:max", None), ("1e-9", "double"), ("1e-5:flip", "double"):
             limit, _, metric = budget.partition(":")
             with self.subTest(budget):
@@ -328,7 +328,7 @@ class Accuracy(TestCase):
         self.assertEqual([pick["variant"] for pick in scene["picks"]], [None, None, None])
 
     def test_perturbation(self):
-        """Variants err; the reference keeps its bits."""
+        """Variants err, and the reference keeps its bits."""
         report = self.json(f"accuracy {BALLS} {SMALL} --precision double --perturb 1:1000 --save perturbed --json")
         (scene,) = report["scenes"]
         (double,) = scene["variants"]

@@ -1,5 +1,6 @@
-// The host's arithmetic gives the same bits on every processor: doubles are rounded after each operation, and
-// functions whose values reach the flat arrays are rounded correctly. A Quad has the bits it claims.
+// The host's arithmetic gives the same bits on every processor, since doubles are rounded after each
+// operation and functions whose values reach the flat arrays are rounded correctly. A Quad has the bits it
+// claims.
 #include "host/compile/random_shape.h"
 #include "host/image/srgb.h"
 #include "host/scene/portable.h"
@@ -81,7 +82,7 @@ TEST(test_quad_has_its_bits)
 #endif
 }
 
-// Squares of integers have exact roots, also far outside the range of a double.
+// Squares of integers have exact roots, even far outside the range of a double.
 TEST(test_quad_roots)
 {
     Random random = {.state = 1};

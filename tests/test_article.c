@@ -31,7 +31,7 @@ static bool within_limits(float t)
     return t > 1e-6f && t < 300.0f;
 }
 
-// The program solves a t^2 + b t + c = 0 and uses only the nearer root.
+// Returns the nearer root of a t^2 + b t + c = 0, the only one that the program uses.
 static float nearer_root(float a, float b, float c)
 {
     float discriminant = b * b - 4 * a * c;

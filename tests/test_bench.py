@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint bench on two tiny images: the figures of its JSON, its counts, the comparison with an earlier report. Nothing is
-asked of the times themselves.
+"""glint bench on two tiny images: the figures of its JSON, its counts, the comparison with an earlier report. The times
+themselves are not checked.
 
 run_tests: sanitize-long-only"""
 import json
@@ -57,7 +57,7 @@ class Bench(TestCase):
         write("sphere.yaml", SPHERE)
 
     def assertFigure(self, value):
-        """A number above 0, or why there is none."""
+        """Checks that a figure is a number above 0, or states why there is none."""
         if isinstance(value, dict):
             self.assertTrue(value["status"] == "unavailable" and value["reason"], value)
         else:
@@ -119,7 +119,7 @@ class Bench(TestCase):
         self.assertEqual(process.stdout.count("builds were not timed"), 1)
 
     def decided(self, command, status=0):
-        """The command with as much time as it takes until the samples are enough for an interval."""
+        """Runs the command with as much time as it takes until the samples are enough for an interval."""
         for seconds in (0.5, 2, 8):
             process = run(f"{command} --seconds {seconds}")
             if process.returncode != 4:
@@ -128,7 +128,7 @@ class Bench(TestCase):
         return self.glint(f"{command} --seconds 32", status)
 
     def test_comparison(self):
-        """A busy machine may take many times as long, but not a million times; the speed of the calibration goes along."""
+        """A busy machine may take many times as long, but not a million times. The calibration slows with it."""
         report = self.json(f"bench sphere.yaml {QUICK} --no-build-times --json")
         run, calibration = report["runs"][0], report["calibration"]
         for times in (run["frame_samples_ms"], run["processor_samples_ms"], calibration["samples_ms"],
@@ -192,7 +192,7 @@ for line in worker.stdout:
         self.refuses(f"{command} ./other", "no OpenCL device matches|none-such")
 
     def test_scene_hash(self):
-        """That of a scene from a pipe is that of its bytes, which are gone once they are read."""
+        """The hash of a scene from a pipe is that of its bytes, which are gone once they are read."""
         os.symlink("/dev/stdin", "pipe.yaml")
         write("other.yaml", SPHERE + "# other\n")
         tiny = f"--size 8x8 --seconds 0.01 {LANES} --no-build-times --json"
@@ -203,7 +203,7 @@ for line in worker.stdout:
         self.assertNotEqual(rows[0]["scene_hash"], changed[0]["scene_hash"])
 
     def test_variants(self):
-        """Each variant has its rows, with its options; those of later ones are compared with the first's, round by round."""
+        """Each variant has rows with its options. Those of later ones are compared with the first's, round by round."""
         variants = "", "--work-group 4x2", "--build-options '-DUNUSED=1 -DOTHER=2'", "--samples 1,2 --bounces 0"
         options = " ".join(f'--variant "{variant}"' for variant in variants)
         command = f"bench sphere.yaml --size 32x24 --seconds 0.4 --lanes 1 {options}"
@@ -231,7 +231,7 @@ for line in worker.stdout:
         self.assertEqual(names, {f"sphere.yaml/32x24/single/1/auto/1/{end}" for end in ("5", "0/--bounces 0")})
 
     def ratio(self, run, other):
-        """The ratio of frame times that glint estimates: the median of the medians of up to 20 blocks of rounds."""
+        """Returns the ratio of frame times that glint estimates, the median of the medians of up to 20 blocks of rounds."""
         logs = [math.log(mine / its) for mine, its in zip(run["frame_samples_ms"], other["frame_samples_ms"])]
         count = min(len(logs), 20)
         blocks = (logs[i * len(logs) // count:(i + 1) * len(logs) // count] for i in range(count))
@@ -279,8 +279,8 @@ for line in worker.stdout:
         self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
 
     def check_energy(self, source, high, env):
-        """The counter has grown by a joule at each reading, which follows each frame unless readings take long. A frame takes at most
-        `high` millijoules."""
+        """Checks energies by a counter that grows by a joule at each reading, which follows each frame unless readings take long. A
+        frame takes at most `high` millijoules."""
         (row,) = self.json(f"bench sphere.yaml {TINY} --seconds 0.01 --json", env=env)["runs"]
         self.assertEqual(row["energy"]["source"], source)
         self.assertTrue(0 < row["energy"]["frame_mj"] < high, row["energy"])

@@ -57,7 +57,7 @@ static Object aligned_object(size_t index, Vector3 center, double size)
     }
 }
 
-// Every bounded form of every shape, mostly small ones, a third triangles, and a plane.
+// Returns a scene of a plane and every bounded form of every shape, mostly small, a third of them triangles.
 static Scene random_scene(size_t count)
 {
     ShapeForm forms[SHAPE_FORMS_MAX];
@@ -81,8 +81,8 @@ static Scene random_scene(size_t count)
     return scene;
 }
 
-// Returns a point where rounding matters: a triangle's vertex or a point of its edge; a corner of a box
-// around another shape, or a point where the shape may touch the box.
+// Returns a point where rounding matters. It is a triangle's vertex or on its edge, a corner of a box around
+// another shape, or where the shape may touch the box.
 static Vector3 delicate_point(const Scene *scene)
 {
     const Object *object = &scene->objects.items[random_bits(&random_state) % scene->objects.count];
@@ -103,8 +103,8 @@ static TraceRay ray_of(Vector3 origin, Vector3 direction)
     return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
 }
 
-// Makes rays, a quarter each: any, along an axis with components of exactly 0 or -0, at a delicate point,
-// from far away.
+// Makes rays. A quarter each are arbitrary, run along an axis with components of exactly 0 or -0, aim at a
+// delicate point, or start far away.
 static void rays_fill(TraceRay *rays, size_t count, const Scene *scene)
 {
     for (size_t i = 0; i < count; i++) {
@@ -176,9 +176,9 @@ TEST(no_hit_depends_on_the_tree)
 
 enum { PACKET = 16, PACKETS = 1000 };
 
-// In each packet nearly all rays look one way, all to the same sides, or three of four, or each its own way:
-// traversal takes one group, two and divergent lanes, or ray by ray. Each tmin lies behind the origin, at
-// it, or ahead of it.
+// Makes packets in which all rays look nearly one way, three of four do, or each looks another way.
+// Traversal then takes one group, two and divergent lanes, or ray by ray. Each tmin lies behind the origin,
+// at it, or ahead of it.
 static void rays_behind_fill(TraceRay *rays, const Scene *scene)
 {
     static const double nears[] = {-30, -4, -1e-3, 0, 1};
@@ -258,7 +258,7 @@ enum { LEVELS = 5, CLOSED_TRIANGLES = 20 << (2 * LEVELS), CLOSED_VERTICES = CLOS
 
 static uint32_t vertex_between(Mesh *mesh, uint32_t (*middles)[2], uint32_t a, uint32_t b)
 {
-    // each edge's middle is asked for twice, with its ends the other way round
+    // each edge's midpoint is requested twice, the second time with its ends swapped
     uint32_t low = a < b ? a : b, high = a < b ? b : a, slot = (low * 73856093u ^ high * 19349663u) & 0xffff;
     for (; middles[slot][1] != 0; slot = (slot + 1) & 0xffff) {
         Vector3 middle = vector_normalize(vector_add(mesh->vertices[low], mesh->vertices[high]));

@@ -60,7 +60,8 @@ static void node_check(TreeCheck *check, uint32_t index, unsigned depth)
     }
 }
 
-// Checks wide nodes: every primitive is in exactly one leaf, every node is visited once, none is too deep.
+// Checks that every primitive is in exactly one leaf of wide nodes, and every node visited once and not too
+// deep.
 static void wide_node_check(TreeCheck *check, const BvhWide *wide, unsigned width, uint32_t index,
                             unsigned depth)
 {
@@ -277,7 +278,7 @@ TEST(planets_stay_outside_the_tree)
     }
 }
 
-// Triangles without area are points; here all are the same. They stay in the tree, and the planet out of it.
+// Triangles without area are points, here all the same one. They stay in the tree, and the planet out of it.
 TEST(points_make_a_tree)
 {
     enum { POINTS = 100000 };

@@ -275,8 +275,8 @@ TEST(camera_is_recorded_in_the_file)
     check_recorded("camera: {position: {keys: {0: [1, 2]}}, look_at: [0, 0, 0]}\n" REST, NULL);
 }
 
-// Checks a scene that takes this long to move and per pixel: every frame after the first few is in time, and
-// the resolution settles at the best there is.
+// Checks that, for a scene that takes this long to move and per pixel, every frame after the first few is in
+// time, and the resolution settles at the best there is.
 static void check_pace(double move_seconds, double seconds_of_pixel, uint32_t expected)
 {
     Preview preview = {0};

@@ -1,5 +1,5 @@
-// Explicit rays at `certified`: what is certain agrees with exact arithmetic on the same doubles, whatever
-// the ray hits and wherever it starts.
+// Tests that certain hits of explicit rays at `certified` agree with exact arithmetic on the same doubles,
+// whatever the ray hits and wherever it starts.
 #include "host/verify/reference_scene.h"
 #include "tests/check.h"
 #include "tests/film.h"
@@ -52,7 +52,7 @@ static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
     return counts;
 }
 
-// From within the scene and from far away, in all directions, of any length.
+// Rays start within the scene and far away, in all directions and of any length.
 TEST(every_shape_is_certain)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();

@@ -47,7 +47,7 @@ static Vector3 vector_nudge(Vector3 v)
 // The latest point_in_view, and the way through it.
 static Vector3 viewed, view;
 
-// A point on a pixel's ray, or on the way to the light from where that ray meets the floor.
+// Returns a point on a pixel's ray, or on the way to the light from where that ray hits the floor.
 static Vector3 point_in_view(Vector3 *along)
 {
     Vector3 direction = random_pixel_direction();
@@ -95,7 +95,8 @@ static Object flat_in_view(size_t index)
     }
 }
 
-// A body of revolution on whose side, or on whose rim, the point is, with the normal there.
+// Returns a body of revolution with a point in view on its side or rim, whose normal there is square to the
+// ray.
 static Object round_in_view(size_t index)
 {
     Vector3 along;
@@ -153,7 +154,7 @@ static Object round_in_view(size_t index)
     }
 }
 
-// The map x + w (n . (x - p)).
+// Returns the map x + w (n . (x - p)).
 static Affine affine_along(Vector3 w, Vector3 n, Vector3 p)
 {
     const double along[3] = {n.x, n.y, n.z}, across[3] = {w.x, w.y, w.z};
@@ -166,7 +167,7 @@ static Affine affine_along(Vector3 w, Vector3 n, Vector3 p)
     return affine;
 }
 
-// A round shape under a map that keeps the line that it nearly touches.
+// Returns a round shape under a map that keeps the line that it nearly touches.
 static Object oval_in_view(const Scene *scene, size_t index)
 {
     Object object = index % 3 > 0 ? round_in_view(index) : flat_in_view(index % 2 > 0 ? 5 : 3);
@@ -178,8 +179,8 @@ static Object oval_in_view(const Scene *scene, size_t index)
     return object;
 }
 
-// A bumpy mesh whose vertices lie next to the rays of every other pixel, and so its edges next to those of
-// the others: hits are near edges, where shadow rays start next to the neighbors.
+// Returns a bumpy mesh whose vertices lie next to the rays of every other pixel, and its edges next to those
+// of the others. Hits are near edges, where shadow rays start next to the neighbors.
 static Mesh mesh_in_view(void)
 {
     enum { COLUMNS = WIDTH / 2, ROWS = HEIGHT / 2 };
@@ -210,7 +211,7 @@ typedef enum { FLAT, ROUND, OVALS, PLANETS, OPTICS, FAMILY_COUNT } Family;
 static const char *const family_names[FAMILY_COUNT] = {"flat shapes and spheres", "round shapes", "ovals",
                                                        "planets", "optics"};
 
-// Every other scene of optics is of spheres alone.
+// Returns an object of the family. Every other scene of optics has only spheres.
 static Object object_in_view(const Scene *scene, Family family, unsigned seed, size_t index)
 {
     if (family == OVALS) return oval_in_view(scene, index);
@@ -218,7 +219,7 @@ static Object object_in_view(const Scene *scene, Family family, unsigned seed, s
     return family == ROUND ? round_in_view(index) : flat_in_view(index);
 }
 
-// The ground on which the eye stands: a plane, an infinite cylinder or cone, or a planet.
+// Returns the ground under the eye, which is a plane, an infinite cylinder or cone, or a planet.
 static Object ground(Family family, unsigned seed)
 {
     const double radius = random_power(&random_state, 4, 7.5), depth = radius - floor_y;
@@ -300,7 +301,7 @@ static const FeatureSet family_features[FAMILY_COUNT] = {
         FEATURE_TORI,
     FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_SPHERES | FEATURE_CYLINDERS, FEATURE_BVH};
 
-// For optics there are enough bounces that rays run along several chords of a sphere.
+// Optics has enough bounces for rays to run along several chords of a sphere.
 static const uint32_t bounce_counts[FAMILY_COUNT] = {2, 2, 2, 2, 5};
 
 // The shares of these crowded scenes' samples that may be re-rendered, a little above the measured 0.62,
@@ -412,7 +413,7 @@ TEST(mirrors_glass_and_spots_are_decided)
     check_family(OPTICS);
 }
 
-// A round shape in the middle of the view, squeezed by a random map.
+// Returns a round shape in the middle of the view, squeezed by a random map.
 static Object oval_before_eye(Scene *scene, unsigned seed)
 {
     const Vector3 center = {eye.x, eye.y, eye.z - 2.5}, axis = random_unit_vector(&random_state);
@@ -533,8 +534,8 @@ TEST(hard_cases_are_decided)
     assert_int_equal(pictures.wrong_decided, 0);
 }
 
-// Bumps and hollows with smooth normals, lit from low and from behind: rays to lights start above some of
-// their triangles and pass over their edges.
+// Bumps and hollows with smooth normals are lit from low and from behind, so that rays to lights start above
+// some of their triangles and pass over their edges.
 TEST(smooth_meshes_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();

@@ -11,8 +11,8 @@
 #include <math.h>
 #include <string.h>
 
-// Lights that lie on a wall but for less than its distance is rounded by, and so far away that their squared
-// distance overflows; and a bright one that all but grazes the wall.
+// Lights lie above a wall by less than its distance is rounded by, bright ones almost graze it, and others
+// are so far from it that the squared distance overflows.
 TEST(lights_on_surfaces_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
@@ -28,7 +28,7 @@ TEST(lights_on_surfaces_are_decided)
         array_push(scene.objects, ((Object){.type = SHAPE_SPHERE, .as.sphere = {{0.5, 0, 0}, 0.25}}));
         point_light_add(&scene, (Vector3){10, 0, heights[i]}, 1e6);
         uncertified += check_small(&scene, 0, "a light that grazes a wall", heights[i]);
-        if (heights[i] >= 1e-9) assert_int_equal(uncertified, 0); // double tells them apart
+        if (heights[i] >= 1e-9) assert_int_equal(uncertified, 0); // double distinguishes them
     }
     for (int digits = 15; digits < 24; digits += 2) {
         const double distance = pow(10, digits);
@@ -40,7 +40,7 @@ TEST(lights_on_surfaces_are_decided)
     }
 }
 
-// Checkers around an eye far from the origin, for their size: on walls, level and tilted, and on a box.
+// Checkers surround an eye far from the origin for their size, on level and tilted walls and on a box.
 TEST(checkers_far_out_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
@@ -69,7 +69,7 @@ TEST(checkers_far_out_are_decided)
         }
 }
 
-// Mirrors and glass that leave so little of the light that a product of their parts underflows: no path ends
+// Mirrors and glass leave so little of the light that a product of their parts underflows. No path ends
 // before it has all its bounces, and no shadow is full.
 TEST(faint_paths_are_decided)
 {
@@ -95,8 +95,8 @@ TEST(faint_paths_are_decided)
     }
 }
 
-// A plane whose normal is not a float, seen at angles that float cannot tell from 0: the horizon, and the way
-// on to another plane behind it, are double's.
+// A plane whose normal is not a float is seen at angles that float cannot distinguish from 0, so that only
+// double decides where the horizon is.
 TEST(skimming_rays_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
@@ -108,8 +108,8 @@ TEST(skimming_rays_are_decided)
     }
 }
 
-// Bubbles with walls of glass, some of them thinner than the distance at which rays through them start off a
-// surface, except at certified. `single` (in long tests also `strict`) shows walls above the bound that
+// Bubbles have walls of glass, some of them thinner than the distance at which rays through them start off a
+// surface, except at certified. `single`, and in long tests `strict`, shows walls above the bound that
 // docs/numerics.md states.
 TEST(thin_walls_are_decided)
 {
@@ -142,8 +142,8 @@ TEST(thin_walls_are_decided)
     }
 }
 
-// Triangles whose edges round to one line, though they have an area: strips across the view from corners far
-// away, and needles.
+// The edges of triangles round to one line, though they have an area. The triangles are strips across the
+// view from corners far away, and needles.
 TEST(needles_have_an_area)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
@@ -183,8 +183,8 @@ TEST(needles_have_an_area)
     }
 }
 
-// A sheet across the view, cut into ribbons a thousand times as long as wide. Each triangle has another
-// plane.
+// Returns a sheet across the view, cut into ribbons a thousand times as long as wide. Each triangle has
+// another plane.
 static Mesh ribbons_in_view(void)
 {
     enum { RIBBONS = 250 };
@@ -207,8 +207,8 @@ static Mesh ribbons_in_view(void)
     return mesh;
 }
 
-// Mirrors and glass of ribbons, and a checkered wall. As floats the vertices have other planes, which would
-// show other squares. An image and its AOVs take three samples per pixel.
+// Ribbons form mirrors, glass and a checkered wall. Rounded to float, the vertices have other planes, which
+// would show other squares. An image and its AOVs take three samples per pixel.
 TEST(slim_triangles_are_seldom_rerendered)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
@@ -245,7 +245,7 @@ TEST(slim_triangles_are_seldom_rerendered)
     }
 }
 
-// A ball of 40,000 smooth triangles, with waves on it: single certifies most pixels, although rays to lights
+// Single certifies most pixels of a ball of 40,000 smooth triangles with waves, although rays to lights
 // start close to other triangles.
 TEST(fine_meshes_are_seldom_rerendered)
 {
@@ -282,7 +282,7 @@ TEST(fine_meshes_are_seldom_rerendered)
     scene_free(&scene);
 }
 
-// A shape of a size, in front of the eye.
+// Returns a shape of this size in front of the eye.
 static Object shape_of_size(unsigned form, double size)
 {
     const Vector3 center = {0.3 * size, 0.2 * size, -4 * size}, axis = {0.3 * size, size, 0.7 * size};
@@ -309,7 +309,7 @@ static Object shape_of_size(unsigned form, double size)
 }
 enum { FORMS = 8 };
 
-// Shapes from 1e-29 to 1e29 as seen from close by, alone and with one of another size in the same scene.
+// Shapes from 1e-29 to 1e29 are seen from close by, alone and with one of another size in the same scene.
 TEST(mixed_sizes_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();

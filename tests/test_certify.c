@@ -9,7 +9,7 @@
 enum { WIDTH = 96, HEIGHT = 64, PIXELS = WIDTH * HEIGHT };
 
 // Renders the scene, `scale` times as wide and high as WIDTH and HEIGHT, and compares about `count` pixels.
-// `uncertified` is of pixels uncertain at certified; NULL: not wanted.
+// `uncertified`, which may be NULL, receives the pixels that are uncertified.
 static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t scale, size_t count,
                              CertifyUncertified *uncertified)
 {
@@ -120,7 +120,7 @@ static void colors_compare(const Scene *scene, uint32_t scale)
     assert_true(certified.right_color <= 2 * single.right_color);
 }
 
-// They are as exact as those of single, even at the edges of round shapes.
+// Colors at certified are as exact as at single, even at the edges of round shapes.
 TEST(colors_of_certified_are_exact)
 {
     if (!probe_has(PRECISION_DOUBLE)) skip();

@@ -38,7 +38,7 @@ objects:
   - sphere: {center: [0, 0, 0], radius: 1, material: {color: [1, 0, 0], reflection: 0.1}}
   - sphere: {center: [0, 0, -1e-9], radius: 1, material: {color: [0, 0, 1], reflection: 0.1}}
 """
-# What Fresnel's equations decide: glass, plastic seen against its normal, and a metal's tint next to them.
+# Fresnel's equations decide about glass, plastic seen against its normal, and a metal's tint next to them.
 FRESNEL = """\
 camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
 background: [0.3, 0.5, 0.9]
@@ -107,11 +107,11 @@ HAS_DOUBLE = need_device()["fp64"]
 
 class Certify(TestCase):
     def certify(self, scene, options):
-        """The rows by their precisions."""
+        """Returns the rows by their precisions."""
         return {row["precision"]: row for row in self.json(f"certify {scene} {SMALL} --json {options}")["precisions"]}
 
     def test_errors_are_noticed(self):
-        """Which of two spheres is nearer is lost at single; a wrong pixel has a wrong color."""
+        """Single cannot decide which of two spheres is nearer. A wrong pixel has a wrong color."""
         write("twins.yaml", TWINS)
         rows = self.certify("twins.yaml", "--precision single")
         wrong = rows["single"]["wrong"]
@@ -120,7 +120,7 @@ class Certify(TestCase):
         self.assertGreater(wrong["margin"], 0)
 
     def test_every_precision(self):
-        """What does not fit is a row with its reason, and an error only if it is named: here all but double, or all."""
+        """A precision that does not fit has a row with its reason, and is an error only if named. Here all but double, or all, are."""
         write("strong.yaml", STRONG)
         rows = self.certify("strong.yaml", "")
         self.assertEqual(list(rows), ["single", "strict", "double", "certified"])
@@ -143,7 +143,7 @@ class Certify(TestCase):
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 
     def test_filters(self):
-        """Colored transmission has bounds: what is decided is right at every precision."""
+        """Colored transmission has bounds, so that what is decided is right at every precision."""
         write("scene.yaml", FILTERS)
         precisions = "strict" + ",certified" * HAS_DOUBLE + ",single" * IS_LONG + ",double" * (IS_LONG and HAS_DOUBLE)
         for name, row in self.certify("scene.yaml", f"--precision {precisions}").items():
@@ -182,7 +182,7 @@ class Certify(TestCase):
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
     def test_undecided_pixels(self):
-        """They are those on an edge through the centers of a column, where errors of double's size change the answer."""
+        """Only pixels on an edge through the centers of a column are undecided, where errors of double's size change the answer."""
         write("edge.yaml", EDGE if IS_LONG else EDGE + BEHIND)
         report = self.json("certify edge.yaml --size 33x33 --pixels 10000 --precision certified --json")
         row = report["precisions"][0]

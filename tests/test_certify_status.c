@@ -1,5 +1,5 @@
-// The exit status of glint certify where an image is wrong: one pixel of what was rendered is changed, or a
-// scene is rendered that differs from the one that is certified in what only a mirror shows.
+// Tests the exit status of glint certify for a wrong image. One pixel of the rendered image is changed, or
+// the rendered scene differs from the certified one in what only a mirror shows.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
@@ -77,7 +77,7 @@ TEST(test_status)
 {
     const Case fails[] = {{"single,certified", AN_OBJECT, 0}, {"certified", A_COLOR, 0}};
     const Case mirrored[] = {{"certified", THE_CHECKER, 0}, {"certified", A_SHADOW, 0}};
-    const Case passing[] = {{"certified", AN_OBJECT, FLAG_UNCERTIFIED}, // it says so itself
+    const Case passing[] = {{"certified", AN_OBJECT, FLAG_UNCERTIFIED}, // it reports so itself
                             {"certified", A_COLOR, FLAG_UNCERTIFIED},
                             {"single", AN_OBJECT, 0}, // which promises nothing
                             {"certified", NOTHING, 0}};

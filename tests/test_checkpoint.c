@@ -95,7 +95,7 @@ static void read_checked(Checkpoint *checkpoint, uint32_t first_row)
     film_free(&band);
 }
 
-// A file with all bands, the last first. Returns its bytes.
+// Makes a file with all bands, the last first. Returns its bytes.
 static Text file_make(void)
 {
     unlink(path);
@@ -346,7 +346,7 @@ static bool band_sink(void *context, const Film *band, double fraction_done)
     return true;
 }
 
-// Only missing bands are handed out; all reach the sink in order.
+// Only missing bands are handed out, and all reach the sink in order.
 TEST(test_a_render_resumes)
 {
     for (unsigned done = 0; done < 1 << BANDS; done++) {

@@ -48,7 +48,7 @@ class Checkpoints(TestCase):
         self.glint(f"{RENDER} -o whole.npy", env=POCL)  # and the kernel is in the cache
 
     def end_early(self, options="", env=None):
-        """The disk is full."""
+        """Renders until the disk is full."""
         self.glint(f"{RENDER} {options} -o whole.npy", env=env or POCL)  # the drivers' files are written
         limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (BYTES_MAX, BYTES_MAX))
         self.refuses(f"{RENDER} {options} -o part.png --checkpoint saved", "cannot write the checkpoint 'saved': File too large",
@@ -56,7 +56,7 @@ class Checkpoints(TestCase):
         self.assertFalse(os.path.exists("part.png"))
 
     def go_on(self, options="", env=None):
-        """The share of the rows that was rendered."""
+        """Resumes the render, and returns the share of the rows that was rendered."""
         report = self.json(f"{RENDER} {options} -o image.npy --checkpoint saved --timing=json", env=env or POCL)
         self.assertSameBytes("image.npy", "whole.npy")
         self.assertFalse(os.path.exists("saved"), "it is removed once the image is complete")
@@ -140,12 +140,12 @@ class Checkpoints(TestCase):
         self.refuses(f"{single} --lanes 1 -o other.png --checkpoint saved", r"belongs to another image \(device: ", env=POCL)
 
     def test_the_image_itself(self):
-        """A checkpoint of the image's own name is replaced by the image, not removed."""
+        """A checkpoint with the name of the image is replaced by the image, not removed."""
         self.glint(f"{RENDER} -o same.npy --checkpoint same.npy", env=POCL)
         self.assertSameBytes("same.npy", "whole.npy")
 
     def test_frames(self):
-        """Each frame has its bands in a file; complete frames are kept, and each of the others reports in one line."""
+        """Each frame has its bands in a file. Complete frames are kept, and each of the others reports in one line."""
         write("moving.yaml", SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 2: 0.5}}"))
         frames = RENDER.replace("sphere.yaml", "moving.yaml")
         self.glint(f"{frames} --frames 0-2 -o whole%d.npy", env=POCL)
@@ -169,7 +169,7 @@ class Checkpoints(TestCase):
         self.assertSameBytes("image1.npy", "whole1.npy")
 
     def test_kills(self):
-        """kill -9 at any moment; whatever is left, the next run resumes."""
+        """After kill -9 at any moment, the next run resumes from whatever is left."""
         command = [PROGRAM, *f"{RENDER.replace('100', '3000')} --device all -o image.npy --checkpoint saved".split()]
         environment = {name: value for name, value in os.environ.items() if name != "GLINT_DEVICE"} | TWO
         self.glint(f"{RENDER.replace('100', '3000')} -o whole.npy", env=POCL)
@@ -177,7 +177,7 @@ class Checkpoints(TestCase):
         kills = renders = 0
         while kills < KILLS:
             process = subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL)
-            # somewhere between what is saved and a little more than the whole, and at any moment of a band
+            # between what is saved and slightly more than the whole, and at any moment of a band
             least = moments.uniform(size("saved"), 1.1 * ROWS * ROW_BYTES)
             while process.poll() is None and size("saved") < least:
                 time.sleep(0.001)

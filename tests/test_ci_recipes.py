@@ -38,7 +38,7 @@ def recipe(name):
 
 
 def github():
-    """Commands, the command after a failure, and the patterns of the files that are collected."""
+    """Returns the commands, the command after a failure, and the patterns of the files that are collected."""
     job, = recipe("github.yml")["jobs"].values()
     runs = [step for step in job["steps"] if "run" in step]
     upload, = (step for step in job["steps"] if "upload-artifact" in step.get("uses", ""))
@@ -48,7 +48,7 @@ def github():
 
 
 def gitlab():
-    """The same; the last command runs in any case and asks for the status."""
+    """Returns the commands, the last command, which runs in any case and asks for the status, and the collected files."""
     job, = recipe("gitlab.yml").values()
     artifacts = job["artifacts"]
     assert artifacts["when"] == "always" and set(artifacts["reports"]["junit"]) <= set(artifacts["paths"])
@@ -56,14 +56,14 @@ def gitlab():
 
 
 def instructions():
-    """The Containerfile's, as name and arguments."""
+    """Returns the instructions of the Containerfile, as name and arguments."""
     lines = read(ROOT / "docs/ci/Containerfile").splitlines()
     return [line.split(" ", 1) for line in lines if line and not line.startswith("#")]
 
 
 class Recipes(TestCase):
     def check_recipe(self, shell, folder, commands, after_failure, collected):
-        """Runs a recipe for a repository in the folder: shell(COMMAND, NAME=VALUE…) gives the exit status."""
+        """Runs a recipe for a repository in the folder, where shell(COMMAND, NAME=VALUE…) returns the exit status."""
         self.assertEqual([re.match(r"glint (\w+)", command)[1] for command in commands], ["verify", "golden", "bench"])
         write(folder / "scene.yaml", SPHERE)
         self.assertEqual(shell("glint golden write scene.yaml"), 0)
@@ -107,7 +107,7 @@ class Recipes(TestCase):
         return shell
 
     def test_recipes(self):
-        """GitLab's recipe; GitHub's has the same commands and files."""
+        """GitLab's recipe passes. GitHub's has the same commands and files."""
         commands, after, collected = github()
         self.assertEqual((commands, collected), (gitlab()[0], gitlab()[2]))
         self.assertIn(f"then {after}; fi", gitlab()[1])

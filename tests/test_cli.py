@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""The command line as a user meets it: every option, every message about a wrong one, the exit status, what is printed
-where, and that a failure leaves an earlier image as it was."""
+"""The command line as a user sees it: every option, every message about a wrong one, the exit status, what is printed
+where, and that a failure leaves an earlier image unchanged."""
 import contextlib
 import glob
 import itertools
@@ -179,7 +179,7 @@ class WrongInput(CliTestCase):
 
 
 def writes_here(process):
-    """Whether a process has a file of this folder open for writing, with a name or without."""
+    """Returns whether a process has a file of this folder open for writing, with a name or without."""
     for link in Path(f"/proc/{process}/fd").glob("*"):
         with contextlib.suppress(OSError):  # it may be closed meanwhile
             flags = int(re.search(r"flags:\s*(\d+)", read(f"/proc/{process}/fdinfo/{link.name}"))[1], 8)
@@ -264,7 +264,7 @@ class Failures(CliTestCase):
                 self.nothing_left("long.png.*")
 
     def test_images_too_large(self):
-        """What cannot fit on the disk is refused; else the first bands say how long it takes."""
+        """An image that cannot fit on the disk is refused. Otherwise the first bands tell how long it takes."""
         for name in "vast.ppm", "vast.npy":
             self.refuses(f"render sphere.yaml --size 1048576x1048576 --quiet -o {name}", r"it has \d+\.0 TiB or more, and its disk has \S+ [KMGT]iB left")
         self.nothing_left("vast.*")
@@ -277,7 +277,7 @@ class Failures(CliTestCase):
         self.assertEqual(render.returncode, 130)
 
     def test_signals_before_the_render(self):
-        """A signal while the scene is read ends glint like later ones; one that is ignored stays ignored."""
+        """A signal while the scene is read ends glint like later ones. One that is ignored stays ignored."""
         os.mkfifo("slow.yaml")
         command = [PROGRAM, *f"render slow.yaml {SMALL} -o slow.png".split()]
         for number in signal.SIGINT, signal.SIGTERM, signal.SIGHUP:
@@ -357,7 +357,7 @@ class Images(CliTestCase):
         self.assertRegex(self.glint(f"check sphere.yaml {options}").stdout, bounds)
 
     def test_camera_of_another_scene(self):
-        """Its keys count, but not its objects and their warnings; the scene needs no camera, and --set changes the scene."""
+        """The file's keys count, but not its objects and their warnings. The scene needs no camera, and --set changes the scene."""
         camera, *others = SPHERE.splitlines(keepends=True)
         moved = camera.replace("fov: 60", "fov: {keys: {0: 60, 2: 20}}")
         self.assertNotEqual(moved, camera)
@@ -384,7 +384,7 @@ class Images(CliTestCase):
         self.refuses(f"render sphere.yaml --camera shot.ppm {SMALL} -o shot.ppm", "would overwrite 'shot.ppm'")
 
     def test_display(self):
-        """The PNG has the curve's values of the linear image, and its notes name the options; a region has the same pattern."""
+        """The PNG has the curve's values of the linear image, and its notes name the options. A region has the same pattern."""
         options = "--size 20x12 --quiet --samples 2"
         self.glint(f"render sphere.yaml {options} -o linear.npy")
         linear = [value * 2**1.5 for pixel in npy_read("linear.npy")[-1] for value in pixel]
@@ -495,7 +495,7 @@ class Images(CliTestCase):
 
     @unittest.skipIf(IS_SANITIZED and not IS_LONG, "the bits are the kernels'")
     def test_smaller_work_groups_give_the_same_bits(self):
-        """A device may accept fewer work-items in a group than glint prefers; PoCL has a variable for it."""
+        """A device may accept fewer work-items in a group than glint prefers. PoCL has a variable for it."""
         options = "--precision strict --lanes 1"  # the kernels of test_device_limits.py
         for limit in None, 32, 16, 1:
             env = {"POCL_MAX_WORK_GROUP_SIZE": str(limit)} if limit else {}
@@ -563,7 +563,7 @@ class Aovs(CliTestCase):
 
     @unittest.skipIf(IS_SANITIZED and not IS_LONG, "the values are the kernels'")
     def test_alpha(self):
-        """What objects cover, and their color without the background: divided by that in PNG, not in EXR."""
+        """Alpha is what objects cover, and colors lack the background. They are divided by alpha in PNG, not in EXR."""
         width, height = 40, 30
         write("disc.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0], fov: 40}\n"
               "background: {horizon: [0.5, 0.25, 1], zenith: [0.1, 0.9, 0]}\n"
@@ -630,7 +630,7 @@ class Trace(CliTestCase):
         self.assertEqual(csv_rows(read("hits.csv")), expected)
 
     def test_certified_refuses_what_has_no_bound(self):
-        """Only where a material of an object has it and bounces rays."""
+        """Certified refuses what has no bound only if a material of an object has it and bounces rays."""
         ink = "absorption: {color: red}"
         for material, refused in (
             ("{fresnel: true, transmission: 1}", "fresnel"), ("{fresnel: true}", None),
@@ -662,7 +662,7 @@ class Trace(CliTestCase):
 
 
 class Reports(CliTestCase):
-    """JSON comes alone on standard output; text about times goes to standard error."""
+    """Only JSON is on standard output. Text about times goes to standard error."""
 
     def test_timing(self):
         report = self.json(f"render sphere.yaml {SMALL} --timing=json")

@@ -50,7 +50,7 @@ static void command_fail(void *result)
     exit(status);
 }
 
-// Drivers may print warnings first, as PoCL 3.1 does on arm64.
+// Asserts that the process printed the text. Drivers may print warnings first, as PoCL 3.1 does on arm64.
 static void assert_prints(const ChildEnd *end, const char *expected)
 {
     if (!strstr(end->errors, expected)) print_error("%s\n", end->errors);
@@ -138,7 +138,7 @@ TEST(test_several_devices)
     unlink(other);
 }
 
-// An image that is complete is written whatever a release says.
+// A complete image is written whatever a release returns.
 TEST(test_release_after_the_output)
 {
     char path[] = "/tmp/glint-test-XXXXXX.png";
@@ -155,7 +155,7 @@ TEST(test_release_after_the_output)
     unlink(path);
 }
 
-// A driver that crashes is named with its call; when the output is complete it is a warning.
+// A driver that crashes is named with its call. If the output is complete, this is a warning.
 TEST(test_crashes)
 {
 #ifdef __SANITIZE_ADDRESS__

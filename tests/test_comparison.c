@@ -21,7 +21,7 @@ static double random_normal(void)
     return sqrt(-2 * log(1 - random_unit())) * cos(6.283185307179586 * random_unit());
 }
 
-// A machine: other work comes in bursts that slow all runs, and the clock's frequency drifts.
+// A machine on which other work comes in bursts that slow all runs, and the clock's frequency drifts.
 typedef struct {
     double scatter;              // of a run, as a logarithm, and its outliers are ten times that
     double burst_share;          // of the runs
@@ -202,7 +202,7 @@ TEST(test_slower_build_is_found)
     assert_int_equal(noisy.of[VERDICT_FASTER], 0);
 }
 
-// One report on a quiet machine, one on a busy or slower one: no false alarm, but no claim either.
+// Reports on a quiet and on a busy or slower machine give no false alarm, but no claim either.
 TEST(test_reports_of_one_build)
 {
     Machine slow = quiet, thermal = quiet;
@@ -261,7 +261,7 @@ TEST(test_rows_of_one_process)
     }
 }
 
-// Worked out by hand: the ends are the order statistics that the binomial distribution gives.
+// The ends are the order statistics that the binomial distribution gives, worked out by hand.
 TEST(test_rows)
 {
     static const struct {

@@ -138,7 +138,7 @@ static void holds_where_they_touch(void **state)
     text_free(&text);
 }
 
-// With enough pairs, all opaque objects count as one box, and if many are unbounded, as everywhere.
+// With enough pairs, all opaque objects count as one box, which is unbounded if many of them are.
 TEST(many_pairs_hold_as_much)
 {
     enum { SPHERE_COUNT = 1500 };

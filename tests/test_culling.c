@@ -1,6 +1,7 @@
 // Cull spheres of rays from the eye or to a light (test_invariances compares whole scenes with and without
-// them). No sphere within the error bound of a line is culled; every sphere clearly outside it is. The cull
-// of several packets is tried with one ray, where it bounds a single direction. run_tests: sanitize-long-only
+// them). No sphere within the error bound of a line is culled, and every sphere clearly outside it is. The
+// cull of several packets is tried with one ray, where it bounds a single direction.
+// run_tests: sanitize-long-only
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"
 #include "host/compile/stages.h"
@@ -97,7 +98,7 @@ static void trial_make(Trial *trial, bool from_eye)
     culling_fill(&trial->flat, &settings);
 }
 
-// What the device finds, with the arrays in its width.
+// Finds on the device which lines miss their spheres, with the arrays in its width.
 static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
 {
     size_t scalar = trial->is_double ? sizeof(double) : sizeof(float),
@@ -110,7 +111,7 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
             ((float *)(void *)lines)[i] = (float)trial->lines[i];
     }
     const FlatArray *cull_spheres = &trial->flat.arrays[FLAT_CULL_SPHERES];
-    // behind the BVH's own
+    // after those of the BVH
     FlatArray row = {
         flat_array_at(cull_spheres, (common_origin - COMMON_ORIGIN_EYE) * trial->flat.cull_sphere_count + 1),
         SPHERES_PER_ORIGIN, cull_spheres->layout};
@@ -151,7 +152,7 @@ static long double dot(const long double *a, const long double *b)
 // component are up to 3^(1/2) 2^-12 of the square; the limit is about twice that.
 #define CLEAR_MISS_BY_BOUNDS 0x1p-10L
 
-// Judges one answer by the line's distance from the center, in long double.
+// Checks one answer by the line's distance from the center, in long double.
 static void line_judge(Trial *trial, size_t index, bool from_eye)
 {
     const double *line = trial->lines + 6 * index;
@@ -181,7 +182,7 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
     } else {
         trial->between_count++;
     }
-    // half a line: none of the ray lies beyond the common origin
+    // half a line, since none of the ray lies beyond the common origin
     const long double away = dot(v, d) * (from_eye ? 1 : -1);
     if (away <= 0) distance = sqrtl(dot(v, v));
     if (distance <= radius + slack) {

@@ -16,7 +16,7 @@ HOLE, TEXELS = 0.6, 64  # the hole's radius on the quad, whose side is 2
 
 
 def png(path, alphas, color=6):
-    """An 8-bit image of one color with an alpha for each pixel, or a gray image of these values."""
+    """Writes an 8-bit image of one color with an alpha for each pixel, or a gray image of these values. Returns its path."""
     pixel = (lambda a: bytes([200, 100, 50, round(255 * a)])) if color == 6 else (lambda a: bytes([round(255 * a)]))
     raw = b"".join(b"\0" + b"".join(map(pixel, row)) for row in alphas)
     chunks = (
@@ -32,7 +32,7 @@ def png(path, alphas, color=6):
 
 
 def hole_png(path, color=6):
-    """Between texels alpha is linear, so the edge at 0.5 is the circle within a fraction of a texel."""
+    """Writes an image with a round hole. Alpha is linear between texels, so the edge at 0.5 is within a fraction of a texel."""
     places = [(i + 0.5) / TEXELS * 2 - 1 for i in range(TEXELS)]
     return png(path, [[min(max(0.5 + (math.hypot(x, y) - HOLE) * 8, 0), 1) for x in places] for y in places], color)
 
@@ -52,7 +52,7 @@ class Cutouts(TestCase):
         return [npy_read(f"a.{name}.npy")[2] for name in names]
 
     def hits(self, scene, rays, options=""):
-        """The object and t of each ray (origin, direction), or None."""
+        """Returns the object and t of each ray (origin, direction), or None."""
         write("rays.txt", "".join(" ".join(map(str, [*origin, *direction])) + "\n" for origin, direction in rays))
         head, rows = csv_rows(self.glint(f"trace {scene} --rays rays.txt {options}").stdout)
         return [None if row[head.index("object")] is None else (row[head.index("object")], row[head.index("t")]) for row in rows]
@@ -111,7 +111,7 @@ class Cutouts(TestCase):
                 self.assertEqual(sum(shadow != (0, 0, 0) for shadow in shadows), 0, f"{gap} {precision}")
 
     def test_each_shape(self):
-        """Explicit rays pass holes: of a sphere the far side is hit; all holes let a ray pass, as do those of a plane and a disc."""
+        """Explicit rays pass holes of a plane and a disc, and hit a sphere's far side, or nothing if that has a hole."""
         write(
             "scene.yaml",
             "camera: {position: [0, 0, -1], look_at: [0, 0, 0]}\n"
@@ -136,7 +136,7 @@ class Cutouts(TestCase):
                     self.assertLess(abs(hit[1] - right[1]), 2e-6, f"{precision}: {ray}")
 
     def test_half_a_square(self):
-        """The image of a square whose left half is cut out is that of half a square, also in a mirror and behind glass."""
+        """The image of a square whose left half is cut out is that of half a square, even in a mirror and behind glass."""
         rest = (
             "camera: {position: [0.3, 0.4, -4], look_at: [0, 0, 0], fov: 50}\nlights: [{point: {position: [-2, 2, -3]}}]\n"
             "objects:\n  - plane: {point: [0, 0, 1.5], normal: [0, 0, -1], material: {reflection: 0.6}}\n"
@@ -228,7 +228,7 @@ class Cutouts(TestCase):
         return write("a.gltf", json.dumps(scene))
 
     def test_refused(self):
-        """Neither certified nor certify has cutouts, or normal maps; an opaque image is named."""
+        """Certified and certify refuse cutouts and normal maps. An opaque image is named."""
         png("opaque.png", [[1, 1]])
         scene = "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nlights: [{point: {position: [1, 2, -5]}}]\nobjects: [{sphere: {center: [0, 0, 0], radius: 1, material: {image: %s.png, cutout: 0.5}}}]\n"
         write("half.yaml", scene % "half")

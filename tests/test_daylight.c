@@ -161,7 +161,7 @@ static Scene scene_of_background(const char *background)
     return scene;
 }
 
-// What the file says reaches the light, the image and the ambient light.
+// The values in the file reach the light, the image and the ambient light.
 TEST(test_scene)
 {
     Scene scene = scene_of_background("{sun: {elevation: 30, azimuth: 90}, intensity: 2, turbidity: 5}");

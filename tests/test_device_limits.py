@@ -66,7 +66,7 @@ REFUSED = (
 
 
 def large_mesh(path, side=320):
-    """A square of 2 * side * side triangles."""
+    """Writes a square of 2 * side * side triangles."""
     vertices = [f"v {x / side - 0.5} {y / side - 0.5} 0" for y in range(side + 1) for x in range(side + 1)]
     corners = (y * (side + 1) + x + 1 for y in range(side) for x in range(side))
     faces = (f"f {c} {c + 1} {c + side + 2}\nf {c} {c + side + 2} {c + side + 1}" for c in corners)
@@ -81,7 +81,7 @@ class DeviceLimits(TestCase):
         write("rays.txt", "".join(f"0 0 -4  {i / 40000 - 0.5} {i % 200 / 200 - 0.5} 1\n" for i in range(40000)))
 
     def outputs(self, command, limits=None):
-        """The command's standard output and files, of the device with the limits."""
+        """Returns the command's standard output and files, on the device with the limits."""
         env = POCL if limits is None else POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits}
         process = self.glint(command, env=env)
         files = {path.name: path.read_bytes() for path in sorted(Path().glob("image*"))}
@@ -185,7 +185,7 @@ class DeviceLimits(TestCase):
         self.assertSameBytes("image.npy", "one.npy")
 
     def test_timers_without_times(self):
-        """Every figure names the host's clock; with timers that work, the device's."""
+        """Every figure names the host's clock, or the device's with timers that work."""
         for limits, clock, text in ("no-timer", "host", "host's"), ("group=8192", "event", "device's"):
             env = POCL | {"LD_PRELOAD": self.shim, "GLINT_LIMITS": limits}
             report = self.json(f"{RENDER} --timing=json", env=env)["by_device"][0]

@@ -112,7 +112,7 @@ TEST(test_one_of_two_devices)
     injected.call = NULL;
 }
 
-// The second device gets no thread: the first renders the whole image.
+// The second device gets no thread, and the first renders the whole image.
 TEST(test_a_device_without_a_thread)
 {
     Compute computes[2];

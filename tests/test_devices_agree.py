@@ -4,9 +4,9 @@ highlights and checkers, at 4 lanes as PoCL at 1; with GLINT_LONG_TESTS=1 at bot
 Implementations that are not installed are skipped. INTEL_OPENCL_RT names a folder that holds Intel's CPU runtime
 (libintelocl.so, for one from the package intel-opencl-rt of PyPI).
 
-rusticl on llvmpipe (Mesa 22.3) has no fused multiply-add, and its compiler inlines the kernels' own one everywhere. It
-renders one kind of shape at a time under all lights, 5 to 15 seconds each: discs (test_several_devices.py has a sphere); with
-GLINT_LONG_TESTS=1 all of them, and the whole scene, which takes the compiler 17 seconds and 1.8 GB.
+rusticl on llvmpipe (Mesa 22.3) has no fused multiply-add, and its compiler inlines that of the kernels everywhere. It
+renders one type of shape at a time under all lights, 5 to 15 seconds each. Here these are discs (test_several_devices.py has
+a sphere); with GLINT_LONG_TESTS=1 all of them, and the whole scene, which takes the compiler 17 seconds and 1.8 GB.
 
 run_tests: sanitize-long-only"""
 import math
@@ -27,7 +27,7 @@ OCLGRIND = {"wrapper": ("oclgrind", "--build-options", "-cl-opt-disable")}
 
 
 def rays():
-    """Rays from all around at the scene's middle, with zeros of either sign among the directions."""
+    """Returns rays from all around at the scene's middle, with zeros of either sign among the directions."""
     around, across = RAY_COUNT * 4 // 5, RAY_COUNT // 10
     for i in range(around):
         angle, y, far = i * 2.399963, 1 - (2 * i + 1) / around, 3 + i % 7 * 4
@@ -41,7 +41,7 @@ def rays():
 
 class DevicesAgree(TestCase):
     def pixels(self, implementation, scene=SCENE, lanes=1, options=""):
-        """The bytes of each pixel."""
+        """Returns the bytes of each pixel."""
         command = f"render {scene} --lanes {lanes} --size {WIDTH}x{HEIGHT} --precision strict --quiet -o image.npy {options}"
         self.glint(command, **implementation)
         data = Path("image.npy").read_bytes()

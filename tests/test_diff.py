@@ -8,13 +8,13 @@ from glint import ROOT, SPHERE, TestCase, main, write
 
 
 def ppm(path, gray, x=None, width=8, height=4):
-    """An image of one gray, black in column x of the first row."""
+    """Writes an image of one gray, black in column x of the first row."""
     pixels = "".join("0 0 0\n" if i == x else f"{gray} {gray} {gray}\n" for i in range(width * height))
     write(path, f"P3\n{width} {height}\n255\n{pixels}")
 
 
 def npy(path, values, kind="<f8", shape=(1, 3)):
-    """An array of NumPy's format, kind "<f8", "<f4" or "<u4"."""
+    """Writes an array in NumPy's format, of kind "<f8", "<f4" or "<u4"."""
     header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
     letter = {"<f8": "d", "<f4": "f", "<u4": "I"}[kind]
     with open(path, "wb") as file:

@@ -8,7 +8,7 @@ from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_decode
 
 
 def expected_metrics(reference, image, is_display):
-    """Each number of the report on two arrays, height x width x 3, and its tolerance."""
+    """Returns each number of the report on two arrays, height x width x 3, and its tolerance."""
     reference, image = reference.astype(np.float64), image.astype(np.float64)
     encoded = [a if is_display else srgb_encode(a) for a in (reference, image)]
     light = [srgb_decode(a) if is_display else a for a in (reference, image)]
@@ -41,7 +41,7 @@ def expected_metrics(reference, image, is_display):
 
 
 def save(name, array, is_display):
-    """Writes an NPY, or a PPM of 8 bits; returns its path and the values that it holds."""
+    """Writes an NPY, or a PPM of 8 bits. Returns its path and the values that it holds."""
     if not is_display:
         np.save(f"{name}.npy", array.astype(np.float32))
         return f"{name}.npy", array.astype(np.float32)
@@ -56,7 +56,7 @@ def waves(generator, height, width):
 
 
 def pairs():
-    """Name, reference, image, and whether both are display values."""
+    """Yields name, reference, image, and whether both are display values."""
     generator = np.random.default_rng(20)
     for height, width in (48, 64), (5, 90), (1, 1), (33, 7):
         base = waves(generator, height, width)

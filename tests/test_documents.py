@@ -23,12 +23,12 @@ def measured(name):
 
 @cache
 def text(document):
-    """On one line, so that a sentence is found wherever it wraps."""
+    """Returns the document on one line, so that a sentence is found wherever it wraps."""
     return " ".join(read(ROOT / document).split())
 
 
 def agrees(words, value):
-    """Whether a number as a document gives it is the value rounded to its digits; texts must be equal."""
+    """Returns whether a number as a document gives it is the value rounded to its digits, or whether texts are equal."""
     if isinstance(value, str):
         return words == value
     mantissa, _, exponent = words.replace(",", "").partition("e")
@@ -44,7 +44,7 @@ def frame(scene, program="glint single"):
 
 
 def peer_cases(program):
-    """Passed, all, and the names of those that failed."""
+    """Returns the numbers of passed and of all cases, and the names of those that failed."""
     asked = {case["case"]: case["programs"][program]["passed"] for case in measured("hard-cases-peers")["cases"]
              if case["programs"].get(program, {}).get("asked")}
     return sum(asked.values()), len(asked), sorted(name for name, passed in asked.items() if not passed)
@@ -67,7 +67,7 @@ def spd(scene, program, key):
 
 
 def spd_rest():
-    """The largest share of pixels off where no other sentence says why."""
+    """Returns the largest share of pixels off where no other sentence states the reason."""
     named = ("balls", "glint single"), ("balls", "Tachyon"), ("teapot", "POV-Ray"), ("teapot", "Tachyon"), ("gears", "POV-Ray")
     return max(program["difference"]["pixels_off"] for rung in measured("peers-spd")["rungs"]
                for name, program in rung["programs"].items() if "difference" in program and (rung["scene"], name) not in named)
@@ -100,7 +100,7 @@ def ladder_open(distances):
 
 
 def textbook_wrong(shapes, *distances):
-    """Percentages, the least and the most."""
+    """Returns the least and the most percentage."""
     wrong = [100 * rung["wrong"] / rung["rays"] for rung in rungs("textbook", shapes=shapes, distances=lambda d: d in distances)]
     return min(wrong), max(wrong)
 
@@ -128,7 +128,8 @@ def budget_pilots():
 
 
 def budget_long(seconds):
-    """The number of rows that take longer at double, how many of them end at a faster precision, and their median times divided by that of double."""
+    """Returns the number of rows that take longer at double, how many of them end at a faster precision, and their median times
+    divided by that of double."""
     rows = [row for row in measured("budgets")["rows"] if row["double_ms"] > 1000 * seconds]
     ratio = {"double": [], "faster": []}
     for row in rows:
@@ -148,14 +149,14 @@ def certified_compared(precision):
 # Hard cases
 
 def verify_counts():
-    """The cases of the suite, which all precisions pass."""
+    """Returns the number of cases of the suite, which all precisions pass."""
     (count,) = {len(run["cases"]) for run in measured("verify")["precisions"]}
     assert all(run["failed"] == 0 for run in measured("verify")["precisions"])
     return count
 
 
 def passed_elsewhere(report, implementation):
-    """Cases that all precisions pass, the number of precisions, and whether the bits at strict are PoCL's."""
+    """Returns the number of cases that all precisions pass, and that of precisions. The bits at strict must be PoCL's."""
     by_name = {entry["implementation"]: entry for entry in measured(report)["implementations"]}
     runs = by_name[implementation]["precisions"]
     (passed,) = {run["passed"] for run in runs}
@@ -167,7 +168,7 @@ def passed_elsewhere(report, implementation):
 
 
 def rusticl_of_mesa_22():
-    """Cases that pass at single and at strict, with PoCL's bits; the others were not answered."""
+    """Returns the numbers of cases that pass at single and at strict, with PoCL's bits. The others were not answered."""
     pocl, rusticl = (entry["precisions"] for entry in measured("verify-rusticl")["implementations"])
     hashes = {(run["precision"], case["name"]): case["hash"] for run in pocl for case in run["cases"]}
     runs = {run["precision"]: run for run in rusticl if "cases" in run}
@@ -183,14 +184,14 @@ def perturbed(precision, case):
 
 
 def perturbed_others():
-    """What fails at single other than R7; its seeds are 1 to 20."""
+    """Returns the names of failures at single other than R7, whose seeds are 1 to 20."""
     runs = [run for run in measured("perturb")["runs"] if run["precision"] == "single"]
     assert sorted({run["seed"] for run in runs}) == list(range(1, 21))
     return [failure["name"] for run in runs for failure in run["failures"] if failure["name"] != "R7"]
 
 
 def scaling_cell(image, ranks):
-    """The value in the table that tools/scaling --check tests."""
+    """Returns the value in the table that tools/scaling --check tests."""
     row = next(line for line in read(ROOT / "docs/measurements/README.md").splitlines() if line.startswith(f"| {image} | {ranks} |"))
     return float(row.split("|")[3])
 

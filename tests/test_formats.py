@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Reports in the formats of other programs: each is read by its own reader and agrees with --json.
+"""Reports in the formats of other programs: each is read by the reader of its format and agrees with --json.
 Sanitizers see the same writers in test_json.
 
 run_tests: sanitize-long-only"""
@@ -59,18 +59,18 @@ class Formats(TestCase):
         write("s.yaml", SPHERE)
 
     def rows(self, command, path):
-        """The rows of the report in JSON, by one run for all formats: a bench builds its kernels on every run."""
+        """Returns the rows of the report in JSON, by one run for all formats, since a bench builds its kernels on every run."""
         if command not in self.reports:
             self.reports[command] = self.json(f"{command} --json")
         return rows_of(self.reports[command], path)
 
     def both(self, command, form):
-        """The report in a format, by --output."""
+        """Returns the report in a format, by --output."""
         self.glint(f"{command} --format {form} --output report")
         return read("report")
 
     def agrees(self, cells, row, members):
-        """Columns of what is measured may differ from run to run; the others are the document's."""
+        """Checks the cells of a row. Columns of measured times may differ from run to run, others are the document's."""
         for heading, path in members.items():
             value = member(row, path)
             if isinstance(value, float) and path[0] == "frame_ms":
@@ -128,7 +128,7 @@ class Formats(TestCase):
             self.assertEqual((suite.get("tests"), suite.get("skipped")), ("4", "3"))
 
     def test_benchmark(self):
-        """As google/benchmark writes repetitions; names, times and their unit are what its tools read."""
+        """Repetitions are as google/benchmark writes them. Names, times and their unit are what its tools read."""
         start = time.monotonic()
         report = json.loads(self.glint(f"{COMMANDS['bench'][0]} --format benchmark").stdout)
         elapsed = time.monotonic() - start
@@ -155,7 +155,7 @@ class Formats(TestCase):
         self.assertEqual(len(re.findall(r"^s\.yaml/.*_pvalue .* U Test", out, re.M)), 2)
 
     def test_output(self):
-        """The text stays on standard output; the file's ending gives the format; nothing is written by a wrong call."""
+        """The text stays on standard output, and the file's ending gives the format. A wrong call writes nothing."""
         out = self.glint("verify S1 --precision single --output report.xml").stdout
         self.assertIn("tier B: 1 of 1 case passed", out)
         ElementTree.fromstring(read("report.xml"))

@@ -24,7 +24,7 @@ RENDER = "--size 32x18 --quiet --lanes 1"
 
 class Frames(TestCase):
     def test_values(self):
-        """Before the first key, at keys, between and behind them."""
+        """Values are right before the first key, at keys, between them and after the last."""
         write("moving.yaml", SCENE.format(**KEYS))
         self.glint(f"render moving.yaml --frames 0-9 {RENDER} -o f%d.npy")
         for frame, values in {
@@ -122,7 +122,7 @@ class Frames(TestCase):
         self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
 
     def test_reports(self):
-        """One line each, also of scenes."""
+        """Each frame has one line, as does each scene."""
         write("moving.yaml", SCENE.format(**KEYS))
         write("still.yaml", SPHERE)
         for options, expected in ("moving.yaml --frames 3-4", [("moving.yaml", 3), ("moving.yaml", 4)]), \
@@ -134,7 +134,7 @@ class Frames(TestCase):
         self.assertEqual(self.json(f"render moving.yaml --frames 3 {RENDER} --timing=json")["frame"], 3)
 
     def test_standard_streams(self):
-        """A scene of standard input; images on standard output, one after the other, with the bytes of files."""
+        """A scene is read from standard input. Images on standard output follow each other, with the bytes of files."""
         moving = SCENE.format(**KEYS)
         write("moving.yaml", moving)
         for ending in "png", "ppm", "npy":

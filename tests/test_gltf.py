@@ -18,7 +18,7 @@ SAMPLE_MODELS = Path("/usr/share/assimp/models/glTF2")
 
 
 class Gltf:
-    """A file that is being made; its members are those of the JSON text."""
+    """A file that is being made, with the members of the JSON text."""
 
     def __init__(self, **members):
         self.bytes = b""
@@ -59,7 +59,7 @@ class Gltf:
         return index
 
     def write(self, path, uri=None):
-        """As .glb, or with the bytes in the text or in a file."""
+        """Writes the file as .glb, or with the bytes in the text or in a file."""
         self.bytes += bytes(-len(self.bytes) % 4)
         buffer = {"byteLength": len(self.bytes)}
         if path.endswith(".glb"):
@@ -77,7 +77,7 @@ class Gltf:
 
 
 def png(rows, color=2, *extra):
-    """An 8-bit image of values from 0 to 1, by default RGB, with extra chunks."""
+    """Returns an 8-bit image of values from 0 to 1, by default RGB, with extra chunks."""
     raw = b"".join(b"\0" + bytes(int(255 * value) for pixel in row for value in pixel) for row in rows)
     header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, color, 0, 0, 0)
     chunks = ((b"IHDR", header), *extra, (b"IDAT", zlib.compress(raw)), (b"IEND", b""))
@@ -209,7 +209,7 @@ Connections:  {{
 
 class Test(TestCase):
     def checked(self, path, *warnings):
-        """What glint check reports; the warnings, and no others, must have these parts."""
+        """Returns what glint check reports. The warnings, and no others, must have these parts."""
         report = self.json(f"check --json {path}")
         texts = [warning["text"] for warning in report["warnings"]]
         self.assertEqual(len(texts), len(warnings), texts)
@@ -372,7 +372,7 @@ class Test(TestCase):
         self.refuses(f"check {gltf.write('a.gltf')}", "more than 1000 nodes deep")
 
     def test_named(self):
-        """What is not shown is named once, with its first place; the square is there."""
+        """Each feature that is not shown is named once, with its first place. The square is shown."""
         gltf = Gltf(
             extensionsUsed=["KHR_texture_transform", "KHR_materials_clearcoat", "ACME_thing"], animations=[{}], materials=[{
                 "alphaMode": "odd", "normalTexture": {"index": 0}, "occlusionTexture": {"index": 0},
@@ -415,7 +415,7 @@ class Test(TestCase):
         self.checked("s.yaml", "b.gltf: nodes[0]: cameras and lights of a mesh", "b.gltf: materials[1]: only glint render FILE shows emission by a texture", "no lights")
 
     def test_losses_of_materials_are_named(self):
-        """One loss for each material; the first is that of Khronos' MultiUVTest."""
+        """Each material has one loss. The first is that of Khronos' MultiUVTest."""
         image = {"baseColorTexture": {"index": 0}}
         for material, path, loss in (
             ({"pbrMetallicRoughness": image, "emissiveTexture": {"index": 1, "texCoord": 1}, "emissiveFactor": [1, 1, 1]}, "materials[0]", "emission next to a different texture is not shown"),
@@ -468,7 +468,7 @@ class Test(TestCase):
         self.checked("a.dae", "a color of material 'm' is out of range: the default is used")
 
     def test_members_of_another_type_are_named(self):
-        """The square is there without them; null is as good as missing."""
+        """The square is shown without such members. null counts as missing."""
         pbr = "materials[0].pbrMetallicRoughness"
         for members, warnings in (
             ({"materials": [{"pbrMetallicRoughness": []}]}, [f"{pbr}: must be an object: not used"]),
@@ -509,7 +509,7 @@ class Test(TestCase):
             self.assertIn("IMAGES", report["features"])
 
     def test_alpha_of_images(self):
-        """It is named where a pixel is transparent and the format does not define it as ignored, or blends by it; the colors stay."""
+        """Alpha is named if a pixel is transparent and the format does not define it as ignored, or blends by it. Colors stay."""
         palette = (b"PLTE", bytes([255, 0, 0, 0, 255, 0]))
         images = {
             "rgba": (png([[(1, 0, 0, 1), (0, 1, 0, 0.5)]], 6), True),
@@ -553,7 +553,7 @@ class Test(TestCase):
         self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS", "ORTHOGRAPHIC"})
 
     def test_parallel_rays(self):
-        """The square fills as much of the frame from near and from afar: half of its height, a quarter of its width."""
+        """From near and afar the square fills half of the frame's height and a quarter of its width."""
         for distance in 3, 4000:
             gltf = Gltf()
             gltf.square()
@@ -569,7 +569,7 @@ class Test(TestCase):
         self.assertIn("the camera has parallel rays, which has no error bound", process.stderr)
 
     def test_formats_look_alike(self):
-        """A smooth, textured square of four formats: the same image, with the same camera and lights."""
+        """A smooth, textured square in four formats gives the same image with the same camera and lights."""
         normals = [(-0.6, 0, 0.8), (0.6, 0, 0.8), (0.6, 0, 0.8), (-0.6, 0, 0.8)]
         with open("a.png", "wb") as file:
             file.write(QUADRANTS)
@@ -622,7 +622,7 @@ class Test(TestCase):
             self.refuses(f"check {SAMPLE_MODELS / name}", f"the file needs {extension}, which glint does not read; export it without")
 
     def test_scenes_of_other_formats(self):
-        """Cameras, lights and textures by assimp; an image of another machine's path lies next to the file."""
+        """Cameras, lights and textures are read by assimp. An image with another machine's path is found next to the file."""
         with open("a.png", "wb") as file:
             file.write(QUADRANTS)
         numbers = {"v": SQUARE, "n": [(0, 0, 1)] * 4, "t": WHOLE}
@@ -649,7 +649,7 @@ class Test(TestCase):
         cells = []
 
         def cell(colors, uvs=None, normals=None, attributes=(), scale=1, **material):
-            """Colors: one for the whole square, or four by quadrants, upper left, right, lower left, right."""
+            """Adds a square. Colors are one for all of it, or four by quadrants, upper left, right, lower left, right."""
             x = len(cells)
             cells.append(colors if isinstance(colors, list) else [colors] * 4)
             material = gltf.add("materials", **material) if material else None

@@ -45,7 +45,7 @@ class Golden(TestCase):
         self.assertEqual(process.stdout, "checkers.yaml: same\nhighlights.yaml: same\nshapes.yaml: same\n")
 
     def test_lines(self):
-        """A line per scene, of its name; writing replaces it and keeps the others."""
+        """Each scene has a line with its name. Writing replaces it and keeps the others."""
         first = self.written()
         self.assertRegex(first, f"^(#.*\n)+{LINE}$")
         write("other scene.yaml", SPHERE.replace("radius: 1", "radius: 0.9"))
@@ -57,7 +57,7 @@ class Golden(TestCase):
         self.assertEqual(self.glint("golden check 'other scene.yaml' --lanes 4 --bvh on").stdout, "other scene.yaml: same\n")
 
     def test_differences(self):
-        """Each changed scene: the layer that differs first, and the pixels, whose crop shows the scene as it is now."""
+        """A changed scene has the layer that differs first, and the pixels, whose crop shows the scene as it is now."""
         self.written()
         for change, layer, part in (
                 (("radius: 1", "radius: 1.0000001"), "object|t", None), (("fov: 60", "fov: 61"), "object|t", None),

@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""What the kernels need of GPUs, compiled for them without one (tools/gpu-resources): no more private memory than the
-scene's pending children and bounces, nothing spilled."""
+"""Kernels compiled for GPUs without one (tools/gpu-resources) need no more private memory than the scene's pending children
+and bounces, and spill nothing."""
 import json
 import subprocess
 

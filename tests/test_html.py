@@ -53,7 +53,7 @@ def member(value, path):
 
 
 def printed_number(text):
-    """3.1·10⁻⁶ is 3.1e-6, 921 600 with narrow spaces 921600, ∞ infinity."""
+    """Reads a printed number. 3.1·10⁻⁶ is 3.1e-6, 921 600 with narrow spaces 921600, ∞ infinity."""
     text = text.replace("−", "-").replace("\u202f", "").replace("∞", "inf")
     power = re.fullmatch("(?:(.*)·)?10([⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)", text)
     digits = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
@@ -61,13 +61,13 @@ def printed_number(text):
 
 
 def srgb_8_bits(value):
-    """IEC 61966-2-1:1999."""
+    """Returns the display value of IEC 61966-2-1:1999."""
     value = min(max(value, 0.0), 1.0)
     return math.floor(255 * (12.92 * value if value <= 0.0031308 else 1.055 * value ** (1 / 2.4) - 0.055) + 0.5)
 
 
 def dump(page, *options):
-    """The document, as chromium has it once it is loaded."""
+    """Returns the document as chromium has it once it is loaded."""
     command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={Path('browser').resolve()}"]
     process = subprocess.run([*command, *options, "--dump-dom", Path(page).resolve().as_uri()], stdout=subprocess.PIPE,
                              stderr=subprocess.DEVNULL, encoding="utf-8", timeout=120, check=True)  # fmt: skip
@@ -81,7 +81,7 @@ class Html(TestCase):
         shutil.copy(plain("spheres16.yaml", "scene"), "spheres16.yaml")
 
     def page(self, arguments):
-        """Runs glint accuracy; checks the JSON in the page against that on standard output, returns both."""
+        """Runs glint accuracy, and checks the JSON in the page against that on standard output. Returns both."""
         process = self.glint(f"accuracy {SMALL} {arguments} --html page.html --json")
         page = Path("page.html").read_text(encoding="utf-8")
         embedded = re.search(r'<script type="application/json" id="report">\n(.*?)\n*</script>', page, re.DOTALL)[1]
@@ -95,7 +95,7 @@ class Html(TestCase):
         return page, report
 
     def check_axis(self, ticks, points):
-        """Ticks and points, value and position, lie as on a logarithmic axis; 0 has a separate tick."""
+        """Checks that ticks and points, value and position, lie as on a logarithmic axis, where 0 has a separate tick."""
         position = {tick["value"]: tick["position"] for tick in ticks}
         first, last = min(filter(None, position), default=1), max(position)
         for value, found in [*position.items(), *points]:
@@ -118,7 +118,7 @@ class Html(TestCase):
         self.check_axis(panel["y"], errors)
 
     def check_labels(self, panels, chosen):
-        """Each point has its name, but in small panels with long names none has; no name covers a text, and a mark under
+        """Checks that each point has its name, except in small panels with long names. No name covers a text, and a mark under
         another one shows through."""
         for panel in [*panels, *chosen]:
             self.assertEqual((panel["covering"], panel["opaque"]), ([], 0))
@@ -126,7 +126,7 @@ class Html(TestCase):
             self.assertGreater(10.5 * panel["scale"], 9, "pixels of text")
 
     def check_tables(self, tables, scene):
-        """Every value, and its order after one and after two clicks on the heading."""
+        """Checks every value, and its order after one and after two clicks on the heading."""
         colors_only = scene["reference"]["kind"] == "file"
         listed = [columns for columns in COLUMNS if not (colors_only and "Normal, largest" in columns)]
         for columns, table in zip(listed, tables, strict=True):
@@ -143,7 +143,7 @@ class Html(TestCase):
                     self.assertEqual(found, sorted(found, reverse=order == "descending"), f"{heading}, {order}")
 
     def check_colors(self, pixels, scene):
-        """The worst pixels have the colors that the figures say, in the reference's image and in their own."""
+        """Checks that the worst pixels have the colors in the figures, in the reference's image and in the variant's."""
         for pixel in pixels:
             worst = scene["variants"][pixel["variant"]]["worst"][pixel["kind"]]
             expected = [*map(srgb_8_bits, worst["reference_color"]), *map(srgb_8_bits, worst["variant_color"])]
@@ -151,7 +151,7 @@ class Html(TestCase):
                 self.assertAlmostEqual(channel, other, delta=1, msg=pixel)
 
     def check_drawn(self, page, report):
-        """What html_probe.js finds in the page."""
+        """Checks what html_probe.js finds in the page."""
         if not CHROMIUM or IS_SANITIZED:  # a sanitized build's page is that of the other build
             self.skipTest("sanitized" if IS_SANITIZED else "there is no chromium")
         probe = (ROOT / "tests/html_probe.js").read_text(encoding="utf-8")
@@ -196,13 +196,13 @@ class Html(TestCase):
         self.check_drawn(page, report)
 
     def test_crossed_out(self):
-        """Errors a thousand times those of any device: shadows on whole spheres."""
+        """Errors a thousand times those of any device put shadows on whole spheres."""
         page, report = self.page("spheres16.yaml --precision single --samples 1,2 --perturb 1:1000")
         self.assertTrue(report["scenes"][0]["variants"][0]["crossed_out"])
         self.check_drawn(page, report)
 
     def test_reference_from_a_file(self):
-        """It has colors only, and no errors of distances and normals."""
+        """A reference from a file has only colors, and no errors of distances and normals."""
         self.glint("render spheres16.yaml --size 120x80 --precision double -o reference.npy")
         page, report = self.page("spheres16.yaml --precision single,double --reference reference.npy")
         self.check_drawn(page, report)

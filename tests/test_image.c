@@ -17,7 +17,7 @@
 
 static const ImageNote notes[] = {{"Software", "glint 1"}, {"Scene", "caf\xC3\xA9.yaml"}, {NULL, NULL}};
 
-// Values from below 0 to above 1, none of them alike.
+// Returns values from below 0 to above 1, all different.
 static float *values_make(uint32_t count)
 {
     float *values = malloc(count * sizeof *values);
@@ -589,7 +589,7 @@ TEST(test_png_that_declares_too_much)
     assert_true(peak_kibibytes() - before < 64 * 1024);
 }
 
-// Nothing of the size that a note declares, here 1.8 GB, is allocated.
+// The size that a note declares, here 1.8 GB, is never allocated.
 TEST(test_png_with_a_large_note)
 {
     long before = peak_kibibytes();

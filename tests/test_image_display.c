@@ -159,7 +159,7 @@ TEST(test_regions_and_bands)
     text_free(&part);
 }
 
-// Many rows at once, which threads share, have the bytes of each by itself.
+// Many rows at once, which threads share, have the same bytes as rows written one by one.
 TEST(test_rows_at_once)
 {
     enum { ROWS = 300, COLUMNS = 700 };

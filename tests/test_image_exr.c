@@ -120,7 +120,7 @@ static bool layer_read(Image *image, const char *layer, MessageList *messages)
     return done;
 }
 
-// `expected`: the numbers of the channels that are read, in the image's order.
+// Checks a layer's values. `expected` has the numbers of the channels that are read, in the image's order.
 static void check_values(const char *layer, const char *expected, const char *what)
 {
     MessageList messages = {0};
@@ -173,7 +173,7 @@ TEST(test_compressions)
     }
 }
 
-// Every number of channels, of which some are not wanted.
+// Files may have any number of channels, of which some are not wanted.
 TEST(test_choice_of_channels)
 {
     static const char *const files[][2] = {
@@ -259,7 +259,7 @@ TEST(test_parts_are_layers)
     check_refused(NULL, "They are beauty, other");
 }
 
-// Where the file has no pixels the image is black, and pixels outside of the image are not read.
+// The image is black where the file has no pixels, and pixels outside of the image are not read.
 TEST(test_windows)
 {
     static const int shifts[][2] = {{3, 5}, {-4, -2}, {-30, 1}};
@@ -345,8 +345,8 @@ TEST(test_other_primaries_are_named)
     }
 }
 
-// Among blocks of every size and compressibility are some whose compressed size is their full size; glint
-// must not spoil those.
+// Among blocks of every size and compressibility are some whose compressed size is their full size, which
+// glint must not spoil.
 TEST(test_blocks_as_large_as_compressed)
 {
     uint32_t random = 1;
@@ -371,7 +371,7 @@ TEST(test_blocks_as_large_as_compressed)
     }
 }
 
-// The file is the same however many rows come at once: parts of blocks, many blocks, or both.
+// The file is the same however many rows come at once, be they parts of blocks, many blocks, or both.
 TEST(test_rows_in_any_number)
 {
     enum { ROWS = 611, COLUMNS = 7, LAYERS = 3 };

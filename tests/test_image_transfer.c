@@ -15,7 +15,7 @@ static uint32_t expected_quantized(float value, Transfer transfer, unsigned bits
     return (uint32_t)floorl(display * (bits == 8 ? 255 : 65535) + 0.5L);
 }
 
-// The single function and the row function must both give what the formula does.
+// Checks that the single function and the row function both give what the formula does.
 static void check_value(float value, Transfer transfer, unsigned bits)
 {
     uint32_t expected = expected_quantized(value, transfer, bits);
@@ -48,7 +48,7 @@ TEST(test_special_values)
     assert_int_equal(image_quantize(0.5F, TRANSFER_NONE, 8), 128);
 }
 
-// Where the formula passes from one display value to the next, the floats on both sides of that place.
+// Checks the floats on both sides of each place where the formula passes from one display value to the next.
 static void check_thresholds(Transfer transfer, unsigned bits)
 {
     uint32_t maximum = bits == 8 ? 255 : 65535;

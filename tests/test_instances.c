@@ -14,7 +14,7 @@
 
 enum { WIDTH = 83, HEIGHT = 47, SIDE = 24, TRIANGLES = 2 * SIDE * SIDE };
 
-// With compiled kernels in the run's cache, and so not in a scratch folder.
+// A plain folder, not scratch_open's, since compiled kernels are in the run's cache.
 static char folder[] = "/tmp/glint-test-XXXXXX";
 
 // Writes a bumpy ball with texture coordinates, and normals if it is smooth.
@@ -66,7 +66,7 @@ static int instances_close(void **state)
     return probe_close(state);
 }
 
-// A scene of balls in a group that is scaled by `size` and moved to `place`, with the camera and the lights.
+// Returns a scene of balls in a group scaled by `size` and moved to `place`, with the camera and the lights.
 static Scene scene_with(double size, Vector3 place, const char *objects)
 {
     Text text = {0};
@@ -183,9 +183,9 @@ static Difference difference_of(const Film *film, const Film *other)
     return found;
 }
 
-// What the numbers of copies and of shared meshes may differ by: t and positions relative to the distance.
-// The normals of copies are those of rounded vertices, which turns them by u times the distance over the size
-// of a triangle. In double the vertices are rounded before the camera's position is subtracted.
+// Checks how far copies and shared meshes differ, with t and positions relative to the distance. The normals
+// of copies are those of rounded vertices, which turns them by u times the distance over the size of a
+// triangle. In double the vertices are rounded before the camera's position is subtracted.
 static void difference_check(const Difference *d, Precision precision, Vector3 place, const char *name)
 {
     const double roundoff = (precision == PRECISION_DOUBLE ? DBL_EPSILON : FLT_EPSILON) / 2,
@@ -201,7 +201,7 @@ static void difference_check(const Difference *d, Precision precision, Vector3 p
              d->position, d->normal, d->color);
 }
 
-// Short tests take one precision, the one whose kernels test_variants has.
+// Returns whether the precision is tested. Short tests take only that whose kernels test_variants has.
 static bool is_tested(Precision precision)
 {
     return precision == probe_same_bits_from() || (tests_are_long() && probe_has(precision));
@@ -251,7 +251,7 @@ TEST(lanes_agree)
     }
 }
 
-// Many instances, some of which overlap.
+// Returns a scene of many instances, some of which overlap.
 static Scene many_make(size_t count)
 {
     Text text = {0};
@@ -448,7 +448,7 @@ TEST(too_many_are_refused)
     scene_free(&scene);
 }
 
-// The arrays of 10,000 instances of 20,000 triangles: those of one mesh and of the instances.
+// 10,000 instances of 20,000 triangles need the arrays of one mesh and of the instances.
 TEST(instances_take_little_memory)
 {
     Scene scene = scene_with(1, (Vector3){0, 0, 0}, INSTANCE("flat", "{scale: 1}"));

@@ -30,7 +30,7 @@ static Film render(const Scene *scene, const RenderSettings *settings)
     return film_render(&probe_compute, scene, settings, AOVS);
 }
 
-// Without AOVs, whose kernels take longer to build than to test.
+// Renders without AOVs, whose kernels take longer to build than to test.
 static Film render_alone(const Scene *scene, const RenderSettings *settings)
 {
     return film_render(&probe_compute, scene, settings, 0);
@@ -57,7 +57,8 @@ static size_t objects_seen(const Film *film)
     return count;
 }
 
-// With what `certified` refuses, which other tests of random scenes include.
+// Returns a random scene with what `certified` refuses, a precision that other tests of random scenes
+// include.
 static Scene optical_scene(uint64_t seed)
 {
     Scene scene = random_scene(seed, OBJECTS);
@@ -117,7 +118,7 @@ static void scale_changes_lengths_alone(const Case *c, uint64_t seed)
     }
 }
 
-// Mirrors each row; `size` bytes per pixel.
+// Mirrors each row of pixels of `size` bytes.
 static void columns_flip(void *values, size_t size)
 {
     unsigned char *bytes = values, kept[4 * sizeof(double)];
@@ -132,7 +133,8 @@ static void columns_flip(void *values, size_t size)
         }
 }
 
-// Without checkers: in a plane they lie along axes made from its normal, which mirror to others.
+// Returns the optical scene without checkers. In a plane they lie along axes made from its normal, whose
+// mirror images differ.
 static Scene unchecked_scene(uint64_t seed)
 {
     Scene scene = optical_scene(seed);
@@ -163,7 +165,7 @@ static void mirror_flips_the_image(const Case *checkered, uint64_t seed)
     scene_free(&given);
 }
 
-// Object ids are list indices; this maps them back to the original order.
+// Maps object ids, which are list indices, back to the original order.
 static void order_changes_ids_alone(const Case *c, uint64_t seed)
 {
     Random random = {seed};

@@ -44,7 +44,7 @@ def is_absent_figure(value):
 
 
 def members_of(value, path=""):
-    """Each member's path and value; a path ends in [] where an array holds objects."""
+    """Yields each member's path and value. A path ends in [] where an array holds objects."""
     if isinstance(value, dict) and not (path and is_absent_figure(value)):
         if path:
             yield path, value
@@ -58,7 +58,7 @@ def members_of(value, path=""):
 
 
 def is_of_type(value, words):
-    """Whether a value is of the type."""
+    """Returns whether a value is of the type."""
     if value is None:
         return "null" in words
     if isinstance(value, dict):
@@ -75,7 +75,7 @@ def is_of_type(value, words):
 
 
 def in_order(paths):
-    """A member's own members follow it."""
+    """Returns the paths in an order in which a member's members follow it."""
     ordered = []
     for path in paths:
         family = [i for i, other in enumerate(ordered) if other == path.rpartition(".")[0] or
@@ -91,7 +91,7 @@ class Json(TestCase):
         write("strong.yaml", STRONG)
 
     def check_members(self, heading, *reports):
-        """The reports together print the members of the page's section, each of its type."""
+        """Checks that the reports together print the members of the page's section, each of its type."""
         schema, = {report["schema"] for report in reports}
         printed = [member for report in reports for member in members_of(report)]
         paths = list(dict.fromkeys(path for path, _ in printed if path.split(".")[-1] not in RARE))
@@ -119,7 +119,7 @@ class Json(TestCase):
         self.check_members("glint render --timing=json", *outputs)
 
     def check_launches(self, launches, reads):
-        """Moments begin with the first command's queueing and follow each other; groups fill the work-items."""
+        """Checks that moments begin with the first command's queueing and are in order, and that groups fill the work-items."""
         for launch in launches:
             self.assertEqual(len(launch["local"]), len(launch["global"]))
             self.assertTrue(all(items > 0 and items % group == 0 for items, group in zip(launch["global"], launch["local"])))
@@ -186,7 +186,7 @@ class Json(TestCase):
         write("plain.yaml", PLAIN)
 
     def test_verify(self):
-        """Cases with a measure and without, one of them an image."""
+        """Cases have a measure or none, and one of them is an image."""
         self.check_members("glint verify", self.json("verify S5 P4 P6 --precision single --json"),
                            self.json("verify P4 --precision single --json --perturb 7"))
 
@@ -224,7 +224,7 @@ class Json(TestCase):
 
 
 def validator_of(heading):
-    """A validator by the schema, which here allows no members beyond its own and rare ones."""
+    """Returns a validator by the schema, which here allows only its members and rare ones."""
     import jsonschema
     only = {"patternProperties": {f"^({'|'.join(RARE)})$": {"type": "string"}}, "additionalProperties": False}
     schema = json.loads(read(SCHEMA_FILE), object_hook=lambda part: {**part, **only} if "required" in part else part)

@@ -68,13 +68,13 @@ static Vector3 vector_at(const double *vectors, size_t pixel)
     return (Vector3){v[0], v[1], v[2]};
 }
 
-// The world's place behind a pixel.
+// Returns the world position of what a pixel shows.
 static Vector3 film_place(const Film *film, const Scene *scene, size_t pixel)
 {
     return vector_add(vector_at(film->position, pixel), scene->camera.position);
 }
 
-// Numbers that float holds exactly: the answer is exact at every precision.
+// Float holds all numbers exactly, so that the answer is exact at every precision.
 static void background_and_ambient(Precision precision)
 {
     Scene scene =
@@ -102,7 +102,8 @@ static void background_and_ambient(Precision precision)
     scene_free(&scene);
 }
 
-// A light straight above a plane, seen from above: kd C I N.L, and with ks the whole highlight in the middle.
+// A light straight above a plane, seen from above, gives kd C I N.L, and with ks the whole highlight in the
+// middle.
 static void light_above_plane(Precision precision)
 {
     Scene scene =
@@ -134,8 +135,7 @@ static void light_above_plane(Precision precision)
     scene_free(&scene);
 }
 
-// R1: a sphere standing on a plane, a light above: the shadow's radius is 10 / sqrt(80), and it reaches the
-// contact.
+// R1: a sphere on a plane under a light has a shadow with the radius 10 / sqrt(80) that reaches the contact.
 static void contact_shadow(Precision precision)
 {
     Scene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
@@ -166,8 +166,8 @@ static void contact_shadow(Precision precision)
     scene_free(&scene);
 }
 
-// A spot straight down on a plane from height 5: the cone of 30 degrees intersects it in a circle of radius 5
-// tan 30, full within 5 tan 20 if the penumbra is 10 degrees wide.
+// A spot shines straight down on a plane from height 5. The cone of 30 degrees intersects it in a circle of
+// radius 5 tan 30, full within 5 tan 20 if the penumbra is 10 degrees wide.
 static void spot_cone(Precision precision)
 {
     Scene scene =
@@ -223,8 +223,8 @@ static long double highlight_of(const Film *film, const Scene *scene, size_t pix
     return s >= 1 ? 0 : expl((long double)shininess * log1pl(-s));
 }
 
-// R5: highlights of every sharpness on a sphere; never below 0 nor above ks, nor NaN. Light and eye are as
-// far from the center, so that the peak lies halfway between; the field of view narrows with the highlight.
+// R5: highlights of every sharpness on a sphere are never below 0 nor above ks, nor NaN. Light and eye are
+// as far from the center, so that the peak is halfway between. The field of view narrows with the highlight.
 static void highlight(Precision precision)
 {
     static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
@@ -260,7 +260,7 @@ static void highlight(Precision precision)
     scene_free(&scene);
 }
 
-// P2: a tilted plane of size S at distance O from the world's origin, under a low sun: not one pixel shadows
+// P2: no pixel of a tilted plane of size S, at distance O from the world's origin under a low sun, shadows
 // itself.
 static void tilted_plane(Precision precision)
 {
@@ -299,7 +299,7 @@ static void tilted_plane(Precision precision)
     scene_free(&scene);
 }
 
-// The eye and a light inside a closed shape: all of it is seen and lit.
+// The eye and a light are inside a closed shape, all of which is seen and lit.
 static void inside(Precision precision)
 {
     static const char *const shapes[] = {
@@ -339,8 +339,8 @@ static bool meets_ground(const double *direction, double slope)
     return b < 0 && b * b >= a * (above * above - radius * radius);
 }
 
-// Ground that is a cylinder or a cone: in every column the horizon is within a row of the exact one. Next to
-// the side the plain discriminant tears it (S4 has the sphere's).
+// The horizon of ground that is a cylinder or a cone is within a row of the exact one in every column. Next
+// to the side the plain discriminant tears it (S4 has the sphere's).
 static void ground_horizon(Precision precision)
 {
     static const struct {
@@ -479,7 +479,7 @@ TEST(degenerate_cameras)
     film_free(&unrolled);
 }
 
-// R8: a single pixel looks along the view; extreme fields of view stay finite.
+// R8: a single pixel looks along the view, and extreme fields of view stay finite.
 TEST(single_pixel_and_extreme_fields)
 {
     Scene scene = scene_of("camera: {position: [1, 2, -7], look_at: [0, 0, 0], fov: 50}\n"
@@ -500,7 +500,7 @@ TEST(single_pixel_and_extreme_fields)
     scene_free(&scene);
 }
 
-// The eye is the origin: the same scene 2^23 away has the same bits.
+// The eye is the origin, so that the same scene 2^23 away has the same bits.
 TEST(distance_from_origin_changes_nothing)
 {
     Film films[2];

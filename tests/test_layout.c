@@ -216,7 +216,7 @@ static cl_program program_make(bool is_double)
     return program;
 }
 
-// Runs a kernel of two buffers and a number; both buffers are written back.
+// Runs a kernel of two buffers and a number. Both buffers are written back.
 static void kernel_run(cl_program program, const char *name, void *first, size_t first_size, void *second,
                        size_t second_size, uint32_t number)
 {
@@ -235,8 +235,8 @@ static void kernel_run(cl_program program, const char *name, void *first, size_t
     clReleaseKernel(kernel);
 }
 
-// Where the rule of types.h puts a member: scalar4 members first, as many bytes as the kernel's four numbers
-// have.
+// Returns where the rule of types.h puts a member. Members of scalar4 come first and have as many bytes as
+// the kernel's four numbers.
 static size_t member_offset(const Member *member, const FlatLayout *layout, bool is_double)
 {
     if (is_double) return member->host_offset;
@@ -267,7 +267,7 @@ static void layout_check(void **state)
     clReleaseProgram(program);
 }
 
-// Numbers that no two places share and that float holds exactly.
+// Returns a number that differs from that of any other place and that float holds exactly.
 static double real_at(size_t member, size_t component)
 {
     return (double)(8 * member + component) + 0.25;
@@ -278,7 +278,7 @@ static uint32_t integer_at(size_t member, size_t component)
     return (uint32_t)(0x80000000u + 8 * member + component);
 }
 
-// Two structs with every member of the type set in the second.
+// Returns two structs with every member of the type set in the second.
 static FlatArray array_fill(size_t type, const FlatLayout *layout)
 {
     FlatArray array = {aligned_alloc(64, (2 * layout->size + 63) / 64 * 64), 2, *layout};
@@ -339,7 +339,7 @@ static void values_check(void **state)
     clReleaseProgram(program);
 }
 
-// The list above misses no member: together they fill their struct. In a shape's struct the id is last.
+// The list above has every member, since they fill their struct. In a shape's struct the id is last.
 TEST(list_is_complete)
 {
     FlatLayout layouts[FLAT_COUNT];

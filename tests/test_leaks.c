@@ -1,5 +1,5 @@
 // In a sanitized build LeakSanitizer finds what glint forgets to release, OpenCL objects included, which the
-// driver allocates; and blames glint for nothing that the driver keeps.
+// driver allocates. It does not blame glint for what the driver keeps.
 #include "host/base/memory.h"
 #include "host/opencl/compute.h"
 #include "tests/check.h"
@@ -30,7 +30,7 @@ static void cl_must(cl_int status)
 }
 
 // Launches a kernel, so that the driver has compiled it and started its threads, and releases all but one
-// thing. Context and queue are not among them: idle worker threads of PoCL may keep pointers to both.
+// thing. That is never the context or queue, since idle worker threads of PoCL may keep pointers to both.
 static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
 {
     DeviceList list;

@@ -93,7 +93,7 @@ def parsed(text):
 
 
 def operation_of(node):
-    """The operation of a node and its operands."""
+    """Returns the operation of a node and its operands."""
     if isinstance(node, c_ast.BinaryOp):
         return node.op, [node.left, node.right]
     if isinstance(node, c_ast.UnaryOp) and node.op == "-":
@@ -153,7 +153,7 @@ class Compiler(_instrument.Generator):
 
 
 def captured(precision="strict", lanes=1):
-    """The launch of the scene, captured into a folder named by precision and lanes."""
+    """Returns the launch of the scene, captured into a folder named by precision and lanes."""
     write("scene.yaml", SCENE)
     folder = f"{precision}-{lanes}"
     process = run(f"render scene.yaml --precision {precision} --lanes {lanes} --size 32x24 --samples 2 --capture {folder} --quiet "
@@ -168,7 +168,7 @@ class Mutants(TestCase):
         self.device = locate.device_find(DEVICE)
 
     def test_mutants(self):
-        """At least nine of ten are found, each with its operation, function, operands and exact result, or what of it can be found."""
+        """At least nine of ten mutants are found, with operation, function, operands and exact result, or what of these can be found."""
         mutants = MUTANTS if IS_LONG else MUTANTS[2:4]
         launches = {variant: captured(*variant) for variant in {(mutant.precision, mutant.lanes) for mutant in mutants}}
         reference = locate.Device(self.device)
@@ -228,7 +228,7 @@ class Parts(TestCase):
         self.assertEqual(_exact.exact("fma", [one, one, tiny], one).lanes, (int(np.float32(2**-46).view(np.uint32)),))
 
     def test_command(self):
-        """`glint locate` starts glint-locate; without a difference it says so."""
+        """`glint locate` starts glint-locate, which reports that there is no difference if it finds none."""
         os.chmod(write("glint-locate", "#!/bin/sh\necho \"$@\"\nexit 3\n"), 0o755)
         self.assertEqual(self.glint("locate a 'b c'", status=3, env={"PATH": f".:{os.environ['PATH']}"}).stdout, "a b c\n")
         self.refuses("locat a", 'unknown command "locat"')

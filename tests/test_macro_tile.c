@@ -65,7 +65,7 @@ static double *component(Vector3 *v, size_t axis)
     return axis == 0 ? &v->x : axis == 1 ? &v->y : &v->z;
 }
 
-// Fills a corner of its flat box, whose sides are along the axes: the sides meet at a point in view.
+// Returns a triangle that fills a corner of a flat box, whose sides along the axes meet at a point in view.
 static Object flat_triangle_in_view(void)
 {
     static const double layers[] = {0.5, 1, 2, 4}; // few, so that triangles of one share leaves
@@ -85,8 +85,8 @@ static Object flat_triangle_in_view(void)
     return object;
 }
 
-// The edge from the first to the second vertex is in a plane with the common origin and through pixels; of
-// every third triangle all vertices are, so that it is seen edge-on.
+// Returns a triangle whose first edge is in a plane with the common origin and through pixels. All vertices
+// of every third triangle are, so that it is seen edge-on.
 static Object triangle_in_view(size_t index)
 {
     size_t origin = random_bits(&random_state) % ORIGINS;

@@ -77,7 +77,7 @@ TEST(transforms_scale_then_turn_then_move)
     scene_free(&scene);
 }
 
-// The outer side is where the corners are seen counterclockwise; a mirror keeps it outside.
+// The outer side is where the corners are seen counterclockwise. A mirror keeps it outside.
 TEST(mirrored_mesh_keeps_its_outer_side)
 {
     file_write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
@@ -244,7 +244,7 @@ TEST(what_no_face_uses_does_not_count)
     }
 }
 
-// Twice the area of all triangles; all have to turn left, seen from above.
+// Returns twice the area of all triangles, which must all turn left seen from above.
 static double area_of(const Mesh *mesh)
 {
     double area = 0;
@@ -393,7 +393,7 @@ static const char smooth_fbx[] =
     "232\n\t}\n}\n"
     "Connections:  {\n\tC: \"OO\",2,0\n\tC: \"OO\",1,2\n}\n";
 
-// The texture's origin is the upper left corner in glTF.
+// Writes the smooth triangle as glTF, where a texture's origin is the upper left corner.
 static void smooth_gltf_write(const char *path)
 {
     static const float numbers[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0,     0, 1,

@@ -11,7 +11,7 @@
 
 enum { SIDE = 64 };
 
-// Gray display values, as a PNG holds them.
+// Returns gray display values, as a PNG holds them.
 static Image gray_image(unsigned step)
 {
     Image image = {.width = SIDE,

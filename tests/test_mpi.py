@@ -25,9 +25,9 @@ RANKS = PROGRAM.parent / "glint-mpi"
 RENDER = "render sphere.yaml --size 64x96 --samples 20 --quiet"
 
 
-# What a rank does wrong: its device fails, or is slow for a number of microseconds, or has so few bytes of memory; or it is interrupted as it
-# reads a scene; or what it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end without a reason
-# (FAULT_ENDS).
+# Faults of a rank. Its device fails, is slow for a number of microseconds, or has so few bytes of memory, or it is interrupted as
+# it reads a scene. Or data that it sends with the tag FAULT_TAG has a wrong word, is sent FAULT_TIMES, or is replaced by an end
+# without a reason (FAULT_ENDS).
 FAULTS = """
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -83,7 +83,7 @@ TAKE, BAND, LAYERS = 0, 2, 3  # tags
 
 
 def wrong_word(tag, word, value, cut=0):
-    """And this many bytes cut off the end."""
+    """Returns the variables for a wrong word in what is sent with the tag, with `cut` bytes cut off the end."""
     return {"FAULT_TAG": tag, "FAULT_WORD": word, "FAULT_VALUE": value, "FAULT_CUT": cut}
 
 
@@ -113,7 +113,7 @@ class Mpi(TestCase):
         return process
 
     def mpirun_each(self, *commands, status=0):
-        """Runs a command per rank, chosen in a shell: mpirun's own way, with colons, crashes in Open MPI 5.0."""
+        """Runs a command per rank, chosen in a shell, since mpirun's way with colons crashes in Open MPI 5.0."""
         choices = "".join(f"{rank}) exec {command} ;;\n" for rank, command in enumerate(commands))
         write("rank.sh", f"case $OMPI_COMM_WORLD_RANK in\n{choices}esac\n")
         return self.mpirun(f"-n {len(commands)} sh rank.sh", status)
@@ -163,7 +163,7 @@ class Mpi(TestCase):
         self.glint(f"{RENDER} -o one.npy", env=POCL)
 
     def write_frames(self, more=(), status=0):
-        """More scenes and six others, and what renders them, also into expected/."""
+        """Writes six scenes and `more`, renders them into expected/, and returns the command that does so."""
         scenes = dict(more) | {f"sphere{i}": SPHERE.replace("radius: 1", f"radius: 1.{i}") for i in range(6)}
         for name, text in scenes.items():
             write(f"{name}.yaml", text)
@@ -173,7 +173,7 @@ class Mpi(TestCase):
         return command
 
     def check_frames(self, together=()):
-        """They are as expected; those that the ranks render together say so."""
+        """Checks that frames are as expected and that those that the ranks rendered together name the ranks."""
         self.assertEqual(sorted(os.listdir("frames")), sorted(os.listdir("expected")))
         for name in os.listdir("frames"):
             _, rows, texts, _ = png_read(f"frames/{name}")
@@ -183,8 +183,8 @@ class Mpi(TestCase):
         os.mkdir("frames")
 
     def test_frames_of_an_animation(self):
-        """Each rank has its frames and their checkpoints, all have the last one; the ones that exist are kept. With reports on
-        standard output all have each frame."""
+        """Each rank has its frames and their checkpoints, and all share the last frame. Those that exist are kept. With reports on
+        standard output all share each frame."""
         write("moving.yaml", SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))
         command = "render moving.yaml --size 64x48 --precision strict --frames 0-4"
         self.glint(f"{command} --quiet -o one%d.npy", env=POCL)
@@ -199,7 +199,7 @@ class Mpi(TestCase):
         self.assertEqual([(report["frame"], len(report["by_rank"])) for report in reports], [(frame, 1) for frame in range(5)])
 
     def test_motion_blur(self):
-        """In a frame that one rank renders, and in one that all render."""
+        """Motion is blurred in a frame that one rank renders and in one that all render."""
         write("moving.yaml", "shutter: 0.5\n" + SPHERE.replace("radius: 1", "radius: {keys: {0: 1, 4: 2}}"))
         command = "render moving.yaml --size 64x48 --precision strict --frames 0-2 --samples 5"
         self.glint(f"{command} --quiet -o one%d.npy", env=POCL)
@@ -208,7 +208,8 @@ class Mpi(TestCase):
             self.assertSameBytes(f"one{frame}.npy", f"ranks{frame}.npy")
 
     def test_frames(self):
-        """Each rank renders whole ones, and all together what is left, or all where one sees other files or has other options. A mistake ends one frame."""
+        """Each rank renders whole frames, and all together the rest, or all frames if one sees other files or has other options. A
+        mistake ends one frame."""
         command = self.write_frames({"bad": "camera: 5", "boxes": (ROOT / "scenes/boxes.yaml").read_text()}.items(), 1)
         os.mkdir("frames")
         self.assertRegex(self.mpirun(f"-n 3 {RANKS} {command} -o frames", 1).stderr, "(?m)^bad.yaml:1")
@@ -224,12 +225,12 @@ class Mpi(TestCase):
             self.assertIn("--work-group, --build-options and --capture need glint render, a single process", process.stderr)
 
     def test_a_refused_checkpoint(self):
-        """It ends all ranks."""
+        """A refused checkpoint ends all ranks."""
         Path("saved").write_text("no checkpoint")
         self.mpirun(f"-n 2 {RANKS} {RENDER} --checkpoint saved", status=1)
 
     def test_frames_of_failing_devices(self):
-        """Others render the frame of a rank whose device fails; with none left the job ends with 2."""
+        """Others render the frame of a rank whose device fails. With none left the job ends with 2."""
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
@@ -243,7 +244,7 @@ class Mpi(TestCase):
         self.assertEqual(os.listdir("frames"), [])
 
     def test_a_frame_that_fits_no_device(self):
-        """It alone is left out, with a message, whichever rank has it last."""
+        """Only that frame is left out, with a message, whichever rank has it last."""
         self.faults_build()
         command = self.write_frames({"large": SPHERE + 4000 * SPHERE.splitlines(keepends=True)[-1]}.items())
         os.remove("expected/large.png")
@@ -254,7 +255,7 @@ class Mpi(TestCase):
         self.check_frames()
 
     def test_an_interrupt_while_a_frame_is_read(self):
-        """The first rank's own; the other rank's frame ends, too, and nothing is left behind."""
+        """An interrupt of the first rank also ends the other rank's frame, and nothing is left behind."""
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
@@ -264,7 +265,7 @@ class Mpi(TestCase):
         self.assertEqual([name for name in os.listdir("frames") if not name.endswith(".png")], [])
 
     def mpirun_faulty(self, *faults, status=0):
-        """Each rank is faulty as its variables say."""
+        """Runs a job in which each rank has the faults of its variables."""
         commands = []
         for fault in faults:
             shim = f"env LD_PRELOAD=./faults.so {' '.join(f'{name}={value}' for name, value in fault.items())}"
@@ -277,22 +278,22 @@ class Mpi(TestCase):
         return process.stderr
 
     def test_failing_devices(self):
-        """The others render the rows of a rank whose device fails; with none left the job ends with 2."""
+        """The others render the rows of a rank whose device fails. With none left the job ends with 2."""
         self.faults_build()
         self.assertRegex(self.mpirun_faulty(SLOW, {}), "warning: rank 1 on .*: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
         self.assertRegex(self.mpirun_faulty({}, SLOW), "warning: the other devices continue without it: clEnqueueNDRangeKernel")
         self.assertRegex(self.mpirun_faulty({}, {}, status=2), "clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
 
     def test_nonsense(self):
-        """Nothing that a rank sends is believed."""
+        """Everything that a rank sends is checked."""
         self.faults_build()
         for fault in FAULTY:
             with self.subTest(fault=fault):
                 self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: it sent data that is not a band")
 
     def start(self, command, patience=1):
-        """A job with a checkpoint, whose ranks write their errors to `errors`: an interrupted mpirun of Open MPI 5 prints none.
-        Returns when the checkpoint has another band, or the job is done.
+        """Starts a job with a checkpoint, whose ranks write their errors to `errors`, since an interrupted mpirun of Open MPI 5
+        prints none. Returns when the checkpoint has another band, or the job is done.
 
         `patience`: the seconds for which mpirun waits before it ends a rank, and again before it kills it.
         """
@@ -311,7 +312,7 @@ class Mpi(TestCase):
         return process
 
     def ranks_of(self, process):
-        """The process of each rank."""
+        """Returns the process of each rank."""
         ranks = {}
         for children in Path(f"/proc/{process.pid}/task").glob("*/children"):
             for child in children.read_text(encoding="utf-8").split():
@@ -320,7 +321,7 @@ class Mpi(TestCase):
         return ranks
 
     def test_interrupts(self):
-        """An interrupt of mpirun, which then exits with a different status, and of the first rank alone."""
+        """An interrupt of mpirun, which then exits with a different status, or of the first rank alone ends the job."""
         command = f"{RENDER.replace('20', '100000').replace('64x96', '64x4096')} --precision strict"  # minutes
         ways = ("mpirun", signal.SIGINT, None), ("rank", signal.SIGTERM, 130)
         version = subprocess.run(["mpirun", "--version"], stdout=subprocess.PIPE, text=True, check=True).stdout

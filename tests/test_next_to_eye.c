@@ -1,5 +1,5 @@
 // Tests that shapes next to the eye, which rounding would move, are defined relative to it, and others are
-// not: kernels of other scenes pay nothing.
+// not, so that kernels of other scenes pay nothing.
 #include "host/compile/compile.h"
 #include "host/compile/shapes.h"
 #include "tests/check.h"

@@ -1,4 +1,4 @@
-// Numbers of scenes are the nearest doubles: those of the C library, however they are written.
+// Numbers of scenes are the nearest doubles, those of the C library, however they are written.
 #include "host/compile/random_shape.h"
 #include "host/import/number.h"
 #include "tests/check.h"

@@ -90,7 +90,7 @@ TEST(layouts_are_read)
     }
 }
 
-// The same position with other normals and texture coordinates is another vertex; the same of all is not.
+// The same position with other normals and texture coordinates is another vertex. The same of all is not.
 TEST(corners_combine_their_parts)
 {
     Scene scene = scene_of_obj(
@@ -226,7 +226,7 @@ TEST(materials_are_those_of_their_faces)
     assert_number(clear->shininess, material_default().shininess);
     scene_free(&scene);
 
-    // a material of the scene's own wins
+    // a material in the scene wins
     assert_true(scene_read(&scene, SCENE_OF(", material: {color: [0, 0, 1]}"), ""));
     assert_null(scene.meshes.items[0].materials);
     assert_vector(triangle_material(&scene, 0)->color, 0, 0, 1);
@@ -240,7 +240,7 @@ TEST(materials_are_those_of_their_faces)
 TEST(missing_materials_are_reported)
 {
     file_write("a.mtl", "newmtl red\nKd 1 0 0\n");
-    // the file of the mesh's own name stands in
+    // a library with the mesh's name replaces one that is missing
     Scene scene = scene_of_obj("mtllib missing.mtl\nusemtl red\n" FACE, "");
     assert_vector(triangle_material(&scene, 0)->color, 1, 0, 0);
     scene_free(&scene);
@@ -340,8 +340,8 @@ TEST(images_of_materials_are_used)
     }
 }
 
-// Heights are white 1/50 of the image's width above black; a colored image of map_Bump has normals, as that
-// of norm. -bm multiplies either.
+// White is 1/50 of the image's width above black. A colored image of map_Bump has normals, as that of norm
+// does. -bm multiplies either.
 TEST(bumps_are_normals)
 {
     const char *ramp = "P3 5 1 255 0 0 0 51 51 51 102 102 102 51 51 51 0 0 0\n",
@@ -480,7 +480,7 @@ TEST(files_have_each_message_once)
     text_free(&scene_text);
 }
 
-// Nine times the most corners a face may have: to cut them would take half a minute.
+// The faces have nine times the most corners of a face, which would take half a minute to cut.
 TEST(many_large_polygons_are_refused)
 {
     Text text = {0};

@@ -210,7 +210,7 @@ TEST(test_too_large)
     free(path);
 }
 
-// Four processes on an empty cache make one key of the hash: what each stores, all load.
+// Four processes on an empty cache make one key of the hash, so that all load what each stores.
 TEST(test_race_on_an_empty_cache)
 {
     enum { PROCESSES = 4, ROUNDS = 20 };
@@ -333,7 +333,7 @@ TEST(test_few_descriptors)
     assert_true(listed && cleared);
 }
 
-// Each byte changed, each shorter length, one byte more; then repaired by storing again.
+// Each changed byte, each shorter length and one more byte are noticed. Storing repairs the entry.
 TEST(test_damage)
 {
     store(key);
@@ -364,7 +364,7 @@ TEST(test_damage)
     free(path);
 }
 
-// As if two keys had one hash: the entry of the one lies where the other is looked for.
+// The entry of one key lies where another is looked for, as if both had the same hash.
 TEST(test_entry_of_another_key)
 {
     store("another key");
@@ -387,7 +387,7 @@ TEST(test_entry_without_rights)
     free(path);
 }
 
-// Replaced when the key is stored; a pipe that nobody writes into is not waited for.
+// What is not an entry is replaced when the key is stored. A pipe that nobody writes into is not waited for.
 TEST(test_entry_that_is_none_of_ours)
 {
     char *path = cache_entry_path(key), *other = cache_entry_path("another key");

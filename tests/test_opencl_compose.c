@@ -1,5 +1,5 @@
-// The composed kernel text, its hash, the judgement of event times, and work-groups cut
-// to fit: all without a device.
+// Tests the composed kernel text, its hash, the judgement of event times, and work-groups cut to fit, all
+// without a device.
 #include "host/opencl/compose.h"
 #include "tests/check.h"
 #include "tests/child.h"

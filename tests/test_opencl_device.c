@@ -30,7 +30,7 @@ typedef struct {
     DeviceList list;
 } Machine;
 
-// A CPU, an accelerator, a GPU without a compiler, two usable GPUs, a CPU of another make.
+// Makes a CPU, an accelerator, a GPU without a compiler, two usable GPUs, and a CPU of another make.
 static void machine_fill(Machine *machine)
 {
     Device *items = machine->items;

@@ -10,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Fails a call. It must be reported where `is_needed`; else the work is done without it.
+// Fails a call. It must be reported if `is_needed`, else the work is done without it.
 static void call_fail(const char *call, size_t index, bool returns_null, bool is_needed)
 {
     injected.call = call;
@@ -64,7 +64,7 @@ TEST(test_needed_calls)
     assert_work_is_right();
 }
 
-// Needed where a launch follows; the last two, of the trace, come after all results.
+// Unmaps are needed where a launch follows. The last two, those of the trace, come after all results.
 TEST(test_unmaps)
 {
     static const char call[] = "clEnqueueUnmapMemObject";

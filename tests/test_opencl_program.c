@@ -135,7 +135,7 @@ TEST(test_cold_and_warm)
     Run warm = run_in_child(triple_request());
     assert_true(warm.from_cache);
     assert_true(warm.text_hash == cold.text_hash);
-    // What the cache gave is machine code for this very launch.
+    // The cache returned machine code for this very launch.
     assert_int_equal(warm.compiled_before_launch, warm.compiled_after_launch);
     if (warm.is_pocl) assert_true(warm.compiled_before_launch > 0);
 }
@@ -181,8 +181,8 @@ static int find_entry(const char *path, const struct stat *status, int type, str
     return 1;
 }
 
-// The one entry of the cache; `key` gets its key, which lies behind a header of 64 bytes with its length
-// at 16.
+// Returns the one entry of the cache. `key` receives its key, which lies behind a header of 64 bytes with
+// the key's length at 16.
 static Text the_entry(char **key)
 {
     entry_path_found = NULL;
@@ -258,7 +258,8 @@ TEST(test_unwritable_cache)
     assert_false(run_in_child(triple_request()).from_cache);
 }
 
-// NVIDIA's compiler counts the lines of the whole text, which glint saves, and ignores #line.
+// Returns whether the log names the place. NVIDIA's compiler ignores #line and counts the lines of the whole
+// text, which glint saves.
 static bool names_place(const char *log, const char *place)
 {
     return strstr(log, place) || strstr(log, "<kernel>:");

@@ -1,5 +1,5 @@
-// Tests that what rays hit of shapes that transforms make other shapes agrees with quadruple precision, at
-// every precision, and of ellipsoids with the textbook's quadric.
+// Tests that hits of shapes that transforms turn into other shapes agree with quadruple precision, at every
+// precision, and hits of ellipsoids with the textbook's quadric.
 //
 // run_tests: sanitize-long-only
 #include "host/compile/compile.h"
@@ -188,7 +188,7 @@ static void hits_ovals(void **state)
     }
 }
 
-// What is certain at `certified` is right, also at outlines and rims.
+// Hits that are certain at `certified` are right, even at outlines and rims.
 TEST(certain_hits_of_ovals_are_right)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();

@@ -1,5 +1,5 @@
-// Tests how long launches take if parts of an image have very different costs: the pace alone, without a
-// device or a clock.
+// Tests how long launches take if parts of an image have very different costs. Only the pace is tested,
+// without a device or a clock.
 #include "host/render/band.h"
 #include "tests/check.h"
 #include <stdlib.h>

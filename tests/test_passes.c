@@ -134,8 +134,8 @@ TEST(moved_renderer_gives_the_bits_of_a_new_one)
     check_moved_renderer(true);
 }
 
-// A preview shows the arrays of the last eye from the present eye: the image of a renderer that moved them,
-// except for their roundings. Returns the number of pixels where these show.
+// Checks that a preview, which shows the arrays of the last eye from the present eye, has the image of a
+// renderer that moved them, except for their roundings. Returns the number of pixels where these show.
 static size_t preview_check(Scene scene, BvhChoice bvh, double fraction_of_way)
 {
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);

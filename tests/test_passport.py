@@ -220,8 +220,8 @@ class PassportTest(TestCase):
         write("sphere.yaml", SPHERE)
 
     def violated(self, edits=None, **variables):
-        """Options of run: the shim, and a cache for each violation and clock, since keys have the text before it is edited;
-        the driver's version tells faults of timers apart."""
+        """Returns options of run: the shim, and a cache for each violation and clock, since keys have the text before it is
+        edited. The driver's version distinguishes faults of timers."""
         edits = {TYPES: TYPES + HELPERS} | edits if edits else {}
         text = "\1".join(word for edit in edits.items() for word in edit)
         key = text + variables.get("FMA_COST", "")
@@ -234,11 +234,11 @@ class PassportTest(TestCase):
         return {"env": {"LD_PRELOAD": self.shim, "XDG_CACHE_HOME": cache, "EDITS": text} | variables}
 
     def device(self, command="devices --probe --json", **options):
-        """The default device, probed."""
+        """Returns the default device, probed."""
         return next(device for device in self.json(command, **options)["devices"] if device["default"])
 
     def findings(self, device, name):
-        """What each precision's passport has for a property."""
+        """Returns what each precision's passport has for a property."""
         return {passport["precision"]: next(found for found in passport["properties"] if found["name"] == name)
                 for passport in device["passports"]}
 
@@ -247,7 +247,7 @@ class PassportTest(TestCase):
                 for found in passport["properties"] if found["finding"] != "sound"}
 
     def test_each_violation_is_named(self):
-        """And none without a violation: PoCL on x86-64 is as IEEE 754 demands."""
+        """Each violation is named, and none without one, since PoCL on x86-64 is as IEEE 754 demands."""
         device = self.device(**self.violated(FMA_COST="1", SWEEP_COST="0"))
         self.assertEqual([passport["precision"] for passport in device["passports"]], MODES if HAS_DOUBLE else MODES[:2])
         usual = self.abnormal(device)
@@ -280,8 +280,8 @@ class PassportTest(TestCase):
                     self.assertEqual({refusal["precision"] for refusal in device["refused"]}, refused)
 
     def test_refusals(self):
-        """By the text of devices and by the commands that render, with the device, the property and what works; `single` goes
-        without it."""
+        """The text of devices and the commands that render report a refusal with the device, the property and what works. `single`
+        does not need the property."""
         broken = self.violated(VIOLATIONS["two-sum"][3])
         process = self.glint("devices --probe", **broken)
         self.assertRegex(process.stdout, "(?m)^  two-sum +BROKEN: loses the rounding error of a sum$")
@@ -300,7 +300,7 @@ class PassportTest(TestCase):
                       passport["properties"])
 
     def test_bits_at_strict(self):
-        """Whatever glint allows for leaves the bits as they are: an inexact division is repaired, and fma emulated."""
+        """What glint allows for changes no bit. An inexact division is repaired, and fma emulated."""
         command = f"render sphere.yaml --size 32x24 --lanes {4 if IS_LONG else 1} --quiet --precision strict -o"
         self.glint(f"{command} right.npy", **self.violated())
         inexact = "division, by three ulp", "square root, by four ulp", "fma that rounds twice"
@@ -310,7 +310,7 @@ class PassportTest(TestCase):
                 self.assertSameBytes("right.npy", "other.npy")
 
     def test_slow_fma(self):
-        """An fma that is emulated at many times its cost is not used, whatever the driver claims; one not claimed must be fast."""
+        """An fma that is emulated at many times its cost is not used, whatever the driver claims. One not claimed must be fast."""
         for cost in "7", "9":
             with self.subTest(cost):
                 device = self.device(**self.violated(FMA_COST=cost))
@@ -342,7 +342,7 @@ class PassportTest(TestCase):
                     self.assertRegex(launch["doubt"], pattern.split(" but")[0])
 
     def test_the_cache(self):
-        """One measurement per device and driver, unless asked for."""
+        """Each device and driver is measured once, unless asked for."""
         def probes(command, **variables):
             write("launches", "")
             variables |= {"LAUNCHES": os.path.abspath("launches"), "XDG_CACHE_HOME": os.path.abspath("cache")}

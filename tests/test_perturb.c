@@ -44,7 +44,7 @@ static const char fma_text[] =
     "    }\n"
     "}\n";
 
-// Runs the kernel on a and b; what comes back belongs to the caller.
+// Runs the kernel on a and b. The results belong to the caller.
 static void repair(uint32_t seed, const float *a, const float *b, float *quotients, float *roots)
 {
     const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT;
@@ -72,16 +72,16 @@ static void repair(uint32_t seed, const float *a, const float *b, float *quotien
     clReleaseProgram(program);
 }
 
-// An integer of this many bits, odd if asked for.
+// Returns an integer of this many bits, which is odd if `odd` is set.
 static double whole(Random *random, int bits, bool odd)
 {
     double half = ldexp(1, bits - 2);
     return 2 * floor(random_between(random, half, 2 * half)) + odd;
 }
 
-// Makes pairs of either sign, from the smallest normal float to the largest: a quarter are any; in a quarter
-// the quotient, and in a quarter the root, is near a float or near the middle between two; a quarter is near
-// a power of two.
+// Makes pairs of either sign, from the smallest normal float to the largest. A quarter are any, in a quarter
+// the quotient, and in a quarter the root, is near a float or near the middle between two, and a quarter is
+// near a power of two.
 static void operands_make(float *a, float *b)
 {
     Random random = {38};
@@ -125,7 +125,7 @@ TEST(wrong_quotients_and_roots_are_repaired)
         free(numbers[i]);
 }
 
-// Runs the kernel on a, b and c; what comes back belongs to the caller.
+// Runs the kernel on a, b and c. The results belong to the caller.
 static void multiply_add(unsigned lanes, const float *a, const float *b, const float *c, float *sums,
                          float *errors)
 {
@@ -155,10 +155,10 @@ static void multiply_add(unsigned lanes, const float *a, const float *b, const f
     clReleaseProgram(program);
 }
 
-// Makes a, b and c. In a quarter c is any; in a quarter it is within a few ulp of the product; in a quarter
-// it is about 24 bits larger or smaller than the product, where it decides how the other is rounded; in a
-// quarter one of them is a power of two, 0 or infinite. Factors have few bits as often as many, so that sums
-// lie in the middle between floats.
+// Makes a, b and c. In a quarter c is any, in a quarter it is within a few ulp of the product, in a quarter
+// it is about 24 bits larger or smaller than the product, where it decides how the other is rounded, and in
+// a quarter one of them is a power of two, 0 or infinite. Factors have few bits as often as many, so that
+// sums lie in the middle between floats.
 static void terms_make(float *a, float *b, float *c)
 {
     static const float special[] = {0.0F, -0.0F, 1.0F, -1.0F, FLT_MAX, -FLT_MAX, INFINITY, -INFINITY};

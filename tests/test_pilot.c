@@ -62,8 +62,8 @@ TEST(bound_of_zeros_and_ones)
     assert_true(mean_upper_bound(values, 1, 0.05) == 1);
 }
 
-// Rare values, as of wrong pixels, in strata that differ: the bound misses the mean no more often than it
-// may, and is not useless (400 zeros alone give 0.006).
+// For rare values, as of wrong pixels, in strata that differ, the bound misses the mean no more often than
+// it may, and is not useless (400 zeros alone give 0.006).
 TEST(bound_covers_the_mean)
 {
     enum { TRIALS = 2000, COUNT = 400 };

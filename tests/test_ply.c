@@ -212,7 +212,7 @@ TEST(faults_name_line_and_row)
     "ply\nformat binary_big_endian 1.0\nelement vertex 4\n" XYZ "element face 2\nproperty list " count_type  \
     " int vertex_indices\n" END
 
-// A square's bytes with this as the second triangle's number of corners.
+// Returns a square's bytes with this as the second triangle's number of corners.
 static Text binary_with_count(const char *header, double count, const Type *type)
 {
     Text text = {0};

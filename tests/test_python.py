@@ -43,7 +43,7 @@ SPHERE = {"camera": {"position": [0, 0, -4], "look_at": [0, 0, 0], "fov": 60}, "
 
 
 class Mesh:
-    """What RayMeshIntersector asks of a trimesh.Trimesh."""
+    """The part of a trimesh.Trimesh that RayMeshIntersector uses."""
     vertices, faces = CUBE_VERTICES, CUBE_FACES
 
 
@@ -140,8 +140,8 @@ class Rays(unittest.TestCase):
         self.assertEqual(scene.trace(np.array([[0, 0, -4.0]] * 4)[::2], [0, 0, 1]).object.tolist(), [0, 0])
 
     def test_bounds_hold(self):
-        """Nothing that is certain differs from exact rational arithmetic on the rays' doubles: a cube's faces at 0 and 1, in
-        which many rays meet edges and diagonals."""
+        """Nothing that is certain differs from exact rational arithmetic on the rays' doubles, for a cube's faces at 0 and 1, in
+        which many rays hit edges and diagonals."""
         random = np.random.default_rng(5)
         count = 2000
         targets = random.integers(0, 5, (count, 3)) / 4
@@ -219,7 +219,7 @@ class Occlusion(unittest.TestCase):
         self.assertTrue(0 < (shadow & facing).sum() < facing.sum(), "the small sphere shades a part of the large one")
 
     def test_ends(self):
-        """Only surfaces strictly between the ends occlude: a cube's faces at t 1 and 2."""
+        """Only surfaces strictly between the ends occlude, here a cube's faces at t 1 and 2."""
         scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
         below, above = np.nextafter((1, 2), 0), np.nextafter((1, 2), 3)
         tmin, tmax = [0, 0, 0, 1, below[1], 2], [below[0], 1, above[0], 2, above[1], 3]
@@ -290,7 +290,7 @@ class Compare(unittest.TestCase):
             glint.compare([1.0], [2.0], color=True)
 
     def test_data(self):
-        """Three channels are colors or data, as the caller says; without comparable values errors are NaN."""
+        """Three channels are colors or data, as the caller chooses. Without comparable values errors are NaN."""
         normals = np.random.default_rng(9).uniform(-1, 1, (9, 16, 3))
         color, data = (glint.compare(normals, -normals, color=is_color) for is_color in (True, False))
         self.assertEqual((data.rmse, data.srgb8_off_by_2_or_more), (color.rmse, 0))
@@ -447,7 +447,7 @@ class Errors(unittest.TestCase):
                 make()
 
     def test_callbacks_and_lifetimes(self):
-        """An exception of progress arrives, also where it frees or uses a scene of the same device; handles are not shared."""
+        """An exception of progress arrives, even if it frees or uses a scene of the same device. Handles are not shared."""
         scene, other = glint.Scene(SPHERE), glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
         other.trace([[3, 3, 3]], [[1, 0, 0]])
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint report: what its archive holds, what it leaves out, and that it is written where a driver crashes, hangs or rejects kernels.
+"""glint report: what its archive holds, what it leaves out, and that it is written if a driver crashes, never returns or rejects
+kernels.
 
 run_tests: sanitize-long-only"""
 import json
@@ -39,7 +40,7 @@ class Report(TestCase):
                     "LOGNAME": "annuser", "CL_EXAMPLE": os.path.abspath("home/x"), "EXAMPLE": "not for others"}
 
     def report(self, command=SMALL, **env):
-        """Standard error of the command, and the files of its archive. Nothing else is left."""
+        """Returns standard error of the command, and the files of its archive. Checks that nothing else is left."""
         process = self.glint(command, env=self.env | env)
         files = {}
         with tarfile.open("r.tar.gz") as archive:

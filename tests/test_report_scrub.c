@@ -1,4 +1,4 @@
-// What glint report leaves out of its files.
+// Tests what glint report leaves out of its files.
 #include "host/cli/report_scrub.h"
 #include "tests/check.h"
 #include <stdlib.h>

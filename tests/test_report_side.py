@@ -40,7 +40,7 @@ def save(path, value):
 
 
 def figures(text):
-    """The report's letter and the frame time, or -, of each line of a row."""
+    """Returns the report's letter and the frame time, or -, of each line of a row."""
     return re.findall(r"(?m)^.*?\b([A-Z]) +(-|[0-9.]+)", text.partition("frame ms")[2])
 
 
@@ -50,7 +50,7 @@ def embedded(page):
 
 class SideBySide(TestCase):
     def compared(self, *reports):
-        """What glint prints of the reports, and the data of the page."""
+        """Returns what glint prints of the reports, and the data of the page."""
         paths = [save(f"{i}.json", value) for i, value in enumerate(reports)]
         out = self.glint(f"report {' '.join(paths)} --html page.html").stdout
         page = Path("page.html").read_text(encoding="utf-8")
@@ -60,7 +60,7 @@ class SideBySide(TestCase):
         return out, embedded(page)
 
     def test_one_host_and_device(self):
-        """Verdicts against the first report, whose scenes had other paths and whose rows another order."""
+        """Verdicts are against the first report, whose scenes had other paths and whose rows another order."""
         older = report(run(10), run(20, scene_hash="00000000000000a2", scene="b.yaml"), run(5, precision="strict"))
         newer = report(run(5.5, precision="strict", scene="moved.yaml"), run(20.2, scene_hash="00000000000000a2"), run(5))
         out, data = self.compared(older, newer)
@@ -80,7 +80,7 @@ class SideBySide(TestCase):
         self.assertIn("\nsize 64x48, lanes 16, BVH auto, samples 1, bounces 5\n", out)
 
     def test_calibration(self):
-        """A host at half its speed explains twice the time, as glint bench --compare has it; on a CPU its processor time counts."""
+        """A host at half its speed explains twice the time, as in glint bench --compare. On a CPU its processor time counts."""
         older, newer = report(run(10), kind="gpu"), report(run(20), kind="gpu")
         newer["calibration"]["samples_ms"] = [6.0] * RUNS
         self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["verdict"], "undecided")
@@ -91,7 +91,7 @@ class SideBySide(TestCase):
         self.assertEqual(self.compared(older, newer)[1]["rows"][0]["cells"][1]["verdict"], "slower")
 
     def test_no_verdict(self):
-        """Only the ratio of medians, and the reason."""
+        """Without a verdict, only the ratio of medians is printed, and the reason."""
         older = report(run(10))
         boarded = report(run(5))
         boarded["device"]["board"] = "board-x"
@@ -121,7 +121,7 @@ class SideBySide(TestCase):
         self.assertNotIn("lower_quartile", self.compared(older, summarized)[1]["rows"][0]["cells"][1]["frame_ms"])
 
     def test_missing_rows(self):
-        """A row that only some reports have, one that has failed, and two reports without a row in common."""
+        """Rows may be in only some reports, may have failed, and two reports may have no row in common."""
         failed = KEY | {"precision": "double", "status": "unavailable", "reason": "no doubles here"}
         out, data = self.compared(report(run(10), run(30, samples=4)), report(run(10), failed), report(run(7, samples=4)))
         self.assertEqual([[cell and cell.get("frame_ms", {}).get("median") and True for cell in row["cells"]] for row in data["rows"]],
@@ -135,7 +135,7 @@ class SideBySide(TestCase):
         self.assertIn("1 row, 0 with times in A and here\n", out)
 
     def test_lanes(self):
-        """A device's own number of lanes does not make another row, but several numbers do; without a verdict if they differ."""
+        """A device's number of lanes does not make another row, but several numbers do. There is no verdict if they differ."""
         out, data = self.compared(report(run(10)), report(run(1, lanes=1), name="gpu-x", kind="gpu"), report(run(9, lanes=8)))
         self.assertEqual([[cell["lanes"] for cell in row["cells"]] for row in data["rows"]], [[16, 1, 8]])
         self.assertIn("their lanes differ", data["rows"][0]["cells"][2]["why_not"])
@@ -177,7 +177,7 @@ class SideBySide(TestCase):
 
     @unittest.skipUnless(shutil.which("chromium"), "chromium is not installed")
     def test_drawn(self):
-        """What the page shows at both widths: each row's name and times, without an error or anything wider than the page."""
+        """At both widths the page shows each row's name and times, without an error or anything wider than the page."""
         long = f"scenes/{'long-' * 30}.yaml"
         older = report(run(10), run(20, samples=4), run(3, scene_hash="00000000000000a2", scene=long))
         gpu = report(run(0.01, lanes=1), run(1e5, lanes=1, scene_hash="00000000000000a2"), name="gpu-x", kind="gpu")

@@ -59,7 +59,7 @@ static Points *points_make(bool is_double, int32_t column, int32_t row, uint32_t
     return points;
 }
 
-// Each of the 2^log2 rectangles of 2^-a by 2^-b, a + b = log2, has one of the points.
+// Asserts that each of the 2^log2 rectangles of 2^-a by 2^-b, a + b = log2, has one of the points.
 static void assert_net(const Point *points, unsigned log2)
 {
     for (unsigned a = 0; a <= log2; a++) {
@@ -107,8 +107,8 @@ TEST(precisions_agree)
     free(exact);
 }
 
-// Equal parts of the square are equal parts of the disc: rings and quarters have as many points as their
-// area.
+// Equal parts of the square are equal parts of the disc, so that rings and quarters have as many points as
+// their area.
 TEST(disc_is_uniform)
 {
     enum { RINGS = 16 };

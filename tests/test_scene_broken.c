@@ -149,7 +149,7 @@ static void check_table(void **state)
     text_free(&table);
 }
 
-// The longest literal part of a format, which identifies the message.
+// Returns the longest literal part of a format, which identifies the message.
 static char *format_core(const char *format, size_t length)
 {
     const char *longest = format;

@@ -27,7 +27,7 @@ typedef struct {
     size_t count_min;
 } Examples;
 
-// Reads each block fenced as the language; of YAML some are a camera alone.
+// Reads each block fenced as the language. Some blocks of YAML are only a camera.
 static void check_examples(void **state)
 {
     const Examples *examples = *state;

@@ -47,7 +47,7 @@ static void check_messages(const char *path, const char *const *overrides, size_
     message_list_free(&messages);
 }
 
-// The files of a scene in two folders, one of which includes another.
+// Writes the files of a scene in two folders, one of which includes another.
 static void write_forest(const char *scene)
 {
     file_write("parts/colors.yaml", "# a comment\nmaterials:\n  green: {color: [0, 1, 0]}\n");
@@ -139,7 +139,7 @@ TEST(test_hash_covers_the_files)
     scene_free(&other);
 }
 
-// What an alias repeats in an included file is joined under one of its names alone.
+// Values that an alias repeats in an included file are joined under only one of its names.
 TEST(test_aliases_of_files)
 {
     file_write("alias.yaml", "define: {two: {objects: &s [{sphere: {center: [0, 0, 0], radius: 1}},\n"

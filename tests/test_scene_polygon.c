@@ -33,7 +33,7 @@ static double outline_area(const Outline *outline)
     return area;
 }
 
-// Crossing number of a ray along x.
+// Returns whether the outline contains a point, by the crossing number of a ray along x.
 static bool outline_holds(const Outline *outline, double x, double y)
 {
     bool inside = false;
@@ -58,8 +58,8 @@ static size_t triangles_holding(const Outline *outline, double x, double y)
 
 static Random generator = {1};
 
-// Checks the cut of an outline that turns left: every corner is used, no triangle is turned over, none
-// overlap.
+// Checks that the cut of an outline that turns left uses every corner, and that no triangle is turned over
+// or overlaps another.
 static void check_cut(const Outline *outline)
 {
     assert_int_equal(polygon_triangulate(outline->items, outline->count, &triangles), POLYGON_CUT);
@@ -89,7 +89,7 @@ static void check_cut(const Outline *outline)
     }
 }
 
-// In each coordinate plane, turning either way, starting at each corner, far from the origin.
+// Checks the cut in each coordinate plane, turning either way, starting at each corner, far from the origin.
 static void check_everywhere(const Outline *outline)
 {
     check_cut(outline);

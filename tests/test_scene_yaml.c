@@ -371,7 +371,7 @@ TEST(test_values_are_removed)
     scene_free(&scene);
 }
 
-// What is set through one of several names of the same nodes changes under that name alone.
+// A value that is set through one of several names of the same nodes changes only under that name.
 TEST(test_aliases_keep_what_is_set_elsewhere)
 {
     Scene scene = SET(LIT "materials:\n  a: &a {color: [0, 0, 1], ior: 2}\n  b: *a\n  c: *a\n"
@@ -487,7 +487,7 @@ TEST(test_a_failed_scene_is_empty)
     message_list_free(&messages);
 }
 
-// Beyond what a node's offsets count; the rest of its bytes is not read.
+// A node's offsets cannot count this many bytes. Those beyond the scene here are never read.
 TEST(test_more_than_2_gibibytes_are_refused)
 {
     const Source source = {.file = "s.yaml", .bytes = CAMERA SPHERE, .length = ((size_t)1 << 31) + 1};

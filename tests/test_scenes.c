@@ -9,7 +9,7 @@
 
 enum { WIDTH = 64, HEIGHT = 36, COLORS_MIN = 16, SCENES_MIN = 12 };
 
-// A color in 8 bits per channel.
+// Returns a color in 8 bits per channel.
 static uint32_t color_number(const double *color)
 {
     uint32_t number = 0;

@@ -1,5 +1,5 @@
-// Hands out rows to workers: the bands reach the sink in order from the top whatever the order they end in,
-// sizes follow the paces, and the rows of a failed worker go to the others.
+// Tests how rows are handed out to workers. Bands reach the sink in order from the top whatever the order
+// they end in, sizes follow the paces, and the rows of a failed worker go to the others.
 #include "host/base/memory.h"
 #include "host/render/scheduler.h"
 #include "tests/check.h"
@@ -18,7 +18,7 @@ typedef struct {
     bool is_right;
 } Sink;
 
-// The clock of the scheduler (the Makefile's --wrap): time passes only where a test says so.
+// The clock of the scheduler (the Makefile's --wrap), which only tests advance.
 static atomic_uint milliseconds;
 double __wrap_clock_seconds(void);
 double __wrap_clock_seconds(void)
@@ -26,7 +26,7 @@ double __wrap_clock_seconds(void)
     return 1e-3 * milliseconds;
 }
 
-// Each value of a band is its row.
+// Checks that bands arrive in order and that each of their values is its row.
 static bool band_sink(void *context, const Film *band, double fraction_done)
 {
     Sink *sink = context;
@@ -91,7 +91,7 @@ static bool give_at(Scheduler *scheduler, size_t worker, BandRows rows, unsigned
     return give(scheduler, worker, rows);
 }
 
-// Each worker's first band.
+// Renders each worker's first band at its pace.
 static void set_paces(Scheduler *scheduler, size_t worker_count, const unsigned *rows_per_second)
 {
     for (size_t i = 0; i < worker_count; i++)
@@ -143,7 +143,7 @@ TEST(test_first_bands_are_short)
     assert_false(scheduler_close(scheduler, NULL));
 }
 
-// Half of a worker's share of the rows that are left, in whole steps and at least one.
+// A band is half of a worker's share of the rows that are left, in whole steps and at least one.
 TEST(test_bands_shrink)
 {
     Sink sink;
@@ -293,7 +293,7 @@ static void *thread_work(void *argument)
     return NULL;
 }
 
-// A worker without rows waits: those of a worker that fails later are its own.
+// A worker without rows waits, since it receives those of a worker that fails later.
 TEST(test_idle_workers_wait_for_lost_rows)
 {
     Sink sink;

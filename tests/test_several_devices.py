@@ -22,7 +22,7 @@ OCLGRIND = Path(shutil.which("oclgrind") or "/none").parent.parent / "lib/oclgri
 FAILURES = 200 if IS_LONG else 10
 SIZE, LARGE = "--size 64x48 --quiet", "--size 64x768 --quiet"
 AOVS = "position", "object", "path"
-# No device launches its first band before all do: so each has one. Passports are measured one after the other.
+# No device launches its first band before all do, so that each has one. Passports are measured one after the other.
 BARRIER = """
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -57,7 +57,7 @@ class SeveralDevices(TestCase):
         write("sphere.yaml", SPHERE)
 
     def makes(self):
-        """All implementations that are installed together, as options of run."""
+        """Returns options of run for all installed implementations together."""
         os.mkdir("vendors")
         for name in "pocl", "rusticl":
             if Path(find_icd(name)).exists():
@@ -75,7 +75,7 @@ class SeveralDevices(TestCase):
         return together
 
     def on_all(self, command, options):
-        """Renders by all devices into all.npy, each of which has a band. The report, unless sanitizers forbid the barrier."""
+        """Renders all.npy by all devices, each of which has a band. Returns the report, unless sanitizers forbid the barrier."""
         count = len(self.json("devices --json", **options)["devices"])
         if not IS_SANITIZED:
             barrier = shim_build("barrier.so", BARRIER)
@@ -102,7 +102,7 @@ class SeveralDevices(TestCase):
     @unittest.skipIf(IS_SANITIZED, "sanitizers have handlers of their own")
     @unittest.skipUnless(platform.machine() == "x86_64" and sys.maxsize > 2**32, "tools/chaos.c is for x86-64 only")
     def test_failing_calls(self):
-        """Any OpenCL call fails, of whichever device: the right image, or an error and none."""
+        """If any OpenCL call of either device fails, the image is right, or there is an error and none."""
         shim = shim_build("chaos.so", read(ROOT / "tools/chaos.c"), "-ldl")
         command = f"render sphere.yaml {LARGE} --samples 20 --precision strict"
         self.glint(f"{command} -o one.npy", **POCL)
@@ -131,7 +131,7 @@ class SeveralDevices(TestCase):
         print(f"{FAILURES} failures of {count} calls, {images} images complete, {dropped} of them with a device less")
 
     def test_names(self):
-        """The files' notes name both; those of one make round alike."""
+        """The files' notes name both devices, and devices of one make round alike."""
         self.glint(f"render sphere.yaml {SIZE} --device 1,0 -o two.png", **TWO)
         _, _, texts, _ = png_read("two.png")
         for key in "Device", "Driver", "Lanes", "Kernel":
@@ -148,7 +148,7 @@ class SeveralDevices(TestCase):
 
     @unittest.skipIf(IS_SANITIZED, "drivers leak")
     def test_makes(self):
-        """One image by all; Oclgrind, ten thousand times slower than the others, gets a few rows."""
+        """All makes render one image. Oclgrind, ten thousand times slower than the others, gets a few rows."""
         together = self.makes()
         command = f"render sphere.yaml {LARGE} --precision strict --no-cache"
         self.glint(f"{command} -o one.npy", **POCL)
@@ -160,7 +160,7 @@ class SeveralDevices(TestCase):
 
     @unittest.skipIf(IS_SANITIZED, "drivers leak")
     def test_comment(self):
-        """An image's notes say whether its devices may round differently."""
+        """An image's notes state whether its devices may round differently."""
         together = self.makes()
         for precision in "single", "strict":
             self.glint(f"render sphere.yaml --size 64x8 --quiet --precision {precision} --device all -o all.png", **together)

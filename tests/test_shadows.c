@@ -10,8 +10,8 @@
 #include <math.h>
 #include <string.h>
 
-// A veil's light is taken once, also in a tile whose shadow rays run to different sides, which then traverse
-// the BVH in several packets: the light is above the corner of a tile.
+// A veil's light is taken once, even in a tile whose shadow rays run to different sides and so traverse the
+// BVH in several packets, since the light is above the corner of a tile.
 TEST(takes_a_veils_light_once)
 {
     Scene scene = scene_of_text(
@@ -117,8 +117,8 @@ TEST(smooth_meshes_do_not_shade_themselves)
     }
 }
 
-// What the grounds below need. A kernel with injected errors and every feature takes four times as long to
-// build.
+// The features of the grounds below. A kernel with injected errors and every feature takes four times as
+// long to build.
 #define GROUND_FEATURES                                                                                      \
     (FEATURE_SPHERES | FEATURE_PLANES | FEATURE_DISCS | FEATURE_CYLINDERS | FEATURE_CONES |                  \
      FEATURE_TRIANGLES | FEATURE_POINT_LIGHTS | FEATURE_DIRECTIONAL_LIGHTS)
@@ -154,7 +154,7 @@ static void compare_with_reference(const Scene *scene, RenderSettings settings, 
     film_free(&perturbed);
 }
 
-// Ground whose coordinates are a million times the size of the objects on it: floats there are 0.5 apart.
+// Ground whose coordinates are a million times the size of the objects on it. Floats there are 0.5 apart.
 typedef struct {
     const char *name, *shape;
     Precision from; // expected from this precision on

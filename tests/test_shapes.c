@@ -125,8 +125,8 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
     if (vector_dot(normal, direction) > 0) tally->wrong++;
 }
 
-// A ray from next to where one meets the scene, off it to either side by a hundredth to a hundred thousandth
-// of the radius, to anywhere.
+// Returns a ray in any direction from next to where the given one hits the scene, off it to either side by a
+// hundredth to a hundred thousandth of the radius.
 static RandomRay move_next_to_surface(const RandomRay *given, const Scene *scene, double radius,
                                       Random *random)
 {

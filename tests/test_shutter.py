@@ -21,13 +21,13 @@ SIZE = "--size 32x24 --samples 6 --quiet"
 
 
 def covered(x, y):
-    """The fraction of the time for which the disc covers a point."""
+    """Returns the fraction of the time for which the disc covers a point."""
     half = math.sqrt(max(0, 0.25 - y * y))
     return max(0, min(x + half, 0.75) - max(x - half, -0.75)) / 1.5
 
 
 def coverage(column, row):
-    """The mean over a pixel."""
+    """Returns the mean coverage over a pixel."""
     steps = [(i + 0.5) / 8 for i in range(8)]
     return sum(covered((column + i - WIDTH / 2) * 1.2 / HEIGHT, (row + j - HEIGHT / 2) * 1.2 / HEIGHT)
                for i in steps for j in steps) / 64
@@ -56,7 +56,7 @@ class Shutter(TestCase):
             self.assertLess(abs(sum(differences)), 0.002 * sum(expected))
 
     def test_times(self):
-        """Each time has its part of the samples; one sample shows the frame; --set and --camera count."""
+        """Each time has its part of the samples, and one sample shows the frame. --set and --camera count."""
         process = self.glint(f"render moving.yaml {SIZE} --lanes 1 --samples 1 -o one.npy", env=POCL)
         self.assertIn("warning: 'moving.yaml': 'shutter' has an effect from --samples 2 on", process.stderr)
         self.glint(f"render moving.yaml {SIZE} --lanes 1 --samples 1 --set shutter=0 -o closed.npy", env=POCL)
@@ -75,7 +75,7 @@ class Shutter(TestCase):
         self.assertGreater(self.furthest("closed.npy", "same.npy"), 0.01)
 
     def test_still(self):
-        """Where nothing moves the image is that without a shutter: without keys its bits, else but for a rounding."""
+        """If nothing moves the image is that without a shutter, with the same bits without keys, else within a rounding."""
         write("still.yaml", SPHERE)
         self.glint(f"render still.yaml {SIZE} --lanes 1 -o still.npy", env=POCL)
         self.glint(f"render still.yaml {SIZE} --lanes 1 --set shutter=1 -o open.npy", env=POCL)
@@ -85,7 +85,7 @@ class Shutter(TestCase):
         self.assertLess(self.furthest("equal.npy", "still.npy"), 3e-7)
 
     def test_strict(self):
-        """The bits of any lanes, devices and region; of several frames each."""
+        """Lanes, devices, a region and several frames change no bit."""
         strict = f"{SIZE} --precision strict"
         self.glint(f"render moving.yaml {strict} --lanes 1 -o one.npy", env=POCL)
         self.glint(f"render moving.yaml {strict} --lanes 4 -o four.npy", env=POCL)
@@ -125,7 +125,7 @@ class Shutter(TestCase):
         self.glint("diff a.npy a.exr --max-rmse 1e-3")
 
     def test_warnings(self):
-        """Are printed once, and so are the files' names."""
+        """Warnings are printed once, as are the files' names."""
         write("fine.yaml", MOVING + "  - sphere: {center: [0, 2, 0], radius: 1e-12}\n")
         process = self.glint(f"render fine.yaml {SIZE.replace('--quiet', '')} --lanes 1 -o a.npy", env=POCL)
         self.assertEqual((process.stderr.count("trillionth"), process.stderr.count("wrote")), (1, 1), process.stderr)

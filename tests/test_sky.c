@@ -103,7 +103,7 @@ TEST(colors_are_a_light)
 
 enum { IMAGE_WIDTH = 24, IMAGE_HEIGHT = 12, SUN_COLUMN = 5, SUN_ROW = 3 };
 
-// An image with one texel that has nine tenths of its light.
+// Returns a texel of an image in which one texel has nine tenths of the light.
 static Color texel(int x, int y)
 {
     if (x == SUN_COLUMN && y == SUN_ROW) return (Color){900, 500, 10};
@@ -163,7 +163,7 @@ TEST(what_hides_the_sky_casts_a_shadow)
     scene_free(&scene);
 }
 
-// What a wall is lit by is what the eye sees of the sky, whichever way that is turned.
+// A wall is lit by what the eye sees of the sky, whichever way the sky is turned.
 TEST(what_is_seen_shines)
 {
     enum { ROWS = 32, COLUMNS = 64 };

@@ -1,6 +1,6 @@
-// Random scenes with random settings, rendered one after another in one process, as a window or a program
-// that uses the renderer does: its memory stays as large, and each image is the one of a process that renders
-// nothing else. 10,000 of them where tests are long.
+// Renders random scenes with random settings one after another in one process, as a window or a program that
+// uses the renderer does. Its memory does not grow, and each image is that of a process that renders nothing
+// else. Long tests render 10,000 scenes.
 // run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/hash.h"
@@ -40,7 +40,7 @@ static uint32_t random_index(Random *random, uint32_t count)
     return (uint32_t)(random_bits(random) % count);
 }
 
-// A strip of triangles, smooth or flat, with texture coordinates.
+// Returns a strip of triangles, smooth or flat, with texture coordinates.
 static Mesh random_mesh(Random *random, uint32_t material_count)
 {
     const size_t count = 3 + random_index(random, 30);
@@ -69,7 +69,7 @@ static bool takes_image(ShapeType type)
     return type == SHAPE_SPHERE || type == SHAPE_PLANE || type == SHAPE_DISC;
 }
 
-// From one object to all, mostly with a mesh and with an image on what can have one.
+// Returns a scene of one object up to all, mostly with a mesh and with an image on what can have one.
 static Scene soak_scene(Random *random)
 {
     Scene scene = random_scene(random_bits(random), OBJECTS);
@@ -103,7 +103,7 @@ static Scene soak_scene(Random *random)
 
 static RenderSettings soak_settings(Random *random)
 {
-    // certified in long tests alone: its kernels with all features take half a minute to build
+    // certified only in long tests, since its kernels with all features take half a minute to build
     const Precision precision =
         (Precision)random_index(random, tests_are_long() ? PRECISION_COUNT : PRECISION_CERTIFIED);
     RenderSettings settings = film_settings(16, 12, probe_has(precision) ? precision : PRECISION_SINGLE);
@@ -151,7 +151,7 @@ static uint64_t rays_hash(Renderer *renderer, Random *random, uint64_t hash)
     return hash;
 }
 
-// Opened for another camera, which sees the same scene, and moved.
+// Returns a renderer that was opened for another camera, which sees the same scene, and moved.
 static Renderer *moved_renderer(Scene *scene, RenderSettings settings)
 {
     const Camera camera = scene->camera;
@@ -203,7 +203,7 @@ static size_t bytes_allocated(void)
     return info.uordblks + info.hblkhd;
 }
 
-// All scenes, twice: the second time all kernels have been built.
+// Renders all scenes twice. The second time all kernels have been built.
 static void soak_run(void *result)
 {
     Soak *soak = result;

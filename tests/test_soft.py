@@ -13,7 +13,7 @@ PRECISIONS = ("single", "strict", "double") if IS_LONG else ("strict",)
 
 
 def png_write(name, width, height, color):
-    """Writes an image of 8 bits; `color` returns the three of a column and a row."""
+    """Writes an image of 8 bits, where `color` returns the three values of a column and a row."""
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
@@ -24,14 +24,14 @@ def png_write(name, width, height, color):
 
 
 def cap(x):
-    """The part of a disc of radius 1 on the side of a chord at x that holds the center if x is above 0."""
+    """Returns the part of a disc of radius 1 on the side of a chord at x that holds the center if x is above 0."""
     x = min(max(x, -1), 1)
     return 0.5 + (x * math.sqrt(1 - x * x) + math.asin(x)) / math.pi
 
 
 class Soft(TestCase):
     def row(self, text, size, options="", **run):
-        """The red channel of the middle row."""
+        """Returns the red channel of the middle row."""
         write("soft.yaml", text)
         self.glint(f"render soft.yaml --quiet --lanes 1 --size {size[0]}x{size[1]} -o soft.npy {options}", **run)
         values = npy_read("soft.npy")[2]
@@ -39,8 +39,8 @@ class Soft(TestCase):
         return [values[middle * size[0] + column][0] for column in range(size[0])]
 
     def penumbra(self, light, options):
-        """The part of the light that arrives on a floor behind the edge of a wall that ends at x = 0, a tenth of the way up
-        to the light, which is far above, at x from -0.2 to 0.2."""
+        """Returns the part of the light that arrives at x from -0.2 to 0.2 on a floor behind the edge of a wall that ends at x = 0,
+        a tenth of the way up to the light, which is far above."""
         camera = "camera: {position: [0, 50, 0], look_at: [0, 0, 0], up: [0, 0, 1], height: 0.025}\nlights:\n"
         if not IS_LONG:  # dark ones, so that the same kernel serves every type of light
             light = "\n  - ".join([light, *(f"{dark}, intensity: 0}}" for dark in DARK)])
@@ -50,7 +50,7 @@ class Soft(TestCase):
         return [self.row(scene + wall, (80, 5), options)[::-1] for wall in walls]
 
     def test_shadows(self):
-        """The penumbra of each light: as the part of its area beyond the edge."""
+        """The penumbra of each light follows the part of its area beyond the edge."""
         # at 1000 up an area of half-width 1.8 has a penumbra of half-width 0.2 behind an edge at 100
         lights = {
             "rectangle: {center: [0, 1000, 0], edges: [[3.6, 0, 0], [0, 0, 9]]}": lambda x: min(max(0.5 + x / 2, 0), 1),
@@ -73,7 +73,7 @@ class Soft(TestCase):
                         self.assertAlmostEqual(value, expected(x), delta=0.02, msg=(i, x))
 
     def test_lamps(self):
-        """Visible lights show their color, and change no other pixel: they cast no shadows."""
+        """Visible lights show their color and change no other pixel, since they cast no shadows."""
         camera = "camera: {position: [0, 2.5, 8], look_at: [0, 1.5, 0], fov: 45}\nlights:\n"
         lights = [("sphere: {{center: [-2.2, 2.5, 0], radius: 0.4, color: [1, 0.75, 0.5]{}}}", (1, 0.75, 0.5)),
                   ("rectangle: {{center: [2.5, 3.5, -1], edges: [[1.5, 0, 0], [0, 1, 0.3]], intensity: 0.5{}}}", (0.5, 0.5, 0.5)),
@@ -114,7 +114,7 @@ class Soft(TestCase):
         self.assertGreater(dark["true"][1], 20)
 
     def test_error_falls(self):
-        """As low-discrepancy points promise, faster than with the root of the samples, by which random ones' error falls."""
+        """The error falls as low-discrepancy points promise, faster than the root of the samples, by which that of random ones falls."""
         light = "rectangle: {center: [0, 1000, 0], edges: [[3.6, 0, 0], [0, 0, 9]]}"
         errors = []
         for samples in 16, 256:
@@ -124,7 +124,7 @@ class Soft(TestCase):
         self.assertLess(errors[1], errors[0] / 5.5, errors)
 
     def test_focus(self):
-        """An edge beyond the focal plane is blurred by the part of the lens that sees past it; one in it is sharp."""
+        """An edge beyond the focal plane is blurred by the part of the lens that sees past it. One in the plane is sharp."""
         # the wall ends at x = 0, its distance is 10
         text = ("camera: {{position: [0, 0, 10], look_at: [0, 0, 0], fov: 2, aperture: 0.2, focus: {focus}}}\n"
                 "ambient: 1\nbackground: 0\nobjects: [{{box: {{min: [0, -90, -1e-6], max: [90, 90, 0]}}}}]\n")
@@ -147,7 +147,7 @@ class Soft(TestCase):
         self.assertEqual(self.row(text.format(", focus: 3, aperture: 0"), (32, 32)), plain)
 
     def test_parallel_rays(self):
-        """Pixels lie evenly on the scene, at every distance; the window's height is that of the image."""
+        """Pixels lie evenly on the scene, at every distance. The window's height is that of the image."""
         write("soft.yaml", "camera: {position: [1, 2, 6], look_at: [1, 2, 0], height: 3}\n"
               "objects: [{plane: {point: [0, 0, 1], normal: [0.3, 0.2, 1]}}]\n")
         for precision in PRECISIONS:
@@ -162,7 +162,7 @@ class Soft(TestCase):
                         self.assertAlmostEqual(y, 2 - (2 * row - 29) / 60 * 3, delta=1e-5)
 
     def test_sky(self):
-        """The colors of the poles, blended by the cosine; its mean is the ambient light."""
+        """The sky has the colors of the poles, blended by the cosine. Its mean is the ambient light."""
         colors = {"horizon": (0.5, 0.25, 1), "zenith": (0, 0.5, 2), "nadir": (1, 0.75, 0)}
         given = ", ".join(f"{name}: {list(color)}" for name, color in colors.items())
         write("soft.yaml", "camera: {position: [0, 0, 5], look_at: [3, 2, 0], fov: 150}\n"
@@ -185,7 +185,7 @@ class Soft(TestCase):
                 self.assertEqual(seen, {True, False})
 
     def test_sky_image(self):
-        """Directions have the texels of their longitude and latitude; the image's mean over all directions is the ambient light."""
+        """Directions have the texels of their longitude and latitude. The image's mean over all directions is the ambient light."""
         columns, rows = 64, 32
         # by column: around +z, -x, -z and +x, and by row: above 45 degrees, below -45 and in between
         sides = [(255, 255, 255), (0, 0, 255), (255, 0, 0), (0, 255, 0)]
@@ -246,7 +246,7 @@ class Soft(TestCase):
                         self.assertAlmostEqual(value, linear(exact), delta=1e-5, msg=(up, precision, i))
 
     def test_certified_refuses(self):
-        """An area, a lens, a panorama and parallel rays, whose errors have no bound."""
+        """Certified refuses an area, a lens, a panorama and parallel rays, whose errors have no bound."""
         camera = "camera: {{position: [0, 0, 5], look_at: [0, 0, 0]{}}}\nlights: [{}]\nobjects: []\n"
         point, command = "point: {position: [0, 5, 0]}", "render soft.yaml --size 8x8 --precision certified -o soft.npy"
         for key, light, message in (("", "{sphere: {center: [0, 5, 0], radius: 1}}", "a light has an area, "),

@@ -37,9 +37,9 @@ static bool take_band(void *context, const Film *band, double fraction_done)
     return true;
 }
 
-// The published tracer sends a reflected ray from whatever transmits (README, Testing procedures, 8), gears
-// of glass with a Ks of 0 too, where it adds nothing to the image. glint sends no such ray, unless it
-// carries a little.
+// Makes what transmits reflect a little, without which glint sends no reflected ray. The published tracer
+// always sends one (README, Testing procedures, 8), even from gears of glass with a Ks of 0, where it adds
+// nothing.
 static void glass_reflect(Scene *scene)
 {
     for (size_t i = 0; i < scene->materials.count; i++) {
@@ -48,7 +48,8 @@ static void glass_reflect(Scene *scene)
     }
 }
 
-// 513 by 513 rays through the corners of 512 by 512 pixels; a tree of rays is 5 deep, the eye's ray counted.
+// Counts rays, with 513 by 513 camera rays through the corners of 512 by 512 pixels. Ray trees are 5 deep,
+// including the camera ray.
 static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
 {
     Text path = {0};

@@ -1,4 +1,4 @@
-// STL files in text and binary: facets, and what is wrong with them.
+// STL files in text and binary: their facets, and messages about wrong ones.
 #include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"
@@ -15,7 +15,7 @@
     "endfacet\n"
 #define TWO_FACETS FACET("0 0 0", "1 0 0", "0 1 0") FACET("0 1 0", "1.0e0 0 0", "+1 1 -0")
 
-// Two triangles of four vertices, whose facets' normals are not theirs.
+// Asserts that the scene has two triangles of four vertices, not the facets' normals, and these messages.
 static void assert_square(const char *messages)
 {
     static const double expected[6][2] = {{0, 0}, {1, 0}, {0, 1}, {0, 1}, {1, 0}, {1, 1}};

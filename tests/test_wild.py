@@ -16,7 +16,7 @@ FOLDER = ROOT / "tests/wild"
 
 
 def render(scene, options=""):
-    """The finished process and the pixels of the image, None where none was written."""
+    """Renders a scene. Returns the finished process and the pixels of the image, or None if none was written."""
     image = Path("wild.ppm")
     image.unlink(missing_ok=True)
     process = run(f"render {scene} -o {image} --size 64x48 --quiet {options}")
@@ -24,7 +24,7 @@ def render(scene, options=""):
 
 
 def messages(errors, name):
-    """Each message without the lines it quotes and the scene's path."""
+    """Returns each message without the lines it quotes and the scene's path."""
     lines = (line for line in errors.splitlines() if re.search("(^|: )(error|warning): ", line))
     return [re.sub(rf"^(glint: ((error|warning): ))?\S*{re.escape(name)}: ?", r"\2", line) for line in lines]
 

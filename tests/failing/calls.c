@@ -47,7 +47,7 @@ static bool call_fails(const char *call)
     return fails;
 }
 
-// A call that returns a status: not made where it fails.
+// Defines a call that returns a status. It is not made where it fails.
 #define STATUS(name, parameters, arguments)                                                                  \
     cl_int __real_##name parameters;                                                                         \
     cl_int __wrap_##name parameters;                                                                         \
@@ -56,7 +56,7 @@ static bool call_fails(const char *call)
         return call_fails(#name) ? CL_OUT_OF_RESOURCES : __real_##name arguments;                            \
     }
 
-// One that releases: made all the same, so that nothing is left in the driver.
+// Defines a call that releases. It is made even where it fails, so that nothing is left in the driver.
 #define RELEASE(name, parameters, arguments)                                                                 \
     cl_int __real_##name parameters;                                                                         \
     cl_int __wrap_##name parameters;                                                                         \

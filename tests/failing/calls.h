@@ -1,5 +1,5 @@
 // Calls that fail on demand. The linker puts the functions __wrap_… of calls.c in the place of those that
-// glint calls (ld --wrap, see the Makefile); an OpenCL call without one does not link.
+// glint calls (ld --wrap, see the Makefile). An OpenCL call without one does not link.
 #pragma once
 
 #include <pthread.h>

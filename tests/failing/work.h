@@ -1,4 +1,4 @@
-// What a device does for glint, once: a render with counted rays and all AOVs, a trace, and a large buffer.
+// Uses a device once as glint does: a render with counted rays and all AOVs, a trace, and a large buffer.
 #pragma once
 
 #include "host/render/renderer.h"
@@ -17,15 +17,15 @@ extern Scene work_scene;
 extern RenderSettings work_settings;
 extern Answer right; // as undisturbed work gives it
 
-// Chooses the device and makes the scene, and the right answer by working once: a group's set-up of cmocka.
+// cmocka's group setup. Chooses the device, makes the scene, and gets the right answer by working once.
 int work_set_up(void **state);
 int work_tear_down(void **state);
 
-// A BandSink into an Answer.
+// Adds a band to an Answer. This is a BandSink.
 bool work_receive_band(void *answer, const Film *band, double fraction_done);
-// Returns whether all was done; the compute is left open.
+// Returns true if all was done. The compute is left open.
 bool work(Compute *compute, Answer *answer);
-// Fails the test where an object is not released.
+// Closes the compute. Fails the test if an object was not released.
 void compute_close_checked(Compute *compute);
-// Works with no failure injected.
+// Works with no failure injected, and fails the test if the answer is wrong.
 void assert_work_is_right(void);

@@ -1,6 +1,6 @@
-// libFuzzer's target: whatever a reader gets, it must neither crash nor leak, nor believe what is not there.
-// GLINT_FUZZ names the reader; tools/fuzz runs them, and tests/test_readers.c a few. Memory that a file
-// claims is bounded by what it has.
+// libFuzzer's target. Whatever a reader gets, it must not crash, leak, or rely on data that is not there.
+// GLINT_FUZZ names the reader. tools/fuzz runs all of them, and tests/test_readers.c a few. The memory that
+// a file claims is bounded by what it has.
 #include "tests/fuzz/readers.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
@@ -34,7 +34,7 @@ static void image_fuzz(const char *path, const Source *source, MessageList *mess
     if (image_read(&image, path, messages)) image_free(&image);
 }
 
-// Errors and the verdict must agree.
+// Checks that the errors and the verdict agree.
 static void verdict_check(bool is_read, const MessageList *messages)
 {
     if (is_read == (message_count(messages, MESSAGE_ERROR) > 0)) abort();
@@ -97,7 +97,7 @@ static void draft_fuzz(const char *path, bool (*read)(MeshDraft *draft), Message
     scene_free(&scene);
 }
 
-// What a process that runs assimp may write.
+// Reads a reply, which a process that runs assimp may have written.
 static bool reply_read(MeshDraft *draft)
 {
     FILE *reply = fopen(draft->import->path, "rb");
@@ -138,7 +138,7 @@ SCENE_READER(cfg, scene_read_cfg(&scene, source, messages))
 SCENE_READER(nff, scene_read_nff(&scene, source, messages))
 SCENE_READER(dat, scene_read_dat(&scene, source, messages))
 
-// Each band that it has can be read, or the checkpoint fails: it never holds rows that the image has not.
+// Checks that each band can be read, or the checkpoint fails, and that no band has rows outside the image.
 static void checkpoint_fuzz(const char *path, const Source *source, MessageList *messages)
 {
     (void)source;
@@ -156,7 +156,7 @@ static void checkpoint_fuzz(const char *path, const Source *source, MessageList 
     checkpoint_close(checkpoint, false, messages);
 }
 
-// Nothing but what was stored is ever loaded.
+// Checks that only what was stored is ever loaded.
 static void cache_fuzz(const char *path, const Source *source, MessageList *messages)
 {
     static const char key[] = "fuzz", stored[] = "machine code";

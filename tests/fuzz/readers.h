@@ -6,5 +6,5 @@
 
 // Chooses the reader that GLINT_FUZZ names.
 int LLVMFuzzerInitialize(int *argument_count, char ***arguments);
-// Lets the reader read the bytes. Ends the process if it believes what is not there.
+// Lets the reader read the bytes. Ends the process if the reader relies on data that is not there.
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);

@@ -4,8 +4,9 @@
 //
 //     answers [SAMPLES [FURTHER]]
 //
-// SAMPLES: how many random rays at each random object; FURTHER: the last ray, without an answer, to print of
-// each family that is closed. A line is a JSON object: a set's name, then its objects, then its rays.
+// SAMPLES is the number of random rays at each random object. FURTHER is the last ray, without an answer, to
+// print of each family that is closed. A line is a JSON object: a set's name, then its objects, then its
+// rays.
 #include "host/verify/checks.h"
 #include "tests/random_ray.h"
 #include <stdio.h>
@@ -21,7 +22,7 @@ static void numbers_print(const char *key, const double *numbers, size_t count)
     printf("]");
 }
 
-// As a double and the rest.
+// Prints a number as a double and the remainder.
 static void quad_print(const char *key, Quad number)
 {
     printf(", ");
@@ -84,8 +85,8 @@ static void hit_print(const ReferenceHit *hit)
     quad_print("z", hit->normal.z);
 }
 
-// The nearest hit, and what the tiers leave open and allow; where nothing is hit, of the object that is
-// missed by the least.
+// Prints the nearest hit, and what the tiers leave open and allow. If nothing is hit, they are those of the
+// object that is missed by the least.
 static void test_ray_print(bool is_double, const Object *objects, size_t count, const VerifyTestRay *test)
 {
     ReferenceRay ray = verify_reference_ray(&test->ray);

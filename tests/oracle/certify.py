@@ -52,7 +52,7 @@ def sets_read(stream):
 
 
 class Near:
-    """The shapes of a mesh that a ray comes as near to as they are large."""
+    """Finds the shapes of a mesh that a ray comes as near to as they are large."""
 
     def __init__(self, shapes):
         self.shapes = [(shape, *exact.floats(shape.center), shape.size**2) for shape in shapes]
@@ -71,7 +71,7 @@ class Near:
 
 
 class Tallies:
-    """How many values of each kind were compared, and the worst error as a part of its bound."""
+    """The number of compared values of each type, and the worst error as a part of its bound."""
 
     def __init__(self, spoil):
         self.spoil, self.counts, self.worst, self.wrong = spoil, Counter(), {}, 0
@@ -87,7 +87,7 @@ class Tallies:
                 print(f"  {kind} is off by {part:.3g} of its bound: {what}")
 
     def spoiled(self, pair):
-        """A number printed as a double and the rest of it."""
+        """Returns a number printed as a double and the remainder, changed by the part that --spoil names."""
         return (Fraction(pair[0]) + Fraction(pair[1])) * (1 + self.spoil)
 
 
@@ -103,7 +103,7 @@ def check_hit(kind, shapes, ray, given, tallies):
     spread = PART * (fraction(t) + Fraction(shape.size or shape.distance(ray)) / Fraction(max(cosine, 1e-25) * ray.scale))
     tallies.take(f"{kind}: t", abs(tallies.spoiled(given["t"]) - fraction(t)), spread, given)
     if len(shapes) > 1 or cosine < 1e-6:
-        return  # of triangles that meet any may be the first
+        return  # any of the triangles that share the point may be the first
     tallies.take(f"{kind}: cosine", abs(tallies.spoiled(given["cosine"]) - Fraction(shape.cosine(ray, t))), Fraction(1, 2**40), given)
     outward = shape.normal([exact.middle(x) for x in ray.at(t)])
     length = (exact.dot(outward, outward) * exact.arb(1)).sqrt()
@@ -131,7 +131,7 @@ def check_margin(kind, shape, ray, given, tallies):
     def is_found(by):
         return grown(shape, by).hit(ray) is not None
 
-    # an edge moves by more than the faces that meet there
+    # an edge moves by more than its faces
     within = (0.49 if isinstance(shape, (exact.Sphere, exact.Torus)) else 0.2) * min(margin, limit)
     held = all(is_found(by) == given["found"] for by in (within, -within))
     tallies.take(f"{kind}: margin", int(not held), 0, given)

@@ -44,7 +44,7 @@ class Beam:
 
 
 def grown(shape, by):
-    """The solid with its surface moved outward by so much; below 0 inward."""
+    """Returns the solid with its surface moved outward by so much, or inward below 0."""
     if isinstance(shape, exact.Sphere):
         return exact.Sphere(shape.center, exact.Fraction(shape.radius) + exact.Fraction(by))
     if isinstance(shape, exact.Box):
@@ -77,7 +77,7 @@ def off_axis(shape, point):
 
 
 def curvature(thing, point):
-    """The largest at a place of the surface: how fast the shading normal turns."""
+    """Returns the largest curvature at a place of the surface, which is how fast the shading normal turns."""
     shape = thing.shape
     if thing.normals is not None:
         normals = [[as_float(x) for x in unit(normal)] for normal in thing.normals]
@@ -96,7 +96,7 @@ def curvature(thing, point):
 
 
 def rim_distance(shape, point):
-    """How far a place of the surface is from where its normal breaks."""
+    """Returns how far a place of the surface is from where its normal breaks."""
     if isinstance(shape, exact.Box):
         faces = sorted(as_float(min(abs(x - a), abs(x - b))) for a, x, b in zip(shape.low, point, shape.high))
         return faces[1]
@@ -116,8 +116,8 @@ def rim_distance(shape, point):
 
 
 class Crossing:
-    """Where a beam first meets a thing: at `t` to the best of knowledge, between low and high. Missed: low is infinite;
-    open: high is."""
+    """The first hit of a beam on a thing, at `t` to the best of knowledge, between low and high. If it is missed, low is
+    infinite, and if that is open, high is."""
 
     def __init__(self, low=inf, t=None, high=inf):
         self.low, self.t, self.high = low, t, high
@@ -199,7 +199,7 @@ def crossing(thing, beam, rounding):
 
 
 class Hit:
-    """A surface as a beam meets it. off: how far the place, turn: how far the unit normal may be off."""
+    """A surface as a beam hits it. off: how far the place, turn: how far the unit normal may be off."""
 
     def __init__(self, thing, index, met, beam, rounding):
         shape, ray = thing.shape, beam.ray
@@ -227,7 +227,7 @@ class Hit:
 
 
 def nearest(scene, beam, rounding):
-    """The hit, None for a miss, or "open"."""
+    """Returns the hit, None for a miss, or "open"."""
     met = [crossing(thing, beam, rounding) for thing in scene.things]
     first = min(range(len(met)), key=lambda i: (met[i].high, met[i].low), default=None)
     if first is None:
@@ -243,7 +243,7 @@ def nearest(scene, beam, rounding):
 
 
 def leaving(hit, direction, turn, rounding):
-    """A beam from a hit: renderers start it off the surface by a few of the hit's errors."""
+    """Returns a beam from a hit, which renderers start off the surface by a few of the hit's errors."""
     start = hit.off + 48 * rounding.u * hit.magnitude
     cosine = abs(as_float(dot(hit.geometry, unit(direction))))
     return Beam(hit.point, [middle(x) for x in direction], start, turn, hit.thing, cosine, hit.magnitude)
@@ -260,7 +260,7 @@ class Sum:
 
 
 def checker_color(hit, rounding, eye):
-    """None where the place is too near a border to decide."""
+    """Returns the color of the place's square, or None if a border is too near to decide."""
     material, kind = hit.thing.material, hit.thing.kind
     point = [arb(p + e) for p, e in zip(hit.point, eye)]
     if kind in ("plane", "disc"):
@@ -283,7 +283,7 @@ def checker_color(hit, rounding, eye):
 
 
 def spot_strength(light, from_light, turn, rounding):
-    """(strength, error); None on a hard edge."""
+    """Returns (strength, error), or None on a hard edge."""
     versine = 1 - dot(unit(light.direction), unit(from_light))
     outer, inner = (1 - (arb(rational(a)) * arb.pi() / 180).cos() for a in (light.angle, light.angle - light.penumbra))
     s = as_float(versine)
@@ -300,7 +300,7 @@ def spot_strength(light, from_light, turn, rounding):
 
 
 def passing(scene, hit, way, end, turn, rounding):
-    """The parts of a light's channels that get through, or None where that is open."""
+    """Returns the parts of a light's channels that get through, or None if that is open."""
     beam = leaving(hit, way, turn, rounding)
     lift = hit.thing.lift(hit.point, hit.facing)
     if lift is not None:
@@ -327,7 +327,7 @@ def passing(scene, hit, way, end, turn, rounding):
 
 
 def highlight(hit, to_light, facing, facing_error, turn, rounding):
-    """(R . V)^shininess and its error."""
+    """Returns (R . V)^shininess and its error."""
     exponent = hit.thing.material.shininess
     power = as_float(exponent)
     if power == 0:
@@ -348,7 +348,7 @@ def highlight(hit, to_light, facing, facing_error, turn, rounding):
 
 
 def lit(scene, light, hit, base, rounding, total):
-    """Adds what a light gives; True or False: whether the place is in its shadow; None: that is open."""
+    """Adds what a light gives. Returns whether the place is in its shadow, or None if that is open."""
     u, material = rounding.u, hit.thing.material
     infinite = light.kind == "directional"
     way = times(light.direction, -1) if infinite else subtract(light.position, hit.point)
@@ -395,7 +395,7 @@ def lit(scene, light, hit, base, rounding, total):
 
 
 def refracted(hit, direction, rounding):
-    """(direction, how far it may be turned per turn of ray and normal); (None, 0) at total reflection, None if open."""
+    """Returns (direction, how far it may be turned per turn of ray and normal), (None, 0) at total reflection, None if open."""
     ior = arb(hit.thing.material.ior)
     eta = 1 / ior if hit.entering else ior
     cosine = -dot(direction, hit.normal)
@@ -412,7 +412,7 @@ def refracted(hit, direction, rounding):
 
 
 def reflectance(hit, cosine):
-    """The part of unpolarized light that the surface reflects, by Fresnel's equations."""
+    """Returns the part of unpolarized light that the surface reflects, by Fresnel's equations."""
     ior = arb(hit.thing.material.ior)
     entering = hit.entering or hit.thing.material.transmission == 0
     there = 1 / ior if entering else ior  # the sine behind the surface over that before it
@@ -427,7 +427,7 @@ def reflectance(hit, cosine):
 
 
 def reflectance_bounded(hit, direction, turn, rounding):
-    """(reflectance, how far a turn of ray and normal may change it)"""
+    """Returns (reflectance, how far a turn of ray and normal may change it)."""
     cosine = -dot(direction, hit.normal)
     part = reflectance(hit, cosine)
     change = max(abs(as_float(reflectance(hit, cosine + way * arb(turn)) - part)) for way in (-1, 1))
@@ -463,7 +463,7 @@ def trace(scene, beam, rounding, bounces):
 
 
 def follow(scene, hit, beam, rounding, bounces, total):
-    """Adds the mirrored and the refracted ray's color; False where that is open."""
+    """Adds the mirrored and the refracted ray's color. Returns False if that is open."""
     material = hit.thing.material
     direction = times(hit.to_eye, -1)
     reflection, transmission = list(material.reflection), arb(material.transmission)

@@ -1,5 +1,5 @@
-"""Closest hits in exact rationals, certified roots and 300-bit balls; nothing here cancels, so that every formula is
-the textbook's own.
+"""Closest hits in exact rationals, certified roots and 300-bit balls. Nothing here cancels, so that every formula is that of
+the textbook.
 
 A solid is a set of points with an exact membership test and, for a line, the t where it may begin or end. These are
 sorted, the membership of a rational point between each two says whether that interval is inside, and the crossings are
@@ -23,7 +23,7 @@ def rational(number):
 
 
 def fraction(number):
-    """An fmpq, or the middle of a ball, as a Fraction."""
+    """Returns an fmpq, or the middle of a ball, as a Fraction."""
     if isinstance(number, arb):
         mantissa, exponent = number.mid().man_exp()
         return Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
@@ -72,13 +72,13 @@ class Ray:
         return [o + t * d for o, d in zip(self.origin, self.direction)]
 
     def polynomials(self, base, axis):
-        """In t, of the point p seen from the base: |p|^2 and p . axis."""
+        """Returns |p|^2 and p . axis as polynomials in t, where p is the ray's point seen from the base."""
         f, d = subtract(self.origin, base), self.direction
         return fmpq_poly([dot(f, f), 2 * dot(f, d), dot(d, d)]), fmpq_poly([dot(f, axis), dot(d, axis)])
 
 
 def polynomial_roots(coefficients):
-    """Real roots of a polynomial with rational coefficients, constant first, as 300-bit rationals."""
+    """Returns real roots of a polynomial with rational coefficients, constant first, as 300-bit rationals."""
     poly = fmpq_poly(coefficients)
     if poly.degree() < 1:
         return []
@@ -89,7 +89,7 @@ class Shape:
     """center, size: for tolerances; radius: of the cross-section whose silhouette a ray may graze."""
 
     def crossings(self, ray):
-        """(t, outward normal's cosine with the ray) of each crossing of a line, ascending."""
+        """Returns (t, outward normal's cosine with the ray) of each crossing of a line, ascending."""
         ts = []
         for t in sorted(self.boundary_ts(ray)):
             if not ts or t - ts[-1] > SAME:
@@ -101,7 +101,7 @@ class Shape:
         return [t for i, t in enumerate(ts) if inside[i] != inside[i + 1]]
 
     def hit(self, ray):
-        """The first t beyond the ray's start, or None."""
+        """Returns the first t beyond the ray's start, or None."""
         return next((t for t in self.crossings(ray) if t > ray.start), None)
 
     def cosine(self, ray, t):
@@ -153,7 +153,7 @@ class Box(Shape):
         return [rational(int(face == min(faces))) for face in faces]
 
     def cosine(self, ray, t):
-        # at an edge any of the faces that meet there may be reported: the one crossed most steeply
+        # at an edge any of the faces that meet there may be reported, so take the one crossed most steeply
         faces = [min(abs(x - a), abs(x - b)) for a, x, b in zip(self.low, ray.at(t), self.high)]
         return max(abs(float(fraction(d))) for d, face in zip(ray.direction, faces) if face == min(faces)) / ray.scale
 
@@ -221,7 +221,7 @@ class DoubleCone(Shape):
         self.radius = self.size = 0.0
 
     def tips(self):
-        """(tip, axis) of each nappe."""
+        """Returns (tip, axis) of each nappe."""
         for sign in (1, -1):
             yield [c + sign * self.apart * a for c, a in zip(self.center, self.axis)], [sign * a for a in self.axis]
 
@@ -359,7 +359,7 @@ class Triangle(Plane):
         self.size = self.radius = max(map(length, self.sides))
 
     def edges(self, ray):
-        """Six times the volume that each edge spans with the ray."""
+        """Returns six times the volume that each edge spans with the ray."""
         seen = [subtract(v, ray.origin) for v in self.vertices]
         return [dot(ray.direction, cross(seen[i], seen[(i + 1) % 3])) for i in range(3)]
 
@@ -369,8 +369,8 @@ class Triangle(Plane):
 
 
 def shape_of(given):
-    """A shape by its numbers and flags, as answers.c prints them: the nine doubles that its member of Object.as
-    (host/scene/scene.h) begins with, in their order there."""
+    """Returns a shape by its numbers and flags, as answers.c prints them. The numbers are the nine doubles that its member of
+    Object.as (host/scene/scene.h) begins with, in their order there."""
     kind, n = given["shape"], given["numbers"]
     if kind == "sphere":
         return Sphere(n[:3], n[3])

@@ -102,7 +102,7 @@ ROUNDINGS = {
 
 
 class Tally:
-    """What became of one kind of value: the worst error in u and as a part of its bound."""
+    """The comparison of one type of value, with the worst error in u and as a part of its bound."""
 
     def __init__(self):
         self.count = self.open = self.wrong = 0

@@ -1,7 +1,7 @@
-"""Scenes for the oracle: what the YAML of docs/scene-format.md says, without meshes and images on surfaces.
+"""Scenes for the oracle, from the YAML of docs/scene-format.md without meshes and images on surfaces.
 
-As docs/verify.md says, the eye is subtracted in double, then each number is rounded once to the precision; what is
-left is exact."""
+As docs/verify.md states, the eye is subtracted in double, then each number is rounded once to the precision. The rest is
+exact."""
 
 import struct
 
@@ -11,7 +11,7 @@ from flint import arb
 
 
 def narrow(number):
-    """As a float has it."""
+    """Returns the number rounded to float."""
     return struct.unpack("f", struct.pack("f", number))[0]
 
 
@@ -101,12 +101,12 @@ class Thing:
         return exact.DoubleCone(from_eye(given["apex"]), vector("axis"), slope)
 
     def outward(self, point):
-        """The normal of the geometry, of any length."""
+        """Returns the geometric normal, of any length."""
         return self.shape.normal(point)
 
     def shading(self, point, geometry):
-        """The normal of the shading, of any length, as balls: on a smooth triangle that of the place between the
-        vertices', each first made unit."""
+        """Returns the shading normal, of any length, as balls. On a smooth triangle it is interpolated between those of the
+        vertices, each normalized first."""
         if self.normals is None:
             return [arb(x) for x in geometry]
         units = [unit(normal) for normal in self.normals]
@@ -120,8 +120,8 @@ class Thing:
         ]
 
     def lift(self, point, geometry):
-        """From the point to where rays to lights start, None where nothing lifts: by the share of each vertex along its
-        normal, which faces as the geometry does, to its tangent plane."""
+        """Returns the way from the point to where rays to lights start, or None if nothing lifts. It goes by the share of each
+        vertex along its normal, which faces as the geometry does, to its tangent plane."""
         if self.normals is None:
             return None
         units = [unit(normal) for normal in self.normals]

@@ -1,6 +1,6 @@
 // Preloaded into glint by tests/test_device_limits.py: OpenCL devices report the limits that GLINT_LIMITS
 // lists, NAME or NAME=VALUE with commas between, and enforce them. Where GLINT_LIMITED is set, only devices
-// with that in their names report limits, and only of arithmetic are they then enforced.
+// with that in their names report limits, and then only those of arithmetic are enforced.
 //
 //   embedded       the embedded profile
 //   toward-zero    float arithmetic does not round to nearest
@@ -32,7 +32,7 @@
 // The OpenCL function that the shim stands in for.
 #define NEXT(function) ((__typeof__(&function))dlsym(RTLD_NEXT, #function))
 
-// Whether the limit is set; *value, which may be NULL, receives its number.
+// Returns whether the limit is set. *value, where `value` may be NULL, receives its number.
 static bool limit_get(const char *name, cl_ulong *value)
 {
     const char *list = getenv("GLINT_LIMITS");
@@ -56,7 +56,7 @@ static cl_int answer(const void *value, size_t value_size, size_t size, void *to
 
 #define ANSWER(Type, value) answer(&(Type){value}, sizeof(Type), size, to, needed)
 
-// The device's extensions without cl_khr_fp64 where that is hidden, and with those by which it is identified.
+// Returns the device's extensions without cl_khr_fp64 if that is hidden, and with those that identify it.
 static cl_int extensions_answer(cl_device_id device, size_t size, void *to, size_t *needed)
 {
     char text[8192] = "";
@@ -69,7 +69,7 @@ static cl_int extensions_answer(cl_device_id device, size_t size, void *to, size
     return status == CL_SUCCESS ? answer(text, strlen(text) + 1, size, to, needed) : status;
 }
 
-// The bus of a device: 0x65 for the first that is asked for, then the next.
+// Returns the bus of a device, 0x65 for the first that is asked for and then the next.
 static unsigned char bus_of(cl_device_id device)
 {
     static cl_device_id devices[16];
@@ -80,7 +80,7 @@ static unsigned char bus_of(cl_device_id device)
     return 0x65 + i;
 }
 
-// Answers the queries that identify a device; *is_known says whether `what` is one.
+// Answers the queries that identify a device. Sets *is_known to whether `what` is one.
 static cl_int identity_answer(cl_device_id device, cl_device_info what, size_t size, void *to, size_t *needed,
                               bool *is_known)
 {
@@ -170,7 +170,7 @@ cl_program clCreateProgramWithSource(cl_context context, cl_uint count, const ch
 
 enum { BUFFERS_MAX = 4096, KERNELS_MAX = 64, ARGUMENTS_MAX = 256 };
 
-// Whether the program's compiler or linker is to fail.
+// Returns whether the program's compiler or linker is to fail.
 static bool is_too_large(cl_program program, const char *limit, cl_ulong *status)
 {
     size_t size = 0;
@@ -218,7 +218,7 @@ static size_t buffer_find(cl_mem buffer)
     abort();
 }
 
-// The kernel's entry, which is made if it has none.
+// Returns the kernel's entry, and adds one if it has none.
 static size_t kernel_find(cl_kernel kernel)
 {
     size_t place = KERNELS_MAX;

@@ -51,7 +51,7 @@ int glob(const char *pattern, int flags, int (*failed)(const char *, int), glob_
     return 0;
 }
 
-// The names where a system's libraries ask for 64-bit offsets.
+// The names that a system's libraries call if they ask for 64-bit offsets.
 FILE *fopen64(const char *path, const char *mode) __attribute__((alias("fopen")));
 int glob64(const char *pattern, int flags, int (*failed)(const char *, int), glob64_t *found)
     __attribute__((alias("glob")));
