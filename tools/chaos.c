@@ -1,21 +1,20 @@
-// Preloaded into glint by tools/chaos: lets one call in a process fail, or many, and counts them.
+// A library that tools/chaos preloads into glint. Makes one or more calls of a process fail; counts calls.
 //
-// GLINT_CHAOS says what fails; numbers count from 0:
+// GLINT_CHAOS selects what fails. Calls are counted from 0:
 //   cl N      OpenCL call N of glint
-//   null N    OpenCL call N of those that create an object: NULL with CL_SUCCESS
+//   null N    OpenCL call N of those that create an object, which returns NULL with CL_SUCCESS
 //   alloc N   allocation N of glint's own code
-//   call N    system call N on a file below the folder GLINT_CHAOS_FOLDER, or on stdin and stdout: EIO
-//   eintr N   the same: EINTR
-//   full N    the same from call N on, if it writes or creates: ENOSPC
-//   short     reads and writes there do half of what they are asked for
-//   deny N    system call of number N, always: EPERM
+//   call N    system call N on a file below the folder GLINT_CHAOS_FOLDER, or on stdin and stdout, with EIO
+//   eintr N   system call N, counted like those of `call`, with EINTR
+//   full N    the system calls of `call` from N on that write or create, with ENOSPC
+//   short     reads and writes among the system calls of `call` transfer half of the requested bytes
+//   deny N    every system call whose number is N, with EPERM
 //   (else)    nothing
-//   child …   the same in the processes that this one starts, not in itself
-// GLINT_CHAOS_LOG is a file that receives "failed NAME" when something is made to fail, and the number of
+//   child …   makes the call fail in this process's children, but not in this process
+// GLINT_CHAOS_LOG names a file that receives "failed NAME" when a call is made to fail, and the number of
 // calls of each kind when the process ends.
 //
-// System calls are trapped by seccomp, so that those within libc are also seen. Only on x86-64 Linux with
-// glibc.
+// seccomp traps the system calls, including those within libc. Works only on x86-64 Linux with glibc.
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
 #endif
@@ -50,9 +49,9 @@
 static char kind[16], folder[PATH_MAX], log_path[PATH_MAX];
 static unsigned long failing = ULONG_MAX;
 static atomic_ulong cl_count, null_count, alloc_count, call_count;
-static uintptr_t text_start, text_end; // of the main program
+static uintptr_t text_start, text_end; // the bounds of the main program's code
 
-// The filter lets the system call in here pass.
+// Makes a system call that the filter lets pass.
 __attribute__((naked, noinline)) static long pass_through(long number, long a, long b, long c, long d, long e,
                                                           long f)
 {
@@ -81,7 +80,7 @@ static bool is_kind(const char *name)
     return strcmp(kind, name) == 0;
 }
 
-// Counts a call; whether it is the one that fails.
+// Counts a call and returns whether it must fail.
 static bool count_fails(const char *of, atomic_ulong *count, const char *name)
 {
     bool fails = atomic_fetch_add(count, 1) == failing && is_kind(of);
@@ -104,7 +103,8 @@ typedef long (*ClFunction)(long, long, long, long, long, long, long, long, long,
 
 enum { CL_OUT_OF_RESOURCES = -5 };
 
-// status at argument `place`, or -1 of a function that returns it
+// Calls an OpenCL function or makes it fail. `status` points to its error code, or is NULL if it returns
+// that.
 static long cl_call(const char *name, long *status, bool is_release, ClFunction function, PARAMETERS)
 {
     if (status && count_fails("null", &null_count, name)) {
@@ -165,7 +165,7 @@ STATUS(clWaitForEvents)
 STATUS(clGetEventInfo)
 STATUS(clGetEventProfilingInfo)
 
-// ---- allocations, of the main program alone
+// ---- allocations by the main program
 
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t count, size_t size);
@@ -303,7 +303,7 @@ static const struct {
 };
 enum { TRAPPED_COUNT = sizeof trapped / sizeof *trapped };
 
-// What a descriptor stands for is below the folder, or stdin or stdout.
+// Returns whether a descriptor is stdin or stdout, or its file is below the folder.
 static bool descriptor_is_ours(long descriptor)
 {
     char link[40], path[PATH_MAX];
@@ -361,7 +361,7 @@ static void on_trap(int signal, siginfo_t *info, void *context)
     errno = error;
 }
 
-// LLVM also has a handler for this signal.
+// Keeps this library's handler of SIGSYS, since LLVM installs one.
 int sigaction(int signal, const struct sigaction *action, struct sigaction *old)
 {
     static int (*function)(int, const struct sigaction *, struct sigaction *);
@@ -408,7 +408,7 @@ static void trap_calls(void)
     filter_install(filter, n);
 }
 
-// A sandbox that knows less than glint and its driver ask for: here and in all that they start.
+// Denies a system call in this process and its children, as a sandbox does that is unaware of it.
 static void deny_call(unsigned number)
 {
     struct sock_filter filter[] = {
@@ -431,7 +431,7 @@ static int find_text(struct dl_phdr_info *info, size_t size, void *unused)
         text_start = info->dlpi_addr + header->p_vaddr;
         text_end = text_start + header->p_memsz;
     }
-    return 1; // the first is the main program
+    return 1; // stops after the first object, which is the main program
 }
 
 __attribute__((constructor)) static void start(void)
@@ -449,7 +449,7 @@ __attribute__((constructor)) static void start(void)
     if (what) snprintf(kind, sizeof kind, "%.*s", (int)strcspn(what, " "), what);
     if (space) failing = strtoul(space, NULL, 10);
     dl_iterate_phdr(find_text, NULL);
-    // not in programs that a driver starts: the filter would end them before they are ready for it
+    // the filter would kill programs that a driver starts before they could handle the signal
     unsetenv("LD_PRELOAD");
     if (is_kind("call") || is_kind("eintr") || is_kind("full") || is_kind("short") || is_kind("count"))
         trap_calls();
@@ -464,7 +464,7 @@ __attribute__((destructor)) static void end(void)
     log_line("call %lu\n", call_count);
 }
 
-// What reads a mesh for another process ends so.
+// Replaces _exit, by which the process that reads a mesh for another one ends.
 void _exit(int status)
 {
     end();

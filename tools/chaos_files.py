@@ -1,4 +1,4 @@
-"""The small files that tools/chaos renders, damages and swells."""
+"""Small files that tools/chaos renders, damages and enlarges."""
 import struct
 import zlib
 
@@ -45,7 +45,7 @@ end_header
 
 
 def png(width, height, rows=b""):
-    """A PNG of that size by its header; its pixels are `rows`."""
+    """Returns a PNG whose header has the given size and whose pixels are `rows`."""
     def chunk(name, data):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
     return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)) +
@@ -71,7 +71,7 @@ def exr(width, height):
 
 
 def jpeg(width, height):
-    """A gray JPEG of that size by its header, with one block: all of 1x1."""
+    """Returns a gray JPEG whose header has the given size, with a single block, which is complete at 1x1."""
     def segment(name, data):
         return b"\xff" + name + struct.pack(">H", len(data) + 2) + data
     one_code = b"\1" + bytes(15) + b"\0"
@@ -82,7 +82,7 @@ def jpeg(width, height):
 
 
 def pixels(content):
-    """Returns a file's content, of a PNG only its size and pixels, because its texts name the device."""
+    """Returns a file's content, or only the size and pixels of a PNG, because its texts name the device."""
     if content is None or not content.startswith(b"\x89PNG"):
         return content
     kept, at = b"", 8

@@ -1,6 +1,6 @@
-// What each part of the kernel costs a scene that has no use for it: a frame's and a build's processor time
-// with the kernel made for the scene's own features, then with one more, then with all. Prints a table in
-// Markdown.
+// Measures what each part of the kernel costs a scene that does not use it. Prints a table in Markdown with
+// the processor times of a frame and of a build, for the kernel with the scene's own features, with one more
+// and with all.
 #include "host/base/fault.h"
 #include "host/import/load.h"
 #include "host/render/renderer.h"
@@ -13,15 +13,15 @@
 
 enum {
     VARIANT_COUNT = FEATURE_COUNT + 2, // the scene's own, each feature, all
-    BUILDS = 4,                        // of each variant, of which the shortest counts
-    ROUNDS = 25                        // of frames of all variants in turn; the shortest counts
+    BUILDS = 4,                        // per variant; the shortest counts
+    ROUNDS = 25                        // one frame of each variant in turn; the shortest counts
 };
 
 typedef struct {
     char name[32];
     FeatureSet extra;
     Renderer *renderer;
-    double first_seconds, frame_seconds; // the first holds the build
+    double first_seconds, frame_seconds; // the first includes the build
 } Variant;
 
 static double timeval_seconds(struct timeval time)

@@ -1,4 +1,4 @@
-"""Compiles the kernels by clang for one ray per work-item, for tools/gpu-resources and tools/spirv-form."""
+"""Compiles the kernels with clang for one ray per work-item, for tools/gpu-resources and tools/spirv-form."""
 import functools
 import os
 import shutil
@@ -10,7 +10,7 @@ ROOT = Path(__file__).resolve().parent.parent
 BUILD = Path(os.environ.get("BUILD", ROOT / "build"))
 OLDEST_CLANG, NEWEST_CLANG = 15, 40
 FIRST_FILE = '#line 1 "render.cl"'  # follows the scene's definitions
-# __OPENCL_VERSION__ is the drivers' to define.
+# Drivers define __OPENCL_VERSION__ themselves.
 OPTIONS = ["-x", "cl", "-cl-std=CL1.2", "-D__OPENCL_VERSION__=120", "-Xclang", "-finclude-default-header", "-w",
            "-I", ROOT / "kernels"]
 
@@ -21,7 +21,7 @@ def fail(message, status=1):
 
 
 def run(*command):
-    """Returns what a command printed to both its outputs."""
+    """Returns what a command printed to stdout and stderr."""
     process = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if process.returncode != 0:
         fail(f"{' '.join(map(str, command))} failed:\n{process.stdout}")
@@ -29,7 +29,7 @@ def run(*command):
 
 
 def clang_version(needs, is_usable):
-    """Returns the newest usable version of clang. Where there is none, exits with 77 and a message that names the needs."""
+    """Returns the newest usable version of clang. If there is none, exits with 77 and a message that names the requirements."""
     for version in range(NEWEST_CLANG, OLDEST_CLANG - 1, -1):
         if shutil.which(f"clang-{version}") and is_usable(version):
             return version

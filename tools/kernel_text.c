@@ -1,5 +1,5 @@
-// Prints the text of the kernel that renders a scene with one ray per work-item: what a GPU would be given,
-// but that HAS_FMA and REPAIRS_DIVIDE are the default device's.
+// Prints the text of the kernel that renders a scene with one ray per work-item, as on a GPU, except that
+// HAS_FMA and REPAIRS_DIVIDE are those of the default device.
 #include "host/cli/options.h"
 #include <stdio.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// The size of the struct in the first version that has it.
+// The size of GlintAllHits in the first version that has it.
 enum { ALL_HITS_SIZE_MIN = offsetof(GlintAllHits, position) + sizeof(double *) };
 
 // A hit of a batch's ray.
@@ -74,7 +74,7 @@ static bool batch_trace(Batch *batch, Renderer *renderer, size_t count, size_t h
     return true;
 }
 
-// Appends the batch's hits, sorted by ray: they are in the order of t already.
+// Appends the batch's hits, sorted by ray. Each ray's hits are already in the order of t.
 static void batch_append(Batch *batch, size_t first, size_t count, GlintAllHits *all)
 {
     const size_t before = all->count, after = before + batch->hits.count;
@@ -101,7 +101,7 @@ static void batch_append(Batch *batch, size_t first, size_t count, GlintAllHits 
     all->count = after;
 }
 
-// Returns false with a message, or if the device failed.
+// Collects all hits. Returns false if the device failed, and false with a message if a ray is invalid.
 static bool rays_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t hits_max, GlintAllHits *all,
                            MessageList *messages)
 {

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-// Copies a caller's pair as struct_read does. Returns false with a message if it is invalid.
+// Copies a caller's pair, of any version of the interface. Returns false with a message if it is invalid.
 static bool pair_read(GlintImagePair *own, const GlintImagePair *given, MessageList *messages)
 {
     if (!struct_read(own, sizeof *own, given, messages)) return false;
@@ -42,7 +42,7 @@ static Image image_of_array(const GlintImagePair *pair, const void *array)
 
 static GlintImageMetrics metrics_of(const ImageMetrics *found)
 {
-    const double none = found->linear.count > 0 ? 0 : (double)NAN; // errors of no values
+    const double none = found->linear.count > 0 ? 0 : (double)NAN; // NaN if no values were compared
     return (GlintImageMetrics){
         .differing_values = found->differing_count,
         .unmatched_values = found->unmatched_count,

@@ -49,7 +49,7 @@ GlintStatus glint_device_open(const char *selector, GlintDevice **device, char *
     if (chosen) compute_open(&opened->compute, chosen);
     const GlintStatus status =
         call_end(&list, &opened->compute, chosen ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
-    // a progress function may trace, and free what it holds, on the device that renders
+    // a progress function may trace and close tracers on the device that renders
     pthread_mutexattr_t recursive;
     pthread_mutexattr_init(&recursive);
     pthread_mutexattr_settype(&recursive, PTHREAD_MUTEX_RECURSIVE);

@@ -29,8 +29,8 @@ extern "C" {
 
 typedef enum {
     GLINT_DONE = 0,
-    GLINT_WRONG_INPUT = 1,   // a scene, a setting or a device's name is wrong, as the messages say
-    GLINT_DEVICE_FAILED = 2, // an OpenCL call failed: close the device
+    GLINT_WRONG_INPUT = 1,   // a scene, a setting or a device's name is wrong; the messages explain it
+    GLINT_DEVICE_FAILED = 2, // an OpenCL call failed; close the device
     GLINT_STOPPED = 3        // the caller's progress function stopped the render
 } GlintStatus;
 
@@ -55,7 +55,7 @@ void glint_text_free(char *text); // accepts NULL
 
 typedef struct {
     size_t size;
-    uint32_t index; // as a selector of glint_device_open
+    uint32_t index; // in decimal, a selector for glint_device_open
     uint32_t compute_units;
     uint64_t memory_bytes; // 0 if unknown
     int is_gpu, is_cpu;
@@ -78,7 +78,7 @@ void glint_device_info(const GlintDevice *device, GlintDeviceInfo *info);
 
 // Scenes
 
-// How a scene is read. Only YAML scenes have values to replace and frames.
+// Options for reading a scene. Only YAML scenes have values to replace and frames.
 typedef struct {
     size_t size;
     // Values to replace, in the syntax of glint render --set, such as "camera.fov=60". An empty value removes
@@ -104,13 +104,13 @@ typedef struct {
     size_t size;
     GlintReal real;            // of vertices and normals
     const void *vertices;      // 3 per vertex
-    const void *normals;       // 3 per vertex, for smooth shading, or NULL; a zero normal is flat there
+    const void *normals;       // 3 per vertex, for smooth shading, or NULL; zero normals mean flat shading
     size_t vertex_count;       // at most 4294967295
     const uint32_t *triangles; // 3 vertex indices each
     size_t triangle_count;     // 1 to 16777216
 } GlintMesh;
 
-// Makes a scene of one mesh, gray, with a camera that frames it and two lights. The arrays are copied.
+// Makes a scene of one gray mesh, with a camera that frames it and two lights. The arrays are copied.
 GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char **messages);
 void glint_scene_free(GlintScene *scene); // accepts NULL
 
@@ -133,7 +133,7 @@ typedef struct {
     size_t size;
     uint32_t width, height; // both 0 select glint_scene_image_size
     uint32_t samples;       // per pixel; 0 means 1
-    uint32_t bounces;       // at most this many per ray
+    uint32_t bounces;       // the maximum per ray
     GlintPrecision precision;
     uint32_t lanes;          // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
     GlintProgress progress;  // or NULL
@@ -142,8 +142,8 @@ typedef struct {
 } GlintRenderSettings;
 
 // Arrays of height x width pixels from the top left, which the caller owns, or NULL for layers that are not
-// wanted. Colors are linear light. Those from t to shadow describe the ray through a pixel's center. Where it
-// misses, t is infinite, normal and position are 0, and object is 4294967295.
+// wanted. Colors are linear light. The layers from t to shadow describe the ray through a pixel's center. If
+// it misses, t is infinite, normal and position are 0, and object is 4294967295.
 typedef struct {
     size_t size;
     double *color;    // 3 per pixel; required
@@ -166,7 +166,7 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
 typedef struct {
     size_t size;
     GlintPrecision precision;
-    uint32_t lanes; // as in GlintRenderSettings
+    uint32_t lanes; // rays per work-item: 1, 4, 8 or 16; 0 lets glint choose
 } GlintTraceSettings;
 
 // Prepares a scene for many calls of the functions that trace. The scene may be freed afterwards, but the
@@ -190,8 +190,8 @@ typedef struct {
 
 typedef enum {
     GLINT_UNCERTAIN = 0,
-    GLINT_CERTAIN = 1,           // by float with bounds
-    GLINT_CERTAIN_IN_DOUBLE = 2, // by double with bounds
+    GLINT_CERTAIN = 1,           // proven by float with bounds
+    GLINT_CERTAIN_IN_DOUBLE = 2, // proven by double with bounds
 } GlintCertainty;
 
 // Arrays of one value per ray, which the caller owns, or NULL where not wanted. On a miss object is
@@ -208,15 +208,14 @@ typedef struct {
     uint8_t *certainty;
 } GlintHits;
 
-// Finds the nearest hit of each ray. A failure, such as a ray that is not as stated above, leaves the arrays
-// undefined.
+// Finds the nearest hit of each ray. A failure, such as an invalid ray, leaves the arrays undefined.
 GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *hits, char **messages);
 
 // Arrays of one value per ray, which the caller owns, or NULL where not wanted.
 typedef struct {
     size_t size;
     uint8_t *occluded; // 1 where anything lies strictly between tmin and tmax, otherwise 0
-    // GlintCertainty of the nearest hit: it may be GLINT_UNCERTAIN where only the object is.
+    // GlintCertainty of the nearest hit. It may be GLINT_UNCERTAIN where only the object is uncertain.
     uint8_t *certainty;
 } GlintOcclusion;
 
@@ -239,7 +238,7 @@ typedef struct {
     double *position;
 } GlintAllHits;
 
-// Finds up to hits_max hits of each ray, nearest first. Of several hits at the same t it finds one. The
+// Finds up to hits_max hits of each ray, nearest first. If several hits have the same t, it finds one. The
 // caller sets hits->size; the other members are overwritten and must not hold arrays of an earlier call.
 // glint_all_hits_free frees the arrays. After a failure there are none, and count is 0. GLINT_CERTIFIED is
 // refused, because its bounds are those of rays from their origins.
@@ -265,7 +264,7 @@ typedef struct {
 typedef struct {
     size_t size;
     uint64_t differing_values; // in any bit
-    uint64_t unmatched_values; // pairs of which one is infinite or NaN and the other is not the same
+    uint64_t unmatched_values; // pairs in which one is infinite or NaN and the other is not the same
     uint64_t nonfinite_reference, nonfinite_image; // pixels
     // The pairs of finite values, and their errors, which are NaN if there are none.
     uint64_t compared_values;

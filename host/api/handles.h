@@ -30,15 +30,15 @@ bool struct_read(void *own, size_t own_size, const void *given, MessageList *mes
 // Members that this version does not know become 0.
 void struct_write(void *given, const void *own, size_t own_size);
 
-// Ends a call: passes its messages to the caller, with the failure of the Compute if it has one; the Compute
-// may be NULL. Returns `status`, or the status of the failure.
+// Ends a call. Passes its messages to the caller, including the failure of the Compute, if it has one. The
+// Compute may be NULL. Returns `status`, or the status of the failure.
 GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages);
 
-// Returns whether the caller's struct, which may be NULL, states a size of at least `size_min` bytes; if not,
-// with a message.
+// Returns whether the caller's struct, which may be NULL, states a size of at least `size_min` bytes, and
+// adds a message if not.
 bool struct_has_size(const void *given, size_t size_min, const char *name, MessageList *messages);
 
-// Returns whether a type of numbers is known; if not, with a message.
+// Returns whether a type of numbers is known, and adds a message if not.
 bool real_is_known(GlintReal real, MessageList *messages);
 
 // Returns a number of a caller's array.
@@ -55,8 +55,8 @@ bool precision_read(Precision *precision, GlintPrecision given, MessageList *mes
 Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderSettings *settings,
                           MessageList *messages);
 
-// Returns how many of the rays are traced at once: on a CPU few enough that what they take, some 300 bytes
-// each, stays in its caches, on a GPU enough to occupy it.
+// Returns how many of the rays are traced at once. On a CPU they are few enough that their data, some 300
+// bytes each, stays in its caches. On a GPU they are enough to occupy it.
 static inline size_t batch_rays(const GlintTracer *tracer, size_t ray_count)
 {
     const bool is_gpu = tracer->device->compute.device->type & CL_DEVICE_TYPE_GPU;
@@ -64,7 +64,7 @@ static inline size_t batch_rays(const GlintTracer *tracer, size_t ray_count)
     return ray_count < most ? ray_count : most;
 }
 
-// Copies a caller's rays as struct_read does. Returns false with a message if they are invalid.
+// Copies a caller's rays, of any version of the interface. Returns false with a message if they are invalid.
 bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);
 
 // Reads `count` rays from `first` on and scales them (host/render/trace.h). Returns false with a message if

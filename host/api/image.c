@@ -1,6 +1,6 @@
 #include "host/api/handles.h"
 
-// The caller's arrays as a film, and whom to tell of its progress.
+// The caller's arrays as a film, and its progress function.
 typedef struct {
     Film film;
     Vector3 eye;
@@ -26,7 +26,7 @@ static unsigned layers_set(Film *film, const GlintImage *image)
     return aovs;
 }
 
-// A film's positions are relative to the eye.
+// Converts a band's positions from relative to the eye to the scene's coordinates.
 static void positions_move(const Rendering *rendering, const Film *band)
 {
     const Film *film = &rendering->film;
@@ -50,7 +50,7 @@ static bool band_receive(void *context, const Film *band, double fraction_done)
     return !rendering->is_stopped;
 }
 
-// Sets the size and what follows from it; false with a message: it is too large, or a setting is wrong.
+// Sets the settings. Returns false with a message if the image is too large or a setting is wrong.
 static bool settings_read(RenderSettings *settings, const GlintRenderSettings *given, const Scene *scene,
                           MessageList *messages)
 {

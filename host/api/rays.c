@@ -58,11 +58,11 @@ static void ray_read(TraceRay *ray, const GlintRays *rays, size_t index)
 
 typedef struct {
     const GlintRays *rays;
-    size_t first; // of the batch, in `rays`
+    size_t first; // index in `rays` of the batch's first ray
     Precision precision;
     TraceRay *scaled;
     int *exponents;
-    pthread_mutex_t mutex; // of the following
+    pthread_mutex_t mutex; // protects the members below
     size_t wrong;          // index of the first ray that is invalid, or SIZE_MAX
     const char *reason;
 } RayBatch;
@@ -97,7 +97,7 @@ bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t 
                       .scaled = scaled,
                       .mutex = PTHREAD_MUTEX_INITIALIZER,
                       .wrong = SIZE_MAX};
-    batch.exponents = exponents; // in the list clang-tidy 14 would miss that it is written to
+    batch.exponents = exponents; // in the initializer, clang-tidy 14 would not see that it is written to
     parallel_run(count, RAYS_OF_THREAD_MIN, ray_batch_scale, &batch);
     return !batch.reason || message_error(messages, "ray %zu: %s", batch.wrong, batch.reason);
 }
@@ -134,7 +134,7 @@ static void hit_write(const TraceArrays *arrays, size_t index, TraceHit *hit, in
 
 typedef struct {
     const TraceArrays *arrays;
-    size_t first; // of the batch, in `arrays`
+    size_t first; // index in `arrays` of the batch's first hit
     TraceHit *found;
     const int *exponents;
 } HitBatch;
@@ -146,8 +146,8 @@ static void hit_batch_write(void *context, size_t begin, size_t end)
         hit_write(batch->arrays, batch->first + i, &batch->found[i], batch->exponents[i]);
 }
 
-// Traces rays in batches, which bounds the memory that they take. Returns false with a message, or if the
-// device failed.
+// Traces rays in batches to bound memory. Returns false with a message if a ray is invalid, or without one
+// if the device failed.
 static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
                        MessageList *messages)
 {

@@ -1,10 +1,10 @@
-// This program's version, and how it was built.
+// Identifies the program's version and build.
 #pragma once
 
 #include "host/api/glint.h" // glint_version
 
-// The commit's hash, with "-dirty" where files differed from it; "unknown" outside of clones and of archives
-// that git made.
+// Returns the commit's hash, with "-dirty" if files differed from it, or "unknown" outside of clones and of
+// archives that git made.
 const char *glint_commit(void);
-// The compiler with its version.
+// Returns the compiler's name and version.
 const char *glint_compiler(void);

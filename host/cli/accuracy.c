@@ -54,7 +54,7 @@ typedef struct {
     AccuracyOptions options;
     OpenDevice open;
     VariantSet set;
-    Film reference; // that of the current scene, or of the only scene if it is read from a file
+    Film reference; // of the current scene, or of the only scene if it is read from a file
     AccuracyScene *scenes;
     OutputFile page; // opened before measuring, so that a failure shows early
     MessageList messages;

@@ -71,7 +71,7 @@ static const CommandLine command_line = {
                OPTIONS_WITHIN(keep_kernels_option, BenchOptions, variants.common),
                OPTIONS_WITHIN(report_options, BenchOptions, report)}};
 
-// What --variant takes.
+// The options that --variant accepts.
 static const CommandLine variant_line = {.groups = {OPTIONS(precisions_option),
                                                     OPTIONS(variant_choice_options),
                                                     OPTIONS_WITHIN(driver_options, VariantOptions, common)}};
@@ -82,11 +82,11 @@ typedef struct {
     VariantSet set;
 } Bench;
 
-// Splits a text in place at its blanks outside of quotes, and removes the quotes, ' or ". Adds each word to
+// Splits a text in place at blanks outside of quotes and removes the quotes, ' or ". Adds each word to
 // `words`. Returns false if a quote is not closed.
 static bool words_split(char *text, char **words, int *count)
 {
-    char quote = '\0', *end = text; // of the words so far
+    char quote = '\0', *end = text; // `end` is the end of the words so far
     bool is_within = false;
     for (const char *at = text; *at != '\0'; at++) {
         const bool is_blank = !quote && isspace((unsigned char)*at);
@@ -105,7 +105,7 @@ static bool words_split(char *text, char **words, int *count)
     return !quote;
 }
 
-// Reads a variant's options from its words, of which the first heads getopt's messages.
+// Reads a variant's options from its words. The first word is the prefix of getopt's messages.
 static bool words_read(VariantOptions *variant, char **words, int count)
 {
     if (command_line_read(&variant_line, variant, count, words) != OPTIONS_READ) return false;

@@ -58,8 +58,8 @@ typedef struct {
 
 static const char not_available[] = "not available on this device";
 
-// Ends the worker. Returns its exit status. If that is not 0, prints the worker's messages, unless the user
-// interrupted, since every process received the interrupt.
+// Ends the worker and returns its exit status. If that is not 0, prints the worker's messages, unless the
+// user interrupted, since every process received the interrupt.
 static int worker_close(MeasuredProgram *worker)
 {
     if (worker->requests) fclose(worker->requests);
@@ -112,8 +112,8 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
     return !error;
 }
 
-// Returns whether the user interrupted. Every process receives the signal: the worker may have ended by it
-// before this one has noticed.
+// Returns whether the user interrupted. Every process receives the signal, so the worker may have exited
+// before this process has noticed.
 static bool is_interrupted(const MeasuredProgram *worker)
 {
     siginfo_t ended = {0};
@@ -252,7 +252,7 @@ static bool rows_classify(Against *against, size_t look)
     return decided;
 }
 
-// Adds pairs until every row is decided or the time is over. The end of the time is also a look.
+// Adds pairs until every row has a verdict or the time has passed, when rows are classified a last time.
 static int pairs_run(Against *against, Progress *progress)
 {
     const size_t row_count = against->set->count;

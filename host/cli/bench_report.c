@@ -194,7 +194,7 @@ static Comparison row_drift(const BenchReport *report, const BenchRow *row)
     return bench_drift(&row->times, report->device->type & CL_DEVICE_TYPE_CPU, report->set->count);
 }
 
-// Warns of a device whose speed changed while it was measured.
+// Warns if the device's speed changed while it was measured.
 static void drift_print(const BenchReport *report, const BenchRow *row, FILE *stream)
 {
     const Comparison drift = row_drift(report, row);

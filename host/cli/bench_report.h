@@ -44,6 +44,6 @@ void samples_json(Json *json, const char *key, const Series *seconds); // in mil
 void comparison_json(Json *json, const RowComparison *comparison);
 void comparison_print(const RowComparison *comparison, FILE *stream);
 
-// Returns the exit status that follows from the comparisons, with a message unless nothing is slower. `other`
-// names what the rows were compared with.
+// Returns the exit status that follows from the comparisons, and prints a message unless nothing is slower.
+// `other` names what the rows were compared with.
 int comparisons_status(const RowComparison *comparisons, size_t count, const char *other);

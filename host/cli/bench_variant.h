@@ -25,8 +25,8 @@ Device variant_device(const Device *device, const Variant *variant);
 // Prepares the runs: counts the rays and, if requested, times the builds. If the device does not support the
 // variant, sets the row's failure.
 void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_builds);
-// Runs the variant once and adds its times to `times`, which is NULL for a warm-up. Returns false if the
-// render failed or the user interrupted.
+// Runs the variant once and adds its times to `times`, or discards them if it is NULL, for warm-ups. Returns
+// false if the render failed or the user interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
 // Renders frames for a second or more, from about one step of the counter to another, and stores the mean
 // energy of one in the row: idle readings are about a 21st of the time, and each end is off by at most the

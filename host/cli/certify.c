@@ -225,8 +225,8 @@ static Json *certify_json(const Certification *certification)
 }
 
 // Renders at one precision and compares. Returns EXIT_DONE or the exit status of the failure. If the
-// precision does not fit the device or the scene and the user named it, that is the user's mistake, with a
-// message. Otherwise its row has the reason.
+// precision does not fit the device or the scene, prints an error if the user named it, and otherwise stores
+// the reason in its row.
 static int precision_compare(Certification *certification, RenderSettings settings, Precision precision)
 {
     settings.precision = precision;
@@ -272,7 +272,7 @@ static int decided_check(const CertifyErrors *certified)
     return EXIT_CHECK;
 }
 
-// Returns what the scene has that the exact reference does not compute, or NULL.
+// Returns the name of a feature of the scene that the exact reference does not compute, or NULL.
 static const char *reference_lacks(const Scene *scene)
 {
     enum { OBJECTS_MAX = 1 << 26 }; // of 168 bytes each

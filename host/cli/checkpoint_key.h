@@ -5,6 +5,6 @@
 #include "host/cli/ranks.h"
 
 // Appends the key of an image. The renderers must be open, with settings.hashes_scene. At `strict` any device
-// may resume the render, at other precisions only devices of the same makes. `ranks` may be NULL.
+// may resume the render; at other precisions only devices of the same models may. `ranks` may be NULL.
 void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,
                     size_t count, const Ranks *ranks);

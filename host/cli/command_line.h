@@ -1,4 +1,4 @@
-// Reads the options of a command by tables, and prints its help from them.
+// Reads the options of a command from tables, and prints its help from them.
 #pragma once
 
 #include "host/base/array.h"
@@ -15,7 +15,7 @@ typedef bool OptionReader(const Option *option, const char *value, void *options
 
 struct Option {
     const char *name;
-    const char *argument; // as the help names it, [=STYLE] if it can be left out; NULL for a flag
+    const char *argument; // as the help names it, [=STYLE] if it is optional; NULL for a flag
     const char *help;     // wrapped where it is printed; a line break starts an item of a list
     OptionReader *read;
     size_t offset; // of the field, within the struct that the reader gets
@@ -31,7 +31,7 @@ struct Option {
 #define NUMBERS_ABOVE(bound, most) NUMBERS(bound, most), .is_above = true
 #define NAMES(array)               .names = (array), .name_count = COUNT_OF(array)
 
-// A table of options, and where in the command's struct the struct with their fields is.
+// A table of options and the place, in the command's struct, of the struct with their fields.
 typedef struct {
     const Option *items;
     size_t count, offset;
@@ -55,11 +55,11 @@ typedef struct {
     OptionGroup groups[OPTION_GROUPS_MAX];
 } CommandLine;
 
-// The result of reading a command line if the command is to run. Any other result is the exit status.
+// The result of reading a command line if the command must run. Any other result is the exit status.
 enum { OPTIONS_READ = -1 };
 
-// Reads the options into the struct. The arguments that are none follow from getopt's `optind` on. Returns
-// OPTIONS_READ, or the exit status once the help or a message is printed.
+// Reads the options into the struct. Other arguments start at getopt's `optind`. Returns OPTIONS_READ, or
+// the exit status after printing the help or a message.
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments);
 
 // Readers. The types are those of their fields.
@@ -71,11 +71,11 @@ OptionReader option_size;       // uint32_t[2], of WxH
 OptionReader option_choice;     // an enum: the index of the name
 OptionReader option_set;        // unsigned: one bit for each name, with commas between
 OptionReader option_folder;     // const char *: creates the folder, which must be writable
-OptionReader option_new_folder; // the same, and the folder must be empty
+OptionReader option_new_folder; // const char *: creates the folder, which must be writable and empty
 
 // Returns the field of the option.
 void *option_field(const Option *option, void *options);
-// Reads values with commas between, at most `most` of them, each into the next `item_size` bytes of `items`.
+// Reads at most `most` values, separated by commas, each into the next `item_size` bytes of `items`.
 bool option_list(const Option *option, const char *value, OptionReader *read, void *items, size_t item_size,
                  size_t most, size_t *count);
 // Reads decimal digits only. *end receives the position after them. Returns false if there are none.

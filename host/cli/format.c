@@ -133,8 +133,7 @@ static size_t column_count(const ResultTable *table)
     return count;
 }
 
-// Appends the row's name, which is its first columns, of those that have a value, with `between` between
-// them.
+// Appends the row's name, which consists of its first columns that have a value, separated by `between`.
 static void name_append(Text *text, const ReportRow *row, const ResultTable *table, const char *between)
 {
     for (size_t i = 0; i < table->name_count; i++) {
@@ -161,7 +160,7 @@ static RowOutcome row_outcome(const ReportRow *row, const ResultTable *table)
     return outcome;
 }
 
-// Appends text with the characters that a format reserves replaced; `replace` returns NULL for all others.
+// Appends text, replacing the characters that a format reserves. `replace` returns NULL for all others.
 static void escaped_append(Text *text, const char *from, const char *(*replace)(char character))
 {
     for (; *from; from++) {

@@ -1,5 +1,5 @@
-// Writes a report in formats for other programs, which are all made from its JSON. The text is what a command
-// prints by default.
+// Writes a report in formats for other programs, which are all made from its JSON. By default a command
+// prints text.
 #pragma once
 
 #include "host/base/json.h"

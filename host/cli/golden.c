@@ -52,7 +52,7 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     const char *file;
-    uint32_t size[2], samples, bounces; // not given: 0, bounces UINT32_MAX
+    uint32_t size[2], samples, bounces; // 0 if not given, except bounces, which are then UINT32_MAX
     bool writes;
 } GoldenOptions;
 
@@ -143,7 +143,7 @@ static const char *hex_read(const char *at, size_t digits, uint64_t *value)
     return at;
 }
 
-// Reads " NAME=" and 16 digits. Returns NULL if they are not there.
+// Reads " NAME=" and 16 digits. Returns the position after them, or NULL if they are missing.
 static const char *hash_read(const char *at, const char *name, uint64_t *hash)
 {
     const size_t length = strlen(name);
@@ -151,7 +151,7 @@ static const char *hash_read(const char *at, const char *name, uint64_t *hash)
     return hex_read(at + 2 + length, 16, hash);
 }
 
-// Reads a prefix and a number of up to nine digits. Returns NULL if they are not there.
+// Reads a prefix and a number of up to nine digits. Returns the position after them, or NULL if absent.
 static const char *count_read(const char *at, const char *prefix, uint32_t *value)
 {
     const size_t length = strlen(prefix);
@@ -261,7 +261,7 @@ static char *crop_write(const Film *film, const Finding *finding)
     const uint32_t width = finding->right - finding->left, height = finding->bottom - finding->top;
     char *path = text_format("%s-golden.png", finding->scene + strspn(finding->scene, "./"));
     for (char *at = path; *at; at++)
-        if (*at == '/') *at = '-'; // scenes of one name lie in several folders
+        if (*at == '/') *at = '-'; // scenes in several folders may have the same name
     float *pixels = memory_allocate(memory_product(3 * (size_t)width, height), sizeof *pixels);
     for (size_t i = 0; i < 3 * (size_t)width * height; i++) {
         const size_t y = finding->top + i / (3 * (size_t)width), in_row = i % (3 * (size_t)width);

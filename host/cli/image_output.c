@@ -123,7 +123,7 @@ bool image_output_holds_floats(ImageFormat format)
     return format == IMAGE_EXR || format == IMAGE_NPY;
 }
 
-// At `certified`, EXR's notes, which precede its pixels, report all of them.
+// Returns whether all bands must be kept, because EXR's notes precede its pixels and report all counts.
 static bool keeps_bands(const ImageOutput *output)
 {
     return output->settings->precision == PRECISION_CERTIFIED && is_exr(output);
@@ -345,8 +345,8 @@ static const void *layer_narrowed(ImageOutput *output, const Film *band, Layer l
     return narrow;
 }
 
-// Returns the colors of objects alone: in PNG those of the part of the pixel that they cover, in EXR times
-// that part.
+// Returns the colors without the background. In PNG they are those of the covered part of the pixel, in EXR
+// they are multiplied by that part.
 static const float *colors_without_background(ImageOutput *output, const Film *band)
 {
     const size_t count = film_pixel_count(band);

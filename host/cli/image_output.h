@@ -10,7 +10,7 @@ extern const char *const tone_names[TONE_COUNT];
 
 typedef struct ImageOutput ImageOutput;
 
-// Returns whether the format holds linear floats, which are not for display.
+// Returns whether the format holds linear floats, not display values.
 bool image_output_holds_floats(ImageFormat format);
 
 // Opens the output. Its files are opened with the first band, and their notes name the devices of all

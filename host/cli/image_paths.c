@@ -35,7 +35,7 @@ char *image_output_aov_path(const ImageOutputOptions *options, const char *name)
     return text_format("%.*s.%s.npy", (int)(dot - options->path), options->path, name);
 }
 
-// Calls `is_so` for each file of the image until it returns false. Returns whether it never did.
+// Returns whether `is_so` is true for every file of the image. Stops at the first that it is not true for.
 static bool files_all(const ImageOutputOptions *options, bool (*is_so)(const char *path, void *context),
                       void *context)
 {

@@ -255,8 +255,8 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
     return true;
 }
 
-// Computes that only the process's end releases, listed so that LeakSanitizer can see that nothing else was
-// leaked.
+// Computes that are released only when the process ends. They are listed so that LeakSanitizer does not
+// report them as leaks.
 static struct {
     Compute *items;
     size_t count, capacity;

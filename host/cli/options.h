@@ -107,8 +107,8 @@ bool device_open(OpenDevice *open, const CommonOptions *common);
 // chose one.
 bool reference_open(Compute *compute, const DeviceList *devices, const char *selector);
 // Closes the device at the end of a command. Returns EXIT_MACHINE with a message if the device failed, else
-// `status`. Unless the command failed or was interrupted, the context is left to the process's end, since
-// PoCL takes 80 ms to free its compiler.
+// `status`. Unless the command failed or was interrupted, the context lives until the process ends, since
+// PoCL needs 80 ms to free its compiler.
 int device_close(OpenDevice *open, int status);
 
 // The devices that render one image.
@@ -119,7 +119,7 @@ typedef struct {
         bool is_dropped; // it failed, and the other devices did its work
     } * items;
     size_t count;
-    bool are_all; // chosen by "all", so that those that do not suit a render can be left out
+    bool are_all; // chosen by "all", so devices that do not suit a render are omitted
 } OpenDevices;
 
 // Opens every device that the selector lists, or all devices for "all". Returns false with a message if there
@@ -134,7 +134,7 @@ bool devices_apply_options(OpenDevices *open, const CommonOptions *common);
 bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages);
 // Closes all devices without reporting failures.
 void devices_abandon(OpenDevices *open);
-// Warns that the device failed and that the others do its work.
+// Warns that the device failed and that the others render its share.
 void devices_drop(OpenDevices *open, size_t index);
 // Closes a device that no renderer uses. Later devices move up.
 void devices_remove(OpenDevices *open, size_t index);

@@ -1,4 +1,4 @@
-// Composes self-contained HTML reports from templates, into which a report's JSON is embedded. The page's
+// Composes self-contained HTML reports from templates in which a report's JSON is embedded. The page's
 // scripts draw it.
 #pragma once
 

@@ -12,8 +12,8 @@
 
 static volatile sig_atomic_t interrupted, is_flag_read, is_held;
 
-// Two signals often arrive together, one for the process and one for its group. A third means that the user
-// insists.
+// Two signals often arrive together, one for the process and one for its group. Only a third is a second
+// request of the user.
 static void interrupt_record(int signal_number)
 {
     if (!is_flag_read && !is_held) {

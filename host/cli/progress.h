@@ -13,7 +13,7 @@ typedef struct {
 // Makes SIGINT, SIGTERM and SIGHUP end the process with EXIT_INTERRUPTED, except for signals that the parent
 // ignores, as nohup and a shell's background jobs do. Must be called first.
 void progress_catch_signals(void);
-// Opens the progress. From here on the signals set a flag, and the third signal ends the process.
+// Opens the progress. Afterwards the signals set a flag, and the third signal ends the process.
 void progress_open(Progress *progress, bool quiet);
 // Returns the remaining time, extrapolated from the fraction that is done (above 0, at most 1), or a negative
 // number if it is not known yet. The first second does not count, since it may contain a kernel's build or a
@@ -23,15 +23,15 @@ void progress_show(Progress *progress, double fraction_done);
 // Shows the progress with the name of the next step, such as "building row 2 of 8".
 void progress_step(Progress *progress, double fraction_done, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// From here on the signals set a flag until they are released, even if progress_end_at_once is called.
+// Makes the signals set a flag until they are released, even if progress_end_at_once is called.
 void progress_hold_signals(void);
 void progress_release_signals(void);
-// From here on signals end the process at once, until progress_open.
+// Makes signals end the process at once, until progress_open is called.
 void progress_end_at_once(void);
 // Erases the line. Signals still only set the flag.
 void progress_close(Progress *progress);
 bool progress_interrupted(void);
-// Returns progress_interrupted(). It is a renderer's `stop`, whose context it ignores.
+// Returns progress_interrupted(). A renderer's `stop` function, which ignores its context.
 bool progress_stops(void *context);
-// From here on progress_interrupted also calls `ask` and returns true if that does.
+// Makes progress_interrupted call `ask` in addition, and return true if it does.
 void progress_ask(bool (*ask)(void));

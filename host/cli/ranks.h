@@ -1,4 +1,4 @@
-// Other machines that render bands of the same image, as processes of one MPI job. Implemented by host/mpi.
+// Other machines that render bands of the same image as processes of one MPI job. host/mpi implements them.
 #pragma once
 
 #include "host/render/renderer.h"
@@ -30,7 +30,7 @@ typedef struct Ranks {
     bool (*begin)(struct Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);
     SceneReceivers receivers; // send them the compiled scene
-    // Starts serving the ranks or, unless they `can_start`, ends their job.
+    // Starts serving the ranks if they `can_start`, else ends their job.
     void (*start)(bool can_start);
     // Hands out rows until the image is complete or the render has ended; the `serve` of RemoteWorkers.
     void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker);

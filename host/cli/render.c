@@ -12,7 +12,7 @@
 #include <string.h>
 #include <unistd.h>
 
-// Returns the pattern with the frame's number in its place, if it has one. The caller frees it.
+// Returns the pattern with its directive, if any, replaced by the frame's number. The caller frees it.
 static char *frame_name_make(const char *pattern, uint32_t frame)
 {
     const FramePlace place = frame_place_of(pattern);
@@ -46,7 +46,7 @@ static char *path_make(const RenderOptions *options, const char *scene)
     return path;
 }
 
-// False with a message.
+// Returns whether all images have different paths, and prints an error if not.
 static bool paths_differ(char *const *paths, const RenderOptions *options)
 {
     if (options->has_format) return true; // all go to standard output

@@ -33,7 +33,7 @@ void render_command_record(RenderCommand *command, int status);
 // command's last call before the ones below.
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks);
 
-// Warns of each device that failed and whose work the others did, which is not a failure of the command.
+// Warns of each failed device whose share the others rendered, which is not a failure of the command.
 void render_command_drop_devices(RenderCommand *command);
 // Returns the command's exit status.
 int render_command_close(RenderCommand *command);

@@ -21,7 +21,7 @@ bool render_devices_open(RenderDevices *open, const CommonOptions *common)
     return open->is_open;
 }
 
-// Prints why devices do not suit the render, and that the others do their work.
+// Prints why devices cannot render the image, and that the others render their share.
 static void unfit_print(MessageList *unfit)
 {
     for (size_t i = 0; i < unfit->count; i++)

@@ -15,8 +15,8 @@ typedef struct {
     bool is_unfit; // whether the last image's settings or scene did not fit a device
 } RenderDevices;
 
-// Opens the devices that the options select and applies --work-group and --build-options. Returns true if
-// they are already open; false with a message if there is none or one does not allow the work-group.
+// Opens the devices that the options select and applies --work-group and --build-options, unless they are
+// open. Returns false with a message if there is none or one does not allow the work-group.
 bool render_devices_open(RenderDevices *open, const CommonOptions *common);
 // Opens the renderers of the devices and of the ranks with another scene. If others are left, removes the
 // devices that failed and, with --device all, those that the scene or settings do not fit. Returns false with
@@ -25,7 +25,7 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
                           const Ranks *ranks, MessageList *messages);
 // Frees an image's scene, and removes the devices that failed while others are left.
 void render_devices_rest(RenderDevices *open);
-// Returns false if the last device failed.
+// Returns whether every device that was not dropped works.
 bool render_devices_work(const RenderDevices *open);
 // Closes the devices. Returns EXIT_MACHINE with a message if a device failed that was not dropped, else
 // `status`.

@@ -63,7 +63,7 @@ static bool band_receive(void *context, const Film *band, double fraction_done)
 static void device_drop(void *context, size_t index)
 {
     OpenDevices *devices = &((ImageRender *)context)->open->devices;
-    if (index < devices->count) devices_drop(devices, index); // otherwise a rank, which printed the reason
+    if (index < devices->count) devices_drop(devices, index); // else a rank, which has printed the reason
 }
 
 // Opens the checkpoint. Returns true if none is requested, and false with messages if it cannot be opened.
@@ -81,7 +81,7 @@ static bool checkpoint_start(ImageRender *render)
     return render->checkpoint != NULL;
 }
 
-// Prints what is left of a render that ended early.
+// Prints what an interrupted or failed render has left.
 static void rest_print(const RenderOptions *options)
 {
     if (progress_interrupted() && options->has_format)
@@ -94,7 +94,7 @@ static void rest_print(const RenderOptions *options)
                 options->checkpoint);
 }
 
-// Adds what a whole image, or one of its times, warns of.
+// Adds the warnings of a complete image, or of one of its times.
 static void warnings_add(ImageRender *render)
 {
     const OpenDevices *devices = &render->open->devices;
@@ -114,7 +114,7 @@ static void warnings_add(ImageRender *render)
     }
 }
 
-// Writes the files of an image that is whole, or abandons them.
+// Writes the files of a complete image, or abandons them.
 static bool files_write(ImageRender *render, bool is_whole)
 {
     HostTimes *times = render->times;
@@ -235,7 +235,7 @@ static int time_render(ImageRender *render)
     return status;
 }
 
-// Rejects options that need one time. Returns false with a message.
+// Returns false with a message if an option does not work with the shutter's several times.
 static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
 {
     const char *const obstacle = shutter->time_count == 1    ? NULL
@@ -256,7 +256,7 @@ static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
     return !obstacle;
 }
 
-// Replaces the scene by that of the shutter's time.
+// Replaces the scene with that of the shutter's time.
 static bool scene_advance(ImageRender *render)
 {
     const double start = clock_seconds();

@@ -23,7 +23,7 @@ static bool region_read(const Option *option, const char *value, void *options)
     return option_fault(option, value, "X,Y,WIDTH,HEIGHT in pixels from the top left");
 }
 
-// Reads a frame's number and moves behind it.
+// Reads a frame's number and advances past it.
 static bool frame_read(const char **at, uint32_t *frame)
 {
     uint64_t number;
@@ -95,7 +95,7 @@ static bool is_to_stdout(const ImageOutputOptions *output)
     return output->path && image_output_is_stdout(output->path);
 }
 
-// Rejects options that standard output cannot have, or --format without it. Returns false with a message.
+// Returns false with a message if options do not suit standard output, or if --format is given without it.
 static bool stdout_fits(const RenderOptions *options)
 {
     const bool is_stdout = is_to_stdout(&options->output);
@@ -115,7 +115,7 @@ static bool stdout_fits(const RenderOptions *options)
     return false;
 }
 
-// Rejects options of display values that the image does not have. Returns false with a message.
+// Returns false with a message if an option does not suit the image's format.
 static bool display_fits(const ImageOutputOptions *output)
 {
     const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
@@ -140,7 +140,7 @@ bool output_is_folder(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-// Rejects options that suit one image alone. Returns false with a message.
+// Returns false with a message if an option works only with a single image and there are several.
 static bool several_fit(const RenderOptions *options)
 {
     const char *const path = is_to_stdout(&options->output) ? NULL : options->output.path;

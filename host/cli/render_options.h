@@ -9,7 +9,7 @@ typedef struct {
     CommonOptions common;
     char **scenes;
     size_t scene_count;
-    const char *scene;         // the one that is rendered
+    const char *scene;         // the current scene
     const char *checkpoint;    // with several frames, their pattern
     ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
     uint32_t size[2];          // 0 if not given
@@ -26,7 +26,7 @@ typedef struct {
 // Returns OPTIONS_READ, or the exit status if help was requested or a usage fault was printed.
 int render_options_read(RenderOptions *options, int argument_count, char **arguments);
 
-// Where a pattern of names has the frame's number: the directive %d, or %0Nd for at least N digits.
+// The place of the frame's number in a pattern of names, %d, or %0Nd for at least N digits.
 typedef struct {
     const char *start, *end; // of the directive; NULL if there is none
     int digits;

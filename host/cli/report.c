@@ -100,7 +100,7 @@ typedef struct {
     char *failure; // NULL if the step has succeeded
 } StepResult;
 
-// What the files of the archive are, by their names or, below kernels/, by their endings.
+// The meanings of the archive's files, by their names or, below kernels/, by their endings.
 static const struct {
     const char *name, *meaning;
 } meanings[] = {
@@ -177,8 +177,8 @@ static char *folder_create(void)
     return NULL;
 }
 
-// Gives the steps empty kernel caches, so that every kernel is built and has a log, and their temporary files
-// the folder.
+// Places the steps' temporary files and kernel caches in the folder. The caches are empty, so every kernel
+// is built and has a log.
 static void variables_set(const char *folder)
 {
     static const char *const variables[] = {"XDG_CACHE_HOME", "POCL_CACHE_DIR", "TMPDIR"};
@@ -279,7 +279,7 @@ static void file_add(Archive *archive, const char *name, const Text *contents)
     archive->count++;
 }
 
-// Adds a file of the folder unless it is empty or does not exist. Kernels are glint's text and have no names.
+// Adds a file of the folder unless it is empty or missing. Kernels have only glint's text; they are kept.
 static void folder_file_add(Archive *archive, const char *folder, const char *name, const Scrubber *scrubber)
 {
     char *path = text_format("%s/%s", folder, name);

@@ -40,8 +40,8 @@ void scrubber_close(Scrubber *scrubber)
     *scrubber = (Scrubber){0};
 }
 
-// Returns whether a character belongs to a word. Such a "+" keeps the "debian" of the version 3.1+debian,
-// since that is also a common host name.
+// Returns whether a character belongs to a word. "+" does, so that the version 3.1+debian keeps its
+// "debian", which is also a common host name.
 static bool is_of_word(char character)
 {
     return isalnum((unsigned char)character) || strchr("_+-", character);
@@ -52,8 +52,8 @@ static bool is_of_path(char character)
     return isalnum((unsigned char)character) || strchr("_+-.~@%/", character);
 }
 
-// Returns whether a path may begin at a byte: after what is not of a path, after the n of an escaped newline,
-// or after an option's letter, as in -I/usr/include.
+// Returns whether a path may begin at a byte. It does after a character that paths lack, after the n of an
+// escaped newline, or after an option's letter, as in -I/usr/include.
 static bool path_may_begin(const Text *text, size_t at)
 {
     if (at == 0) return true;

@@ -1,12 +1,12 @@
-// Removes from text what would tell who wrote a bug report and where: folders, and the names of user and
-// host.
+// Removes text that would identify the author and machine of a bug report: folders, and the names of user
+// and host.
 #pragma once
 
 #include "host/base/text.h"
 
 enum { SCRUB_WORDS_MAX = 8 };
 
-// The words that are replaced. A path is replaced wherever it stands, a name only as a whole word.
+// The words to replace. A path is replaced wherever it occurs, a name only as a whole word.
 typedef struct {
     struct {
         char *word;

@@ -38,7 +38,7 @@ static void libraries_append(Text *text)
     free(assimp);
 }
 
-// Appends the name of the system's release, as os-release(5) gives it.
+// Appends the name of the system's release from os-release(5).
 static void release_append(Text *text)
 {
     Text file = {0};

@@ -1,8 +1,8 @@
-// versions.txt of glint report.
+// Composes versions.txt of glint report.
 #pragma once
 
 #include "host/cli/report_scrub.h"
 
 // Returns the versions of glint, of its libraries and of the system, and the variables that OpenCL reads, a
-// line each. The caller frees it.
+// line each. The caller frees the text.
 Text report_versions(const Scrubber *scrubber);

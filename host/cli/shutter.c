@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// Each time leaves an edge behind what moves; with 256 times its contrast is 1/256.
+// Each time leaves an edge along moving objects, whose contrast is 1/256 with 256 times.
 enum { TIMES_MAX = 256 };
 
 Shutter shutter_open(const Scene *scene, uint32_t sample_count)

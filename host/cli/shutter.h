@@ -17,7 +17,7 @@ typedef struct {
     bool is_estimated;         // whether the render's time was estimated
 } Shutter;
 
-// Begins with the first time. The scene is that of the frame.
+// Opens the shutter at its first time. `scene` is that of the frame.
 Shutter shutter_open(const Scene *scene, uint32_t sample_count);
 void shutter_close(Shutter *shutter);
 

@@ -55,8 +55,8 @@ static bool key_equal_but_lanes(const BenchKey *a, const BenchKey *b)
     return bench_key_equal(a, &other);
 }
 
-// Returns whether lanes distinguish rows that have this key otherwise: a report has several of them. Else
-// each has the lanes that suit its device.
+// Returns whether a report has several rows with this key that differ only in lanes. Otherwise rows have the
+// lanes that suit their devices, and lanes are ignored.
 static bool lanes_matter(const SideBySide *side, const BenchKey *key)
 {
     for (size_t i = 0; i < side->report_count; i++) {
@@ -77,7 +77,7 @@ const SideCell *side_first(const SideBySide *side, size_t row)
     return cell;
 }
 
-// Puts a report's row next to those of the reports before that have its key, or after all rows.
+// Places a report's row next to earlier reports' rows with its key, or after all rows.
 static void row_place(SideBySide *side, size_t report, const BaselineRow *row)
 {
     const bool needs_lanes = lanes_matter(side, &row->key);

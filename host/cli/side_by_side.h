@@ -1,4 +1,4 @@
-// Compares reports of glint bench row by row: of several devices, versions or days.
+// Compares reports of glint bench, from several devices, versions or days, row by row.
 #pragma once
 
 #include "host/base/json.h"
@@ -11,7 +11,7 @@ enum { SIDE_REPORTS_MAX = 26, SIDE_COLUMNS = 8 }; // a report is named by a lett
 typedef struct {
     const char *path;
     Baseline *baseline;
-    const char *why_not;                 // why none of its rows gets a verdict, or NULL
+    const char *why_not;                 // why none of its rows has a verdict, or NULL
     double mean_ratio;                   // geometric, of frame times
     size_t ratio_count;                  // of rows that both have
     size_t verdicts[VERDICT_FASTER + 1]; // rows by verdict
@@ -48,7 +48,7 @@ static inline SideCell *side_cell(const SideBySide *side, size_t row, size_t rep
 {
     return &side->cells[row * side->report_count + report];
 }
-// Appends what a column of a row's name has, the columns being the first of bench_table.
+// Appends the value of a column of a row's name. These columns are the first of bench_table.
 void side_column_append(Text *text, const BenchKey *key, size_t column);
 
 void side_by_side_print(const SideBySide *side, FILE *stream);

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 
-// Perfetto takes the thread that has the number of its process, and thread 0, for the main one.
+// Perfetto treats the thread with its process's number, and thread 0, as the main thread.
 enum { PROCESS = 1, HOST_THREAD = PROCESS, THREADS_OF_DEVICE = 4 };
 
 static void event_begin(Json *json, const char *phase, const char *name, size_t thread)
@@ -27,7 +27,7 @@ static void thread_name(Json *json, size_t thread, const char *name)
     json_end(json);
 }
 
-// The caller adds the event's "args" and ends it.
+// Begins a complete event. The caller adds its "args" and ends it.
 static void span_begin(Json *json, const char *name, size_t thread, double start_seconds, double seconds)
 {
     event_begin(json, "X", name, thread);
@@ -40,13 +40,13 @@ static double host_end(const LaunchTime *time)
     return time->host_start_seconds + time->host_seconds;
 }
 
-// The commands of a device, by both of its reports' lists.
+// The commands of a device, from both lists of its report.
 typedef struct {
     const NamedLaunch *lists[2];
     size_t counts[2];
     const Device *device;
-    // What to add to the device's clock to get the host's: the host learns of a command's end no earlier than
-    // it ends, so that the least difference is the best.
+    // Added to the device's clock, this gives the host's. The host never observes a command's end before it
+    // happens, so the smallest difference is the best estimate.
     double device_to_host;
 } Commands;
 
@@ -65,7 +65,7 @@ static Commands commands_of(const RenderReport *report, const Device *device)
     return commands;
 }
 
-// Adds a command: by the device's clock where that is trusted, else from the call to the end of the wait.
+// Adds a command, timed by the device's clock if it is trusted, else from the call to the end of the wait.
 static void command_add(Json *json, const Commands *commands, const NamedLaunch *command, size_t thread,
                         double origin)
 {

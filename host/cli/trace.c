@@ -46,7 +46,7 @@ typedef struct {
     size_t count, capacity;
 } RayList;
 
-// Reads up to eight numbers of a line; returns their count, or -1 if a word is not a number.
+// Reads up to eight numbers of a line. Returns their count, or -1 if a word is not a number.
 static int line_numbers(Report *report, size_t start, size_t end, double numbers[8])
 {
     const Source *source = report->source;
@@ -99,7 +99,7 @@ static bool rays_read(RayList *rays, const Source *source, const CommonOptions *
     return report_close(&report);
 }
 
-// Returns whether the text starts as files of NumPy's format, version 1.0, do.
+// Returns whether the text starts with the magic string of NumPy's format, version 1.0.
 static bool is_npy(const Text *text)
 {
     return text->count >= 6 && memcmp(text->items, "\x93NUMPY", 6) == 0;

@@ -24,11 +24,11 @@ typedef struct {
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
 
 // Their fields are in VariantOptions.
-extern const Option variant_choice_options[4]; // what --variant takes, too, as it takes --precision
-extern const Option variant_set_options[2];    // what all rows share
+extern const Option variant_choice_options[4]; // --variant accepts these, in addition to --precision
+extern const Option variant_set_options[2];    // shared by all rows
 enum { SECONDS_MAX = 1000000000 };
 
-// The groups of a command with VariantOptions, after its own.
+// The groups of options of a command with VariantOptions, which follow the command's other groups.
 #define VARIANT_GROUPS(Type, variants)                                                                       \
     OPTIONS_WITHIN(variant_choice_options, Type, variants),                                                  \
         OPTIONS_WITHIN(variant_set_options, Type, variants),                                                 \
@@ -57,8 +57,8 @@ bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t cho
 // Returns the variants of one scene as a set that shares them, for variant_set_measure. It must not be
 // closed.
 VariantSet variant_set_part(const VariantSet *set, size_t first, size_t count);
-// Sets the rows' lanes to those that the device renders with. If fewer lanes than requested make a row equal
-// to an earlier one, the row keeps the requested lanes and is not available.
+// Sets the rows' lanes to those that the device uses. If it uses fewer than requested and the row equals an
+// earlier one, the row keeps the requested lanes and is not available.
 void variant_set_fit_lanes(VariantSet *set, const Device *device);
 // Opens each available variant and warms it up. `progress` may be NULL. Returns false if the user interrupted
 // or the device failed.

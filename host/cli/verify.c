@@ -322,7 +322,7 @@ static Json *journal_json(const Verification *verification)
     return json;
 }
 
-// Prints why the arithmetic of the device does not suit a precision.
+// Prints why the device's arithmetic is unsuitable for a precision.
 static bool arithmetic_is_suitable(Compute *compute, const VerifyOptions *options, Precision precision)
 {
     const RenderSettings settings = precision_settings(options, precision);
@@ -391,7 +391,7 @@ static bool result_discard(void *context, const VerifyResult *result)
     return true;
 }
 
-// Starts a process that builds the kernels of `strict` and `double` into the cache while `single` is
+// Starts a process that adds the kernels of `strict` and `double` to the cache while `single` is
 // verified, by running a case that needs all of them. It ends with this process. No OpenCL call may have been
 // made before.
 static void builder_start(const VerifyOptions *options)

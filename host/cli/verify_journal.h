@@ -31,7 +31,7 @@ typedef struct {
     PrecisionRecord precisions[ARITHMETIC_COUNT];
 } VerifyJournal;
 
-// Lets this process, a child of `parent`, end with it.
+// Makes this process, a child of `parent`, end when that does.
 void child_end_with(pid_t parent);
 
 // Returns a zeroed journal, which lives until the process ends.

@@ -1,5 +1,5 @@
-// glint view starts the window, which is a separate program, so that no other command loads its libraries.
-// Loading them took a tenth of the processor time of a small render.
+// glint view starts the window, which is a separate program, so that other commands do not load its
+// libraries. Loading them took a tenth of the processor time of a small render.
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"

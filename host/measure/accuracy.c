@@ -91,7 +91,7 @@ typedef struct {
     const Film *reference, *variant;
     const AccuracyEdges *edges;
     AccuracyErrors *errors;
-    // Values of the pixels that are compared further:
+    // Values of the pixels that hit the reference's object:
     double *expected, *found; // the colors of the shaded ones
     float *t_relative, *t_ulps, *normal;
 } FilmComparison;

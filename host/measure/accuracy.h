@@ -1,5 +1,5 @@
-// Measures how far an image is from a reference, split by cause: another object, another shadow, another
-// path, or different numbers where these three agree. Works on plain arrays; docs/accuracy.md defines every
+// Measures the differences of an image from a reference by cause: another object, another shadow, another
+// path, or different numbers where these three agree. Works on plain arrays. docs/accuracy.md defines every
 // figure.
 #pragma once
 
@@ -69,10 +69,10 @@ typedef struct {
     const char *why_colors_only;
     size_t nonfinite, negative;     // pixels
     EdgeCount object, shadow, path; // shadows and paths are compared where the object equals the reference's
-    // Where object, shadows and path equal the reference's and a surface was hit.
+    // Pixels that hit a surface and whose object, shadows and path equal the reference's.
     size_t shading_pixels;
     ErrorSummary shading;
-    // Where the object equals the reference's and the ray hit one.
+    // Pixels that hit an object, which equals the reference's.
     size_t surface_pixels;
     ErrorExtremes t_relative, t_ulps, normal;
     ErrorSummary image;                          // over all pixels
@@ -109,7 +109,7 @@ typedef struct {
     AccuracyErrors errors;
     float *image;          // linear, 3 values per pixel; NULL if unavailable
     unsigned disqualified; // the set of DISQUALIFIED_… for which its speed does not count
-    unsigned pareto;       // the set of 1 << AccuracyMeasure in which no other is as good in less median time
+    unsigned pareto; // the set of 1 << AccuracyMeasure for which no other is as good in less median time
 } AccuracyVariant;
 
 // An error that a user allows, and the fastest variant that stays within it.

@@ -10,7 +10,7 @@
 
 const double baseline_tolerance = 1.1;
 
-// What glint report writes instead of the name of a host.
+// The text that glint report writes instead of the host's name.
 static const char scrubbed_host[] = "HOST";
 
 // Returns a text, or "" if the value is not a text.

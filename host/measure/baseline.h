@@ -24,7 +24,7 @@ typedef struct {
     BaselineRow *items;
     size_t count, capacity;
     Calibration calibration;
-    // Where the report is from, each "" if it is unknown.
+    // The report's origin. Each text is "" if it is unknown.
     const char *date, *version, *commit, *host;
     const char *device, *device_type, *board, *platform, *driver;
     bool is_calibrated;  // by this program's workload

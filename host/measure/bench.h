@@ -19,7 +19,7 @@ typedef struct {
     Series frame;               // seconds from a run's first enqueue until the host has read its last band
     Series processor;           // seconds of all processors that this process used during the run
     Series event, host;         // seconds of a run's launches, by their events and by the host's clock
-    const char *clock_fault;    // why the events' times cannot be trusted, as some launch showed, or NULL
+    const char *clock_fault;    // why some launch shows that the events' times are unreliable, or NULL
     double run_event, run_host; // sums over the current run
     // Extremes over the launches so far of the device's clock minus the host's, if the device's ran 1 %
     // faster or slower.
@@ -41,14 +41,14 @@ Summary bench_kernel(const BenchTimes *times);
 // small.
 bool bench_converged(const BenchTimes *times, size_t enough);
 
-// Compares the last runs with the first (comparison_of_ends), by the processor time of a CPU device, else by
-// the launches' time: a device that is throttled becomes slower.
+// Compares the last runs with the first (comparison_of_ends), which detects throttled devices. Uses the
+// processor time of a CPU device, else the launches' time.
 Comparison bench_drift(const BenchTimes *times, bool is_cpu, size_t row_count);
 
 // The energy of a row's frames, rendered one after another.
 typedef struct {
     const char *source;     // what measured it; NULL if it was not measured
-    const char *why_not;    // the reason for that
+    const char *why_not;    // why it was not measured
     double joules, seconds; // of one frame
 } BenchEnergy;
 

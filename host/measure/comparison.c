@@ -172,7 +172,7 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
         const double exponent = i * exponent_max;
         Series new_blocks = ratio_blocks(new_times.frame, new_times.calibration, exponent),
                old_blocks = ratio_blocks(old_times.frame, old_times.calibration, exponent);
-        // one of the exponents between is right, and the error is shared by two medians
+        // the right exponent lies between these two, and the error is shared by two medians
         RatioInterval new_median = blocks_interval(&new_blocks, row_error(row_count) / 2),
                       old_median = blocks_interval(&old_blocks, row_error(row_count) / 2);
         covering.low = fmin(covering.low, new_median.low - old_median.high);

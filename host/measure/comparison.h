@@ -50,8 +50,8 @@ typedef struct {
 } ReportTimes;
 
 // Compares reports that were not measured together. A claim must hold whether or not the frame's time follows
-// the machine's speed, which the calibration measures, and even if it follows twice as strongly: the interval
-// covers all of that. It is wider by an allowance for differences between two processes, which a report
+// the machine's speed, which the calibration measures, and even if it follows twice as strongly. The
+// interval covers all of that, and an allowance for differences between two processes, which a report
 // cannot show.
 Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, size_t row_count,
                                  double tolerance);
@@ -67,8 +67,8 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
 // either fifth may remain undecided.
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance);
 
-// Returns a row's verdict from comparisons of frame times and of processor times: slower if either is, else
-// faster if processor times are, else that of the frame times, since waiting does not show in processor
-// times. But frame times alone do not make a row faster: with two processes that worked and paused next to
-// other programs, they did in 1 of 43 comparisons of a build with itself.
+// Returns a row's verdict from comparisons of frame times and of processor times. It is slower if either is,
+// else faster if processor times are, else that of the frame times, since waiting does not show in processor
+// times. Frame times alone do not make a row faster, because with two processes that worked and paused next
+// to other programs, they did in 1 of 43 comparisons of a build with itself.
 Verdict verdict_of_row(Verdict frame, Verdict processor);

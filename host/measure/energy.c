@@ -86,7 +86,7 @@ static const char *packages_add(EnergyMeter *meter)
     return meter->count > 0 ? NULL : why_not;
 }
 
-// Stores a function of the library. Returns whether there is one of this name.
+// Stores the library's function of this name. Returns false if there is none.
 static bool function_find(void *library, const char *name, void *function)
 {
     void *found = dlsym(library, name);

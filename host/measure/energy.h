@@ -9,7 +9,7 @@ typedef struct EnergyMeter EnergyMeter;
 // Opens the meter of a device. Returns NULL if there is none and sets *why_not to the reason, a constant.
 EnergyMeter *energy_open(const Device *device, const char **why_not);
 void energy_close(EnergyMeter *meter); // accepts NULL
-// Returns what measures: "NVML" for a board, "RAPL" for all processors without their memory.
+// Returns the source of the figures: "NVML" for a board, "RAPL" for all processors without their memory.
 const char *energy_source(const EnergyMeter *meter);
 // Returns the joules since the meter was opened. A counter that wraps must be read before it wraps again,
 // which takes minutes. Returns NAN once a counter could not be read or was set back.

@@ -44,6 +44,6 @@ typedef struct {
 // lower bound.
 double sample_rmse_floor(const Sampling *sampling);
 
-// Judges a sample. `reference` and `sample` must have the same pixels.
+// Classifies a sample. `reference` and `sample` must have the same pixels.
 SampleVerdict sample_classify(const ErrorBudget *budget, const Film *reference, const Film *sample,
                               const Sampling *sampling);

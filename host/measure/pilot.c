@@ -5,11 +5,10 @@
 #include <math.h>
 #include <string.h>
 
-// There are enough pixels that a wrong one in 25,000 would be noticed, and few enough to cost a small part of
-// the image.
+// Enough pixels to notice one wrong pixel in 25,000, and few enough to cost a small fraction of the image.
 enum { PIXELS_WANTED = 100000, CELL_MIN = 3, CELL_MAX = 4096 };
 static const double pilot_confidence = 0.95;
-// Times differ by this ratio from run to run, which does not justify less precision.
+// Times vary by this ratio from run to run, so such a difference does not justify less precision.
 static const double time_tolerance = 1.1;
 
 static uint32_t cell_for(const RenderSettings *settings, double pixels_wanted)
@@ -234,7 +233,7 @@ void pilot_describe(Text *text, const Pilot *pilot)
     const double percent = 100 * pilot->confidence;
     text_appendf(text, "%s: ", precision_names[pilot->chosen]);
     if (pilot->chosen == PRECISION_DOUBLE) {
-        bool is_kept = false; // by another precision, which is not faster
+        bool is_kept = false; // whether another precision keeps the budget, but is not faster
         for (unsigned i = 0; i < ARITHMETIC_COUNT; i++)
             is_kept = is_kept || (i != PRECISION_DOUBLE && pilot->candidates[i].verdict.keeps);
         text_appendf(text,

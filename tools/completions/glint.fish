@@ -13,7 +13,7 @@ function __glint_aovs
     glint render --help | string replace -rf '^ {26}(\w+): .*' '$1'
 end
 
-# Whether the word before is one of these options.
+# Returns whether the previous word is one of these options.
 function __glint_after
     contains -- (commandline -opc)[-1] $argv
 end

@@ -1,7 +1,7 @@
-// How far t is off, by shape, precision and distance: random rays through the kernels that this program was
-// built with, each compared with the quadruple-precision reference of host/verify/reference.c on the very
-// bits that the kernel gets. Prints JSON (tools/numerics/ulp-ladder makes the tables of it); with --check it
-// prints what exceeds the hard cases' bounds instead.
+// Measures the error of t by shape, precision and distance. Traces random rays with the kernels that this
+// program was built with, and compares each with the quadruple-precision reference of
+// host/verify/reference.c, which receives the same bits as the kernel. Prints JSON, of which
+// tools/numerics/ulp-ladder makes tables. With --check, prints the errors beyond the hard cases' bounds.
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
@@ -16,25 +16,25 @@
 #include <string.h>
 #include <time.h>
 
-// Distance of a ray's start from the shape's center, in radii of the shape's bounding sphere.
+// Distances from rays' origins to the shape's center, in radii of the shape's bounding sphere.
 static const double rungs[] = {1.0001, 1.01, 1.1, 2, 10, 100, 1e3, 1e4, 1e5, 1e6};
 
 enum {
     RUNG_COUNT = COUNT_OF(rungs),
-    INSTANCES = 6,  // of each shape, among which each rung's rays are divided
-    COPIES = 64,    // of a shape, to time a test
-    TIMED_RUNS = 5, // of which the shortest counts
+    INSTANCES = 6,  // per shape; each rung's rays are divided among them
+    COPIES = 64,    // copies of a shape that are added to time a test
+    TIMED_RUNS = 5, // the shortest counts
     TIMED_RAYS = 1 << 17
 };
 
 typedef struct {
-    size_t ray_count; // of each shape, over all rungs; 0: no errors are measured
+    size_t ray_count; // per shape, over all rungs; 0 if no errors are measured
     bool check, time;
-    unsigned precisions; // set
-    const char *shape;   // NULL: all
+    unsigned precisions; // a set
+    const char *shape;   // NULL for all
 } LadderOptions;
 
-// Rays of one rung towards one shape, and what they should hit.
+// Rays of one rung towards one shape, with the expected hits and the kernel's.
 typedef struct {
     TraceRay *rays;
     ReferenceHit *hits;
@@ -49,19 +49,19 @@ typedef struct {
 } Errors;
 
 typedef struct {
-    Errors steep, grazing; // at a cosine of 0.1 or more, and below
+    Errors steep, grazing; // at a cosine of 0.1 or more, and at a smaller one
     size_t compared, wrong,
-        undecided;         // hits and misses; differing beyond the band in which both are right; in it
+        undecided; // hits and misses; wrong ones outside the band in which both are right; those in it
     double bound_fraction; // the largest error as a fraction of the tier's bound
 } Tally;
 
-// A tier's bounds: on t, in ulps plus a slack of size or distance over the cosine, and the band in which hit
-// or miss is undecided; in u. The hard cases allow tier B its slack below a cosine of 0.1 alone; here it is
-// allowed at every angle (tests/test_shapes.c says why, docs/measurements/README.md which rungs need it). The
-// textbook has no bounds.
+// A tier's bounds: the error of t in ulps, plus a slack in u of the size or distance over the cosine, and
+// the band in u in which hit and miss are both right. The hard cases allow tier B its slack only below a
+// cosine of 0.1. Here it is allowed at every angle, for the reason in tests/test_shapes.c.
+// docs/measurements/README.md lists the rungs that need it. The textbook has no bounds.
 typedef struct {
     double ulps, slack, band;
-    bool of_size; // else of the distance
+    bool of_size; // whether the slack scales with the size, else with the distance
 } Tier;
 
 static const Tier tiers[ARITHMETIC_COUNT] = {
@@ -75,7 +75,7 @@ static Vector3 vector_from(const double parts[3])
     return (Vector3){parts[0], parts[1], parts[2]};
 }
 
-// From `rung` radii away towards a random point of the bounding sphere, enlarged by a fiftieth.
+// Returns a ray from `rung` radii away to a random point of the bounding sphere enlarged by a fiftieth.
 static RandomRay ladder_ray(const RandomShape *shape, double rung, Random *random)
 {
     Vector3 out = vector_normalize(random_in_sphere(random));
@@ -110,8 +110,8 @@ static Rays rays_make(const Object *object, const RandomShape *shape, double run
     return rays;
 }
 
-// For times the kernels of the shape alone; for errors those with every feature, which answer the same bits
-// and serve all shapes.
+// Opens a renderer. Times need the kernels of the shape alone. Errors use those with every feature, which
+// return the same bits and serve all shapes.
 static Renderer *renderer_of(Compute *compute, const Scene *scene, Precision precision, FeatureSet features)
 {
     RenderSettings settings = settings_of_image(1, 1, precision);
@@ -187,7 +187,7 @@ static void rays_trace(Renderer *renderer, const Rays *rays)
     if (!renderer_trace(renderer, rays->rays, rays->count, rays->answers)) fault("the device failed");
 }
 
-// The shortest of several runs of the trace kernel, in CPU time of all threads.
+// Returns the CPU time of all threads in the shortest of several runs of the trace kernel.
 static double trace_seconds(Renderer *renderer, const Rays *rays)
 {
     double least = HUGE_VAL;
@@ -195,12 +195,12 @@ static double trace_seconds(Renderer *renderer, const Rays *rays)
         double start = cpu_seconds();
         rays_trace(renderer, rays);
         double seconds = cpu_seconds() - start;
-        if (run > 0) least = fmin(least, seconds); // the first builds
+        if (run > 0) least = fmin(least, seconds); // the first run includes the build
     }
     return least;
 }
 
-// Time per test = (time with 1 + COPIES copies - time with 1) / COPIES, for rays of all rungs.
+// Returns the time per test, (time with 1 + COPIES copies - time with 1) / COPIES, for rays of all rungs.
 static double test_seconds(Compute *compute, const RandomShape *shape, Precision precision)
 {
     bool is_double = precision == PRECISION_DOUBLE;
@@ -274,7 +274,7 @@ static void shape_trace(LadderShape *shape, int which, Precision precision, Comp
     rays_trace(*renderer, rays);
 }
 
-// Adds one shape's errors on one rung: each precision of the same width on the same rays.
+// Adds one shape's errors on one rung. All precisions of one width trace the same rays.
 static void rung_measure(Compute *compute, LadderShape *shape, int rung, bool is_double,
                          const LadderOptions *options, size_t count, Tally tallies[ARITHMETIC_COUNT])
 {
@@ -314,7 +314,7 @@ static bool tally_within_bounds(const Tally *tally)
     return tally->wrong == 0 && tally->bound_fraction <= 1;
 }
 
-// For --check: what exceeds the bounds.
+// Prints what exceeds the bounds, for --check.
 static void tally_report(const Tally *tally, const char *shape, Precision precision, double distance)
 {
     if (tally_within_bounds(tally)) return;
@@ -322,7 +322,7 @@ static void tally_report(const Tally *tally, const char *shape, Precision precis
            precision_names[precision], tally->wrong, tally->compared, tally->bound_fraction);
 }
 
-// True if one shape on one rung is within the bounds at each precision of one width.
+// Measures one shape on one rung. Returns whether each precision of one width is within the bounds.
 static bool rung_run(Compute *compute, LadderShape *shape, int rung, bool is_double,
                      const LadderOptions *options, Json *json)
 {
@@ -410,7 +410,7 @@ int main(int argument_count, char **arguments)
             json_begin_object(json, NULL);
             json_text(json, "shape", shape.name);
             json_text(json, "precision", precision_names[precision]);
-            // milliseconds of a million are nanoseconds of one
+            // milliseconds per million tests are nanoseconds per test
             json_number(json, "ms_per_million", 1e9 * test_seconds(&compute, &shape.instances[0], precision));
             json_end(json);
         }

@@ -1,7 +1,7 @@
-// The textbook's crossings of rays with shapes, to measure next to glint's, never to ship: make TEXTBOOK=1
-// puts them into kernels/traversal/primitives.h, which then calls textbook_SHAPE_hit.
+// Textbook intersections of rays with shapes, to compare with glint's. They are never shipped. make
+// TEXTBOOK=1 includes them in kernels/traversal/primitives.h, which then calls textbook_SHAPE_hit.
 
-// The roots of a t^2 + 2 b t + c = 0 by the school's formula.
+// The roots of a t^2 + 2 b t + c = 0 by the quadratic formula.
 typedef struct {
     real near, far; // near <= far for a > 0
 } TextbookRoots;
@@ -51,8 +51,8 @@ static inline mask textbook_disc_hit(const Disc *disc, const Ray *ray, real *t)
     return hit & (vector_dot(from_center, from_center) <= radius * radius);
 }
 
-// Textbook box: slabs, by division (Kay, Kajiya, Ray tracing complex scenes, SIGGRAPH 1986); zeros in the
-// direction are left to infinities.
+// Textbook box: slabs, by division (Kay, Kajiya, Ray tracing complex scenes, SIGGRAPH 1986). Zeros in the
+// direction yield infinities.
 static inline TextbookRoots textbook_slab_crossings(real low, real high, real origin, real direction)
 {
     real to_low = (low - origin) / direction, to_high = (high - origin) / direction;
@@ -73,8 +73,8 @@ static inline mask textbook_box_hit(const Box *box, const Ray *ray, real *t)
     return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
 }
 
-// Textbook cylinder and cone: |p|^2 - (p . w)^2 = (R + k p . w)^2 for a unit axis w, b^2 - a c, and each cap
-// by itself (Glassner, An introduction to ray tracing, 1989, section 2.3; Heckbert, Ray tracing, 1989).
+// Textbook cylinder and cone: |p|^2 - (p . w)^2 = (R + k p . w)^2 for a unit axis w, b^2 - a c, and separate
+// caps (Glassner, An introduction to ray tracing, 1989, section 2.3; Heckbert, Ray tracing, 1989).
 typedef struct {
     real t;
     mask found;
@@ -157,7 +157,7 @@ static inline mask textbook_is_zero(real x)
     return fabs(x) < (real)(1e-9f);
 }
 
-// A real root of x^3 + a x^2 + b x + c.
+// Returns a real root of x^3 + a x^2 + b x + c.
 static inline real textbook_cubic_root(real a, real b, real c)
 {
     const real third = (real)(1.0f / 3);
@@ -176,7 +176,7 @@ static inline real textbook_cubic_root(real a, real b, real c)
     return lanes_select(discriminant < (real)(0), three, one) - third * a;
 }
 
-// Offers the real roots of y^2 + b y + c, moved by `shift`.
+// Pushes the real roots of y^2 + b y + c, plus `shift`.
 static inline void textbook_quadratic_offer(real b, real c, real shift, mask counts, const Ray *ray,
                                             TextbookNearest *nearest)
 {
@@ -246,6 +246,6 @@ static inline mask textbook_triangle_hit(const Triangle *triangle, const Ray *ra
     return hit & (u >= (real)(0)) & (v >= (real)(0)) & (u + v <= (real)(1)) & (*t > ray->tmin);
 }
 
-// The paraboloid and the oval have no textbook formula: glint's are used.
+// The paraboloid and the oval have no textbook formula, so glint's are used.
 #define textbook_paraboloid_hit paraboloid_hit
 #define textbook_oval_hit       oval_hit

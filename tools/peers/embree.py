@@ -1,4 +1,4 @@
-"""Writes a scene as tools/peers/embree reads it, and runs that: a renderer on Embree (Debian package libembree-dev)."""
+"""Writes a scene for tools/peers/embree, a renderer on Embree (Debian package libembree-dev), and runs it."""
 import pathlib
 
 from scene import NotModelled, cross, triple, unit

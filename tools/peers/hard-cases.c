@@ -1,10 +1,10 @@
-// Rays one by one against a scene by Embree (Debian package libembree-dev), for tools/peers/hard-cases.
+// Traces single rays through a scene with Embree (Debian package libembree-dev), for tools/peers/hard-cases.
 //
 // usage: PROGRAM robust|plain < SCENE
 //
-// SCENE has a word a line with its numbers: `object` begins the next object, whose parts follow (sphere:
+// Each line of SCENE is a word with numbers. `object` begins the next object, whose parts follow (sphere:
 // center, radius; disc: center, normal, radius; triangle: three corners; cone: a point and its radius,
-// twice); `ray` has origin, direction and where it starts. A line for each ray: the object's number and the
+// twice). `ray` has an origin, a direction and the distance where it starts. Prints each ray's object and
 // distance, or `-`.
 #include <embree3/rtcore.h>
 #include <math.h>
@@ -39,7 +39,7 @@ static void geometry_attach(RTCScene scene, RTCGeometry geometry, uintptr_t obje
     rtcReleaseGeometry(geometry);
 }
 
-// A sphere, a disc or a truncated cone: one point, or two, with its radius.
+// Adds a sphere, a disc or a truncated cone, which have one or two points with radii.
 static void round_add(RTCDevice device, RTCScene scene, enum RTCGeometryType type, const float *points,
                       size_t count, const float *normal, uintptr_t object)
 {
@@ -59,7 +59,7 @@ typedef struct {
     unsigned vertex_count, triangle_count;
 } Mesh;
 
-// The vertex of the same place, so that neighbors share it.
+// Returns the index of the vertex at this position, which neighbors share. Adds one if there is none.
 static unsigned vertex_index(Mesh *mesh, const float *place)
 {
     for (unsigned i = mesh->vertex_count; i-- > 0;)

@@ -1,5 +1,4 @@
-"""The hard cases that are images, for tools/peers/hard-cases: each is a question to a program, answered pixel by
-pixel."""
+"""The hard cases that are images, for tools/peers/hard-cases. Each case renders with a program and checks the pixels."""
 import json
 import pathlib
 import struct
@@ -35,7 +34,7 @@ class Camera:
         self.up = cross(self.right, self.forward)
 
     def ray(self, column, row):
-        """The direction through a pixel's center."""
+        """Returns the direction through a pixel's center."""
         width, height = self.size
         x, y = 2 * column + 1 - width, height - 1 - 2 * row
         step = self.half_tangent / height
@@ -46,15 +45,15 @@ class Camera:
 
 
 class Look:
-    """The emission, the diffuse reflection and the highlight of every object in an image."""
+    """The emission, diffuse reflection and highlight that all objects of an image share."""
 
     def __init__(self, ambient=0.0, diffuse=0.0, specular=0.0, shininess=1.0):
         self.ambient, self.diffuse, self.specular, self.shininess = ambient, diffuse, specular, shininess
 
 
 def draw(program, camera, objects, look, light=None):
-    """Gray values, 0 to 255, row by row. objects: (kind, numbers). light: ("point", place) or ("directional", the way
-    it travels, a place far up that way, a place it passes), and its intensity."""
+    """Renders gray values, 0 to 255, row by row. Objects are (kind, members). `light` is ("point", position, intensity) or
+    ("directional", direction of travel, a distant point that it comes from, a point that it passes, intensity)."""
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         scene, image = folder / "scene", folder / "image.ppm"
@@ -110,7 +109,7 @@ def glint_scene(camera, objects, look, light):
 
 
 def flipped(value):
-    """Tachyon's coordinates are left-handed: x is turned over."""
+    """Returns a value with x negated, because Tachyon's coordinates are left-handed."""
     if isinstance(value, (list, tuple)):
         if len(value) == 3 and not isinstance(value[0], (list, tuple)):
             return [-value[0], value[1], value[2]]
@@ -122,7 +121,7 @@ def tachyon_scene(program, camera, objects, look, light):
     width, height = camera.size
     half_pixel = camera.half_tangent / height
     top, right = camera.half_tangent, camera.half_tangent * width / height
-    # its rays go through the upper right corners of the pixels
+    # Tachyon's rays pass through the upper right corners of the pixels
     frustum = [side - half_pixel for side in (-right, right, -top, top)]
     lines = [
         f"Begin_Scene\nResolution {width} {height}\nCamera\nZoom 1\nAspectratio 1\nAntialiasing 0\nRaydepth 1",
@@ -158,14 +157,14 @@ def silhouette(program, camera, objects):
 
 
 def judged(is_hit, depth, band):
-    """depth: how deep a ray gets into what it may hit; within the band of 0 nothing is said."""
+    """Returns the fault of an answer, or None. `depth` is how deep the ray enters the object; within `band`, both are right."""
     if abs(depth) <= band or is_hit == (depth > 0):
         return None
     return "misses" if depth > 0 else "hits for a miss"
 
 
 def question(ask):
-    """Turns a generator of faults into what the tool asks a program."""
+    """Returns a function that collects the generator's faults for a program, and the reason if it was not run."""
 
     def answer(program):
         try:
@@ -215,8 +214,8 @@ def thin_ring(program):
 
 
 def acne(program):
-    """P2: a plane under grazing light, near and far from the origin, small and large: nothing of it is in shadow. The
-    light is as strong as makes every pixel half white; Tachyon leaves out any light whose cosine is below 0.002."""
+    """P2: a plane under grazing light, near and far from the origin, small and large. No part of it is in shadow. The
+    light's intensity makes every pixel half white. Tachyon ignores lights whose cosine is below 0.002."""
     normal = unit([1, 2, 3])
     side = unit(cross(normal, [1, 0, 0]))
     for size, offset in ((1, 0), (1, 1e3), (1, 1e6), (1e-4, 0), (1e-4, 1), (1e4, 0)):
@@ -299,7 +298,7 @@ def scales(program):
 
 
 def mirrored(program):
-    """R7: the mirrored scene gives the mirrored image, bit for bit."""
+    """R7: the mirrored scene renders to the mirrored image, bit for bit."""
     for width in (64, 63):
         images = []
         for sign in (1, -1):

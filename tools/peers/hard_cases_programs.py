@@ -1,4 +1,4 @@
-"""Asks other programs what rays hit, for tools/peers/hard-cases."""
+"""Traces rays with other programs, for tools/peers/hard-cases."""
 import pathlib
 import shutil
 import subprocess
@@ -8,7 +8,7 @@ SOURCE = pathlib.Path(__file__).with_name("hard-cases.c")
 
 
 class NotModelled(Exception):
-    """A shape that the program does not have."""
+    """Raised for a shape that the program does not have."""
 
 
 def triple(values, between=" "):
@@ -80,7 +80,7 @@ class Glint:
 
 
 def pixel_object(path):
-    """Returns the color of a PPM of one pixel."""
+    """Returns the object that the color of a PPM of one pixel encodes, as (index, None), or None for a miss."""
     code = path.read_bytes()[-3]
     return None if code == 0 else (code - 1, None)
 
@@ -97,7 +97,7 @@ class Povray:
 
     @staticmethod
     def vector(values):
-        """POV-Ray's tori lie around y, ours around z: every coordinate moves on by one place."""
+        """Returns a vector with its coordinates rotated by one place, because POV-Ray's tori lie around y and ours around z."""
         return "<" + triple([values[1], values[2], values[0]], ", ") + ">"
 
     def part(self, kind, body):
@@ -123,7 +123,7 @@ class Povray:
         return f"quadric {{ {v([1, 1, 0])}, 0, 0, {-body['radius'] ** 2!r}"
 
     def trace(self, objects, rays):
-        """All rays in one run, a frame of an animation each."""
+        """Traces all rays in one run, each as a frame of an animation."""
         if len(rays) == 1:  # one frame is not an animation
             return self.trace(objects, rays * 2)[:1]
         with tempfile.TemporaryDirectory() as folder:
@@ -199,7 +199,7 @@ class Tachyon:
     @staticmethod
     def trace_one(folder, scene, origin, direction):
         up = min(((abs(x), k) for k, x in enumerate(direction)))[1]
-        # the frustum: its upper right corner, through which the pixel's ray goes, is the middle of the view
+        # the pixel's ray passes through the frustum's upper right corner, which is the middle of the view
         head = (
             "Begin_Scene\nResolution 1 1\nCamera\nZoom 1\nAspectratio 1\nAntialiasing 0\nRaydepth 1\n"
             f"Center {triple(origin)}\nViewDir {triple(direction)}\n"

@@ -17,7 +17,7 @@ class PolygonTriangles(ctypes.Structure):
 
 @functools.cache
 def triangulation():
-    """glint's own, so that all programs have the same triangles."""
+    """Builds and loads glint's triangulation, so that all programs have the same triangles."""
     with tempfile.TemporaryDirectory() as folder:
         library = pathlib.Path(folder) / "polygon.so"
         subprocess.run(["cc", "-std=gnu11", "-O2", "-ffp-contract=off", "-shared", "-fPIC", f"-I{ROOT}",
@@ -33,7 +33,7 @@ def triangles_of(corners):
 
 
 def add_polygon(scene, material, corners):
-    """To the last mesh if that has the same material and kind of normals. A corner is a place, or a place and a normal."""
+    """Adds a polygon to the last mesh, or to a new one if its material or use of normals differs. Corners may have normals."""
     places, normals = [corner[:3] for corner in corners], [corner[3:] for corner in corners if corner[3:]]
     last = scene.meshes[-1] if scene.meshes else None
     if not last or last.material != material or bool(last.normals) != bool(normals):
@@ -52,7 +52,7 @@ def material_of(numbers):
 
 
 def finish_lights(scene):
-    """Each of n lights without a color has the intensity sqrt(n) / 2n; so has the ambient light."""
+    """Sets the ambient light, and each light without a color, to the intensity sqrt(n) / 2n, where n is the number of lights."""
     if scene.lights:
         white = [len(scene.lights) ** -0.5 / 2] * 3
         scene.ambient = white

@@ -5,7 +5,7 @@ WIDTH, HEIGHT, LEFT, TOP = 330, 260, 50, 30
 
 
 class LogPanel:
-    """One plot of a row of them, over whole powers of ten."""
+    """One plot of a row of plots, whose axes span whole powers of ten."""
 
     def __init__(self, number, title, x_values, y_values):
         self.x0 = LEFT + number * (WIDTH + 50)
@@ -38,7 +38,7 @@ def powers_around(values):
 
 
 def svg(panels, legend):
-    """Legend: pairs of a label and the style of its line."""
+    """Returns the panels as SVG, with a legend of pairs of a label and a line style."""
     parts = [part for panel in panels for part in panel.parts]
     for i, (label, style) in enumerate(legend):
         x, y = LEFT + i * 170, TOP + HEIGHT + 36

@@ -11,7 +11,7 @@ def vector(values):
 
 
 def material_text(name, material, ambient):
-    """POV-Ray shows the ambient and diffuse light of a transparent material by its opaque fraction only."""
+    """Returns a material's text. POV-Ray scales ambient and diffuse light of a transparent one by its opaque fraction."""
     transmission = material.get("transmission", 0)
     opaque = 1 - transmission
     finish = [part * material.get("ambient", 1) / opaque for part in ambient]
@@ -37,7 +37,7 @@ def write_mesh(write, mesh):
 
 
 def write_shapes(write, scene, end):
-    """Each with what `end` gives for the name of its material; none where that is None."""
+    """Writes each shape, ended by `end` of its material's name. Omits those for which `end` returns None."""
     def write_shape(text, name):
         if end(name) is not None:
             write(f"{text} {end(name)}\n")
@@ -83,7 +83,7 @@ def write_scene(scene, path, size):
             write(material_text(name, material, scene.ambient))
         glass = {name for name, material in scene.materials.items() if material.get("transmission", 0) > 0}
         write_shapes(write, scene, lambda name: f"material {{ M_{name} }} {'no_shadow ' * (name in glass)}}}")
-        # Glass of NFF has the shadow of an opaque object, which in POV-Ray another object must cast.
+        # In NFF, glass casts the shadow of an opaque object. In POV-Ray a second, invisible object casts it.
         write_shapes(write, scene, lambda name: "no_image no_reflection }" if name in glass else None)
 
 

@@ -12,7 +12,7 @@ import time
 
 
 def apart(function, *arguments):
-    """Runs in a separate process, because Linux counts what this one has held in the peak of the programs that it starts."""
+    """Calls a function in a separate process, because Linux counts this process's memory toward the peak of its child processes."""
     with concurrent.futures.ProcessPoolExecutor(1) as child:
         return child.submit(function, *arguments).result()
 
@@ -21,7 +21,7 @@ Run = collections.namedtuple("Run", "seconds processor_seconds peak stdout stder
 
 
 def run_once(command, environment=None):
-    """Seconds from start to end, and of all processors together; peak bytes; and what was printed."""
+    """Runs a command. Returns its wall seconds, its seconds of all processors, its peak bytes and its output."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as errors:
         start = time.monotonic()
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=out, stderr=errors, env=environment)
@@ -38,7 +38,7 @@ def run_once(command, environment=None):
 
 
 def read_ppm(path):
-    """The bytes of an image of 8 bits a channel."""
+    """Returns the channels of an 8-bit PPM."""
     content, at, words = path.read_bytes(), 0, []
     while len(words) < 4:
         end = content.index(b"\n", at)
@@ -49,8 +49,8 @@ def read_ppm(path):
 
 
 def image_difference(path, other_path):
-    """Mean and largest absolute difference in 255ths; which part of all channels is off by more than 16 of them, and
-    which part of the pixels by more than 2 in some channel."""
+    """Returns the mean and largest absolute difference in 255ths, the fraction of channels that differ by more than 16 of
+    them, and the fraction of pixels of which some channel differs by more than 2."""
     off = bytes(map(abs, map(operator.sub, read_ppm(path), read_ppm(other_path))))
     worst = bytes(map(max, off[0::3], off[1::3], off[2::3]))
     channels, pixels = collections.Counter(off), collections.Counter(worst)

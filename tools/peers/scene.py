@@ -1,4 +1,4 @@
-"""Reads what a YAML scene of spheres, planes, meshes and their instances holds, for the writers of other programs' formats."""
+"""Reads YAML scenes of spheres, planes, meshes and their instances, for the writers of other programs' formats."""
 import math
 import pathlib
 import re
@@ -10,16 +10,16 @@ SPHERE = re.compile(r"- sphere: {center: \[([^,]+), ([^,]+), ([^\]]+)\], radius:
 
 
 class NotModelled(Exception):
-    """What a program does not have."""
+    """Raised for a feature that a program does not have."""
 
 
 @dataclass
 class Mesh:
     vertices: list
-    faces: list     # triples of indices of vertices
-    normals: list   # one a vertex, or none: flat
+    faces: list     # triples of vertex indices
+    normals: list   # one per vertex, or empty for flat shading
     material: str
-    instances: list = field(default_factory=list)  # of four columns of a matrix 3x4; if there are any, only they are drawn
+    instances: list = field(default_factory=list)  # four columns of a 3x4 matrix each; replace the mesh itself
 
 
 @dataclass
@@ -27,13 +27,13 @@ class Scene:
     camera: dict
     background: list
     ambient: list
-    lights: list    # of (position, color)
+    lights: list    # (position, color)
     materials: dict
-    spheres: list = field(default_factory=list)  # of (center, radius, material)
-    planes: list = field(default_factory=list)   # of (point, normal, material)
+    spheres: list = field(default_factory=list)  # (center, radius, material)
+    planes: list = field(default_factory=list)   # (point, normal, material)
     meshes: list = field(default_factory=list)
-    suns: list = field(default_factory=list)     # directional lights, of (direction of the light, color)
-    cones: list = field(default_factory=list)    # open, of (from, its radius, to, its radius, material)
+    suns: list = field(default_factory=list)     # directional lights: (direction of travel, color)
+    cones: list = field(default_factory=list)    # without caps: (from, its radius, to, its radius, material)
 
     def half_tangent(self):
         """Returns the tangent of half the vertical field of view."""
@@ -68,7 +68,7 @@ def triple(values):
 
 
 def item_texts(text):
-    """The items of the list of objects, one text each. One starts where a line starts with two blanks and a dash."""
+    """Yields the text of each item of the list of objects. An item starts at a line that begins with two blanks and a dash."""
     item = []
     for line in text.splitlines():
         if line.startswith("  - ") and item:
@@ -81,7 +81,7 @@ def item_texts(text):
 
 
 def rotation(degrees):
-    """About x, then y, then z."""
+    """Returns the matrix of rotations about x, then y, then z."""
     (sx, cx), (sy, cy), (sz, cz) = ((math.sin(a), math.cos(a)) for a in map(math.radians, degrees))
     return [[cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
             [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
@@ -89,7 +89,7 @@ def rotation(degrees):
 
 
 def smooth_normals(vertices, faces):
-    """The mean of the normals around a vertex, weighted by the angle there."""
+    """Returns each vertex's mean of the normals of its faces, weighted by their angles at the vertex."""
     normals = [[0.0, 0.0, 0.0] for _ in vertices]
     for face in faces:
         corners = [vertices[i] for i in face]
@@ -104,7 +104,7 @@ def smooth_normals(vertices, faces):
 
 
 def read_mesh(keys, folder):
-    """An OBJ of triangles without normals."""
+    """Reads an OBJ of triangles without normals."""
     transform = keys.get("transform", {})
     scale = transform.get("scale", 1)
     scale = scale if isinstance(scale, list) else [scale] * 3
@@ -173,7 +173,7 @@ def read_scene(path):
             scene.suns.append((keys["direction"], color))
     definitions = {name: read_definition(group, path.parent) for name, group in data.get("define", {}).items()}
     for text in item_texts(objects):
-        quick = SPHERE.match(text.strip())  # yaml takes minutes for a million
+        quick = SPHERE.match(text.strip())  # PyYAML needs minutes for a million
         if quick:
             *numbers, material = quick.groups()
             *center, radius = map(float, numbers)

@@ -10,8 +10,8 @@ def place(values):
 
 
 def frustum(scene, size):
-    """The image's left, right, bottom and top at a distance of 1, half a pixel off to the left and down: Tachyon's
-    rays go through the upper right corners of the pixels, those of the others through the centers."""
+    """Returns the image's left, right, bottom and top at a distance of 1, shifted by half a pixel to the left and down, because
+    Tachyon's rays pass through the upper right corners of the pixels and those of the others through the centers."""
     top, half_pixel = scene.half_tangent(), scene.half_tangent() / size[1]
     right = top * size[0] / size[1]
     return [side - half_pixel for side in (-right, right, -top, top)]
@@ -26,7 +26,7 @@ def texture(material, ambient):
 def write_mesh(write, mesh):
     places = [place(vertex) for vertex in mesh.vertices]
     normals = [place(normal) for normal in mesh.normals]
-    for a, c, b in mesh.faces:  # a mirrored triangle turns the other way round
+    for a, c, b in mesh.faces:  # mirroring reverses a triangle's winding
         corners = f"V0 {places[a]} V1 {places[b]} V2 {places[c]}"
         if normals:
             write(f"STri {corners} N0 {normals[a]} N1 {normals[b]} N2 {normals[c]} {mesh.material}\n")
@@ -68,7 +68,7 @@ def write_scene(scene, path, size):
 
 
 def command(scene_path, image, size):
-    """Depth 6, the eye's ray counted, is glint's five bounces."""
+    """Returns the command. A depth of 6 counts the camera ray, so it equals glint's five bounces."""
     return ["tachyon", scene_path, "-res", str(size[0]), str(size[1]), "-shade_phong", "-raydepth", "6",
             "-format", "PPM", "-o", image]
 

@@ -1,7 +1,7 @@
-// Elements, and numbers as they are set in print.
+// Makes elements and formats numbers for display.
 "use strict";
 
-// svg("rect", { width: 1 }, child, …) and html("td", { class: "words" }, "text", …)
+// Returns a function that makes elements: svg("rect", { width: 1 }, child, …), html("td", { class: "words" }, "text", …).
 const elementMaker = (namespace) => (name, attributes = {}, ...children) => {
   const element = document.createElementNS(namespace, name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
@@ -13,7 +13,7 @@ const html = elementMaker("http://www.w3.org/1999/xhtml");
 
 const powerOfTen = (exponent) => "10" + String(exponent).replace(/./g, (sign) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[sign] ?? "⁻");
 
-// Three digits; below 0.01 and from 10,000 two digits and a power of ten: 3.1·10⁻⁶. null: not finite.
+// Formats a number with three digits or, below 0.01 and from 10,000, with two and a power of ten, as 3.1·10⁻⁶. null means not finite.
 function formatNumber(value) {
   if (value === null) return "not finite";
   const size = Math.abs(value);
@@ -25,7 +25,7 @@ function formatNumber(value) {
   return value < 0 ? "−" + text : text;
 }
 
-// Digits in groups of three: 921 600.
+// Formats a count with its digits in groups of three, such as 921 600.
 function formatCount(value) {
   return value < 10000 ? String(value) : String(value).replace(/\B(?=(\d{3})+$)/g, "\u202F");
 }
@@ -33,7 +33,7 @@ function formatCount(value) {
 const formatMs = (value) => formatNumber(value) + "\u00A0ms";
 const plural = (count, noun, nouns = noun + "s") => `${formatCount(count)} ${count === 1 ? noun : nouns}`;
 
-// A variant's mark and name.
+// Returns a variant's mark and name.
 function variantName({ names, variants }, index) {
   const { precision } = variants[index], name = document.createDocumentFragment();
   name.append(svg("svg", { class: `mark ${precision}`, viewBox: "-7 -7 14 14", "aria-hidden": "true" },

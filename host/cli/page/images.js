@@ -1,4 +1,4 @@
-// The images: whole, their differences, two in one frame, and around the worst pixels. The first of a scene is the
+// Draws the images, their differences, comparisons of two images, and crops around the worst pixels. A scene's first image is the
 // reference's.
 "use strict";
 
@@ -6,7 +6,7 @@ function imageElement({ size: [width, height] }, source, alt) {
   return html("img", { src: source, alt, width, height, decoding: "async" });
 }
 
-// "double; equal to it as 32-bit floats: single, strict"
+// Returns a caption such as "double; equal to it as 32-bit floats: single, strict".
 function imageCaption(scene, name, others) {
   const caption = html("figcaption", {}, name);
   others.forEach((index, i) => caption.append(i ? ", " : "; equal to it as 32-bit floats: ", variantName(scene, index)));
@@ -19,7 +19,7 @@ function drawReference(section, scene) {
                                              imageCaption(scene, "The reference", variants));
 }
 
-// Two colors per decade; every other one is labeled with its upper end.
+// Draws the scale of differences with two colors per decade. Every other one is labeled with its upper end.
 function drawScale({ difference_decades: decades, difference_colors: colors }) {
   return colors.map((color, step) => {
     let label = step % 2 ? "" : powerOfTen(step / 2 - decades);
@@ -32,7 +32,7 @@ function drawScale({ difference_decades: decades, difference_colors: colors }) {
 
 const formatDigits = (value, digits) => (value === null ? "not finite" : String(Number(value.toPrecision(digits))));
 
-// Of a worst pixel's kind: what its error is, and the value that is shown besides colors.
+// The kinds of worst pixels, with the meaning of their errors and the value that is shown in addition to colors.
 const worstKinds = {
   object: { error: "color off by", heading: () => "Object", value: (id) => (id === 0xffffffff ? "none" : String(id)) },
   shadow: { error: "color off by", heading: ({ light }) => `Light ${light}`, value: (bit) => (bit ? "occluded" : "visible") },
@@ -43,7 +43,7 @@ const worstKinds = {
   image: { error: "off by" },
 };
 
-// 15x15 pixels around a pixel, which two frames mark, one of them black.
+// Draws the 15x15 pixels around a pixel, which is marked by two frames, one of them black.
 function drawCrop(scene, source, { x, y }, caption) {
   const [[left, width], [top, height]] = [x, y].map((center, axis) => {
     const side = Math.min(15, scene.size[axis]);
@@ -74,8 +74,8 @@ function drawWorst(scene, name, worst, image, show) {
          button));
 }
 
-// Two images, one above the other and cut at a position that the reader moves. Returns what shows a pixel of an image there,
-// besides the reference.
+// Makes a comparison of two stacked images, split at a position that the reader moves. Returns a function that shows a pixel of an
+// image next to the reference.
 function makeComparison(section, scene) {
   const comparison = section.querySelector(".comparison"), find = (selector) => comparison.querySelector(selector);
   const images = scene.images.flatMap(({ variants: [index], image, difference }, i) => [
@@ -98,7 +98,7 @@ function makeComparison(section, scene) {
   const setSplit = () => stage.style.setProperty("--split", `${range.value}%`);
   range.addEventListener("input", setSplit);
 
-  let center = [0.5, 0.5]; // of the visible part, as fractions of the image
+  let center = [0.5, 0.5]; // center of the visible part, in fractions of the image
   const setZoom = () => {
     stage.style.width = zoom.value ? `${width * zoom.value}px` : "";
     stage.classList.toggle("zoomed", zoom.value > 1);

@@ -1,4 +1,4 @@
-// The report as a whole: the device, the fastest within each budget, and a section per scene.
+// Draws the report: the device, the fastest variant within each budget, and a section per scene.
 "use strict";
 
 const reportText = document.getElementById("report").textContent;
@@ -21,12 +21,12 @@ function budgetText(budget) {
   return Math.abs(budget / 10 ** exponent - 1) < 1e-9 ? powerOfTen(exponent) : formatNumber(budget);
 }
 
-// The picked row and those that tie with it.
+// Returns the picked row and those that tie with it.
 function tiedRows({ variant, others }) {
   return [variant, ...others.filter(({ ties }) => ties).map((other) => other.variant)];
 }
 
-// What is certain of the picked row's time, with the report's confidence.
+// Describes what is certain about the picked row's time at the report's confidence.
 function drawCertainty(scene, { others }) {
   if (!others.length) return ["; no other is within it"];
   const range = ({ low, high }) => `${formatNumber(low)} to ${formatNumber(high)} times as long`;
@@ -74,7 +74,7 @@ function drawFacts({ size: [width, height], pixels, lights, bounces, reference, 
   return facts;
 }
 
-// One sentence for all budgets that the same variant satisfies.
+// Draws one sentence for all consecutive budgets with the same picked variant.
 function drawPicks(scene) {
   const groups = [];
   for (const pick of scene.picks) {
@@ -101,7 +101,7 @@ function drawPicks(scene) {
   });
 }
 
-// A variant under the pointer is marked in every plot and table of its scene.
+// Marks the variant under the pointer in every plot and table of its scene.
 function linkVariants(section) {
   section.addEventListener("pointerover", (event) => {
     const index = event.target.closest("[data-variant]")?.dataset.variant;

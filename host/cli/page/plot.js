@@ -1,4 +1,4 @@
-// Plots of each kind of error against the time of a frame, both axes logarithmic.
+// Plots each kind of error against frame time, on logarithmic axes.
 "use strict";
 
 const both = (count) => count.edge + count.away;
@@ -13,7 +13,7 @@ const kinds = [
   { name: "normal", title: "Normal", unit: "radians, 99.9 % within", error: (errors) => errors.normal.p99_9 },
 ];
 
-// The measured variants that have this kind's error.
+// Returns the measured variants that have this kind's error.
 function pointsOf(scene, kind) {
   return scene.variants.flatMap((variant, index) => {
     const error = variant.status === "measured" ? kind.error(variant.errors) : NaN;
@@ -21,7 +21,7 @@ function pointsOf(scene, kind) {
   });
 }
 
-// Where a plot's times and errors lie within its `width` and `height`. Errors of 0 lie on a floor below the error axis.
+// Maps a plot's times and errors to its `width` and `height`. Errors of 0 lie on a floor below the error axis.
 function layOut(scene, points, width, height) {
   const times = scene.variants.flatMap((variant) => variant.frame_ms ?? []);
   const errors = points.map((point) => point.error).filter((error) => error > 0);
@@ -94,9 +94,9 @@ function drawPoint({ index, variant, error, time }, name, kind, { x, y }) {
 const overlap = (a, b) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
-const KEY_WIDTH = 11; // of the mark before a name
+const KEY_WIDTH = 11; // width of the mark before a name
 
-// Where a name may stand, seen from its mark: next to it, else above or below, where a mark before it says whose it is.
+// Returns a name's candidate positions relative to its mark: next to it, else above or below, with a second mark before the name.
 function labelPlaces(width) {
   const near = [[6, -19], [6, 7], [-6 - width, 7], [-6 - width, -19], [9, -6], [-9 - width, -6]];
   const far = Array.from({ length: 12 }, (_, i) => [-32 - 13 * i, 20 + 13 * i]).flat();
@@ -104,7 +104,7 @@ function labelPlaces(width) {
           ...far.flatMap((dy) => [6, -6 - width - KEY_WIDTH].map((dx) => ({ dx, dy, width: width + KEY_WIDTH, key: KEY_WIDTH })))];
 }
 
-// Names, each where it covers nothing.
+// Draws the names where they cover nothing.
 function drawLabels(points, scene, { x, y, left, right, top, bottom, hasAxis }) {
   const taken = points.flatMap(({ time, error }) => [
     { x: x(time.median) - 7, y: y(error) - 7, width: 14, height: 14 },

@@ -1,4 +1,4 @@
-// The comparison of benchmark reports: what each is of, a line per row and report, and all figures.
+// Draws a comparison of benchmark reports: their origins, a line per row and report, and all figures.
 "use strict";
 
 const { reports, rows, columns, constants, confidence, tolerance } =
@@ -12,7 +12,7 @@ const drawLetter = (index) => html("span", { class: `letter ${reportClass(index)
 
 const rangeText = (low, high) => `${formatNumber(low)} to ${formatNumber(high)}`;
 
-// 2026-11-27T10:00:26Z: 2026-11-27 10:00 UTC
+// Converts 2026-11-27T10:00:26Z to 2026-11-27 10:00 UTC.
 const formatDate = (date) => date.replace("T", " ").replace(/:\d\d(\.\d+)?Z$/, " UTC");
 
 function drawSummary({ common, rows: count, mean_ratio: ratio, why_not: reason, ...verdicts }, index) {
@@ -42,7 +42,7 @@ function drawReport(report, index) {
     html("p", {}, drawSummary(report, index)));
 }
 
-// The cells' places on the axis: with several reports relative to the first one's median, else in milliseconds.
+// Returns the cells' positions on the axis, relative to the first report's median if there are several, else in milliseconds.
 function placesOf(row, measure) {
   const base = hasRatios ? row.cells[0]?.[measure]?.median : 1;
   return row.cells.map((cell) => {
@@ -53,7 +53,7 @@ function placesOf(row, measure) {
   });
 }
 
-// Ticks and positions in percent. Small differences are not stretched to the whole axis.
+// Returns ticks and positions in percent. Small differences are not stretched to the whole axis.
 function layOut(places) {
   const values = places.flat().flatMap((place) => (place ? [place.lower, place.upper] : []));
   if (hasRatios) values.push(0.9, 1.1);
@@ -84,7 +84,7 @@ function drawBar(place, label, { ticks, x }) {
     svg("circle", { cx: `${x(median)}%`, cy: "50%", r: 4 }));
 }
 
-// Cells with the ratio to the first report, with its interval and verdict where there are any.
+// Draws cells with the ratio to the first report, and its interval and verdict where there are any.
 function drawRatio(cell, measure) {
   const isFrame = measure === "frame_ms", ratio = isFrame ? cell.ratio : cell.kernel_ratio;
   if (!ratio) return [html("td"), html("td")];
@@ -111,7 +111,7 @@ function drawLine(row, index, place, measure, layout) {
   return line;
 }
 
-// The row's name across all columns, if it has one.
+// Draws the row's name, if it has one, across all columns.
 function drawName(row, width) {
   const name = nameOf(row);
   return name ? html("tr", { class: "name" }, html("th", { scope: "rowgroup", colspan: width }, name)) : "";
@@ -136,13 +136,13 @@ function drawBars() {
       ...row.cells.map((_, index) => drawLine(row, index, places[i][index], measure, layout)))));
 }
 
-// Scene, size and precision speak for themselves; a number needs its heading.
+// Joins the parts of a name. Scene, size, precision and variant need no heading; other values do.
 const joinName = ({ name }, isNamed) => columns.flatMap((heading, i) => {
   if (!name[i] || !isNamed(heading)) return [];
   return ["scene", "size", "precision", "variant"].includes(heading) ? name[i] : `${heading} ${name[i]}`;
 }).join(", ");
 
-// Reports may differ in the lanes of a row. They are part of its name only if rows have the same name without.
+// Reports may differ in a row's lanes, which are part of its name only if names would otherwise be ambiguous.
 const shortNames = rows.map((row) => joinName(row, (heading) => heading !== "lanes"));
 const areShort = new Set(shortNames).size === rows.length;
 const nameOf = (row) => joinName(row, (heading) => heading !== "lanes" || !areShort);

@@ -1,5 +1,5 @@
-// Tables of a scene's variants: a column is its heading, its value of a variant, and how that is written. A value that a
-// variant lacks is undefined.
+// Draws tables of a scene's variants. A column has a heading, a function from a variant to its value, and a format. Missing values
+// are undefined.
 "use strict";
 
 function verdict(variant) {
@@ -68,7 +68,7 @@ function drawRow(scene, index, columns) {
               html("th", { scope: "row" }, variantName(scene, index)), ...cells);
 }
 
-// Missing values and those that are not finite come last in either order.
+// Compares two values. Missing and non-finite values come last in either order.
 function compareValues(a, b, sign) {
   const missing = (a ?? null) === null, otherMissing = (b ?? null) === null;
   if (missing || otherMissing) return missing - otherMissing;

@@ -6,7 +6,7 @@
     hits = scene.trace(origins, directions, precision="certified")
     hits.object[hits.certain]                   # proven equal to the result of exact arithmetic
 
-Every call that computes releases Python's lock. A wrong scene or argument raises SceneError, a device that fails
+Every call that computes releases Python's global lock. A wrong scene or argument raises SceneError, and a device failure raises
 DeviceError. Warnings have the category GlintWarning.
 """
 from __future__ import annotations
@@ -29,22 +29,22 @@ __all__ = ["AllHits", "Device", "DeviceError", "GlintWarning", "Hits", "ImageMet
 
 MISS = 0xFFFFFFFF  #: the object of a miss
 PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
-#: the layers of an image: values per pixel (0: one per light) and their type
+#: the layers of an image, with their values per pixel (0 means one per light) and their type
 LAYERS = {"color": (3, np.float64), "t": (1, np.float64), "normal": (3, np.float64), "position": (3, np.float64),
           "object": (1, np.uint32), "shadow": (0, np.uint32), "doubt": (1, np.uint32),
           "coverage": (1, np.float64), "backdrop": (3, np.float64)}
 
 
 class SceneError(ValueError):
-    """A scene, file, setting or selector is wrong; the text is what `glint` prints."""
+    """Raised if a scene, file, setting or selector is wrong, with the messages that `glint` prints."""
 
 
 class DeviceError(RuntimeError):
-    """An OpenCL call failed."""
+    """Raised if an OpenCL call failed."""
 
 
 class Stopped(Exception):
-    """The progress function returned True."""
+    """Raised if the progress function returned True."""
 
 
 class GlintWarning(UserWarning):
@@ -121,7 +121,7 @@ class _OpenDevice:
 
     @classmethod
     def forget(cls, selector: Union[None, int, str]) -> None:
-        """Opens the device again at its next use, after it has failed."""
+        """Forgets a device that failed, so that its next use re-opens it."""
         with cls._lock:
             cls._opened.pop(None if selector is None else str(selector), None)
 
@@ -154,7 +154,7 @@ class Hits(NamedTuple):
 
 
 class AllHits(NamedTuple):
-    """All hits of rays: arrays with one row per hit, sorted by ray and then by t. The members are as in Hits."""
+    """All hits of rays: arrays with one row per hit, sorted by ray and then by t. Other members than `ray` are those of Hits."""
     ray: np.ndarray  #: the index of each hit's ray
     object: np.ndarray
     t: np.ndarray
@@ -204,12 +204,12 @@ def _options(overrides: Optional[Mapping[str, Any]], frame: float, camera: Optio
 
 
 class Scene:
-    """A scene, from a dict or text in glint's YAML format; glint.load and glint.load_mesh make others."""
+    """A scene made from a dict or text in glint's YAML format. glint.load and glint.load_mesh make scenes from files and arrays."""
 
     def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
                  frame: float = 0):
-        """overrides: values to replace, such as {"camera.fov": 60}; a text is YAML, and an empty one removes the key.
-        frame: the frame of an animated scene. name: begins its messages."""
+        """Reads the description. overrides: values to replace, such as {"camera.fov": 60}; a string is YAML, and an empty one
+        removes the key. frame: the frame of an animated scene. name: the prefix of the scene's messages."""
         text = description if isinstance(description, str) else _yaml(description)
         encoded = text.encode()
         options = _options(overrides, frame)
@@ -251,12 +251,12 @@ class Scene:
     def render_layers(self, layers: Sequence[str], width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5,
                       precision: str = "single", device: Union[None, int, str] = None, lanes: int = 0,
                       progress: Optional[Callable[[float], Any]] = None, min_contribution: float = 0) -> dict[str, np.ndarray]:
-        """Renders the layers named, of glint.LAYERS, and returns their arrays, (height, width[, values]).
+        """Renders the named layers of glint.LAYERS and returns their arrays, of shape (height, width[, values]).
 
-        width, height: both 0 select the size of the scene's file, else 1280 wide. bounces: at most this many per ray.
-        precision: single, strict, double or certified. device: as for `glint render --device`. lanes: rays per
+        width, height: both 0 select the size in the scene's file, else 1280 wide. bounces: the maximum per ray.
+        precision: single, strict, double or certified. device: a selector as for `glint render --device`. lanes: rays per
         work-item; 0 lets glint choose. progress: called with the fraction done; if it returns True, Stopped is raised.
-        min_contribution: rays whose weight in the pixel is below it are left out.
+        min_contribution: rays whose weight in the pixel is lower are not traced.
         """
         if isinstance(layers, str):
             raise ValueError("layers: expected a sequence of names, not one text")
@@ -301,8 +301,8 @@ class Scene:
               device: Union[None, int, str] = None, lanes: int = 0) -> Hits:
         """Finds the nearest hit of each ray strictly between tmin and tmax, in lengths of the direction.
 
-        origins, directions: (n, 3); directions may have any length but 0. Where all arrays are of float32 they
-        are taken as they are, else as float64. At "certified" tmin must be 0. tmin, tmax: one number or n.
+        origins, directions: (n, 3); directions may have any length but 0. Arrays are passed as float32 if all are float32,
+        else as float64. tmin, tmax: one number or n. At "certified" tmin must be 0.
         """
         rays, keep = _rays(origins, directions, tmin, tmax)
         count = rays.count
@@ -325,10 +325,10 @@ class Scene:
                  device: Union[None, int, str] = None, lanes: int = 0, *, return_certain: bool = False) -> Any:
         """Returns whether anything lies strictly between tmin and tmax of each ray, as an array of bool.
 
-        Shadows: trace from the light, or from outside the scene if it is directional, to the points at "double" or "certified",
-        with tmax=1 - 1e-6. A ray that starts at a hit point, which is rounded, may hit the same surface again.
+        For shadows, trace from the light, or from outside the scene if it is directional, to the points at "double" or
+        "certified", with tmax=1 - 1e-6. A ray that starts at a hit point, which is rounded, may re-hit the same surface.
         return_certain: whether to return a second array, which is True where the first is proven, at "certified".
-        Takes as long as `trace`, whose other arguments it has, but returns 1 or 2 bytes per ray instead of 77.
+        This takes as long as `trace`, whose other arguments it shares, but returns 1 or 2 bytes per ray instead of 77.
         """
         rays, keep = _rays(origins, directions, tmin, tmax)
         occluded, certainty = np.empty(rays.count, bool), np.empty(rays.count, np.uint8) if return_certain else None
@@ -339,8 +339,8 @@ class Scene:
 
     def trace_all(self, origins: Any, directions: Any, precision: str = "double", tmin: Any = None, tmax: Any = None,
                   hits_max: Optional[int] = None, device: Union[None, int, str] = None, lanes: int = 0) -> AllHits:
-        """Finds all hits of each ray, or the nearest hits_max, sorted by ray and then by t: of hits at the same t only one.
-        Arguments are those of `trace`, but precision is not "certified"."""
+        """Finds all hits of each ray, or the nearest hits_max, sorted by ray and then by t. If several hits have the same t, it
+        finds one. The other arguments are those of `trace`, but precision must not be "certified"."""
         rays, keep = _rays(origins, directions, tmin, tmax)
         found = _c.AllHits(ctypes.sizeof(_c.AllHits))
         most = ctypes.c_size_t(-1) if hits_max is None else _count("hits_max", hits_max)
@@ -383,7 +383,7 @@ class Scene:
 
 
 def _rays(origins: Any, directions: Any, tmin: Any, tmax: Any) -> tuple[Any, Any]:
-    """Returns the rays, and the arrays that must live as long."""
+    """Returns the rays and the arrays that they refer to, which must live as long."""
     given = [array for array in (origins, directions, tmin, tmax) if array is not None]
     is_float = all(getattr(array, "dtype", None) == np.float32 for array in given)
     dtype = np.float32 if is_float else np.float64
@@ -408,13 +408,13 @@ def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) ->
 
 @dataclass(frozen=True)
 class ImageMetrics:
-    """How far an image is from its reference: the figures of `glint diff`, with the names of its JSON report.
+    """The differences between an image and its reference: the figures of `glint diff`, with the names of its JSON report.
 
-    max_abs to rel_mse compare the values that are finite in both, and are NaN if there are none. max_ulp is in units in the last place of the arrays' type.
-    srgb8_off_by_1 to flip_max compare colors as a screen shows them, and are 0 or NaN for data.
+    max_abs to rel_mse compare the values that are finite in both, and are NaN if there are none. max_ulp is in units in the last place
+    of the arrays' type. srgb8_off_by_1 to flip_max compare colors as a screen shows them, and are 0 or NaN for data.
     """
-    differing_values: int  #: in any bit
-    unmatched_values: int  #: infinite or NaN in one, and not the same in the other
+    differing_values: int  #: pairs that differ in any bit
+    unmatched_values: int  #: pairs in which one is infinite or NaN and the other is not the same
     nonfinite_reference: int  #: pixels
     nonfinite_image: int
     compared_values: int
@@ -435,10 +435,10 @@ class ImageMetrics:
 
 
 def compare(reference: Any, image: Any, color: Optional[bool] = None) -> ImageMetrics:
-    """Compares an image with its reference, arrays of one shape: (height, width, channels), or fewer dimensions.
+    """Compares an image with its reference. Both arrays have the same shape, (height, width, channels) or fewer dimensions.
 
-    color: whether they are colors in linear light, by default if there are 3 channels; normals, say, are not. Other arrays are
-    data, such as t. Arrays are compared as float32 if both are, else as float64.
+    color: whether they are colors in linear light, by default if there are 3 channels. Set it to False for data, such as
+    normals. Arrays of other shapes, such as t, are data. Arrays are compared as float32 if both are, else as float64.
     """
     given = np.asarray(reference), np.asarray(image)
     shape = given[0].shape
@@ -462,8 +462,8 @@ def compare(reference: Any, image: Any, color: Optional[bool] = None) -> ImageMe
 
 def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,
          camera: Union[None, str, os.PathLike[str]] = None) -> Scene:
-    """Reads a scene, mesh or glTF file. overrides, frame: of a YAML scene, as for Scene. camera: another scene's file, whose
-    camera replaces the scene's."""
+    """Reads a scene, mesh or glTF file. overrides, frame: for YAML scenes, as in Scene. camera: the path of another scene,
+    whose camera replaces the scene's."""
     options = _options(overrides, frame, None if camera is None else os.fsencode(camera))
     scene = Scene.__new__(Scene)
     scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
@@ -471,7 +471,7 @@ def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, An
 
 
 def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
-    """Makes a scene of triangles: vertices (n, 3), faces (m, 3), and normals (n, 3) for smooth shading. A face's index is
+    """Makes a scene of triangles from vertices (n, 3), faces (m, 3) and, for smooth shading, normals (n, 3). A face's index is
     its object. A camera frames the mesh, and two lights illuminate it."""
     points = _reals(vertices, 3, None, "vertices", np.float32 if getattr(vertices, "dtype", None) == np.float32 else np.float64)
     directions = None if normals is None else _reals(normals, 3, len(points), "normals", points.dtype)

@@ -1,4 +1,4 @@
-"""Results of operations of OpenCL C by integers and fractions alone, so that no floating-point unit has to be trusted.
+"""Computes operations of OpenCL C with integers and fractions only, so that no floating-point unit has to be trusted.
 
 A value is a type and the bits of each lane. NaNs count as equal, with the bits of NAN.
 """
@@ -32,18 +32,18 @@ class Value(NamedTuple):
 
 
 class Undefined(Exception):
-    """The standard allows more than one result."""
+    """Raised if the standard allows more than one result."""
 
 
 def number(kind, bits):
-    """A lane as an int or a float, which holds every float and double."""
+    """Returns a lane as an int or a float. Python's float represents every float and double."""
     if kind in FORMATS:
         return struct.unpack(FORMATS[kind][0], struct.pack(FORMATS[kind][1], bits))[0]
     return bits - (1 << BITS[kind]) if kind in SIGNED and bits >> (BITS[kind] - 1) else bits
 
 
 def bits_of(kind, value):
-    """The bits of an int, float or fraction, rounded to nearest with ties to even, or modulo the type's range."""
+    """Returns the bits of an int, float or fraction, rounded to nearest with ties to even, or modulo the type's range."""
     if kind == "bool":
         return int(value != 0)
     if kind not in FORMATS:
@@ -65,7 +65,7 @@ def bits_of(kind, value):
 
 
 def root(value):
-    """The root of a fraction, with enough digits and a last one that is odd if it is inexact, so that it rounds as the root does."""
+    """Returns a fraction's root with enough digits to round correctly. If it is inexact, the last digit is odd."""
     scale = 2 ** (128 + 2 * abs(value.numerator.bit_length() - value.denominator.bit_length()))
     scaled = value.numerator * scale * scale // value.denominator
     whole = math.isqrt(scaled)
@@ -73,7 +73,7 @@ def root(value):
 
 
 def of_floats(operation, numbers):
-    """A float or fraction that is to be rounded."""
+    """Returns the result of an operation on floats, as a float or a fraction that is not rounded yet."""
     a, b, c = (*numbers, 0.0, 0.0)[:3]
     if operation in ("fmin", "fmax", "min", "max"):
         if any(map(math.isnan, numbers)):
@@ -105,13 +105,13 @@ def of_floats(operation, numbers):
 
 
 def common_type(*kinds):
-    """The type in which the operands of a comparison are compared."""
+    """Returns the type in which the operands of a comparison are compared."""
     ranks = list(BITS)
     return max((kind if BITS[kind] >= 32 else "int" for kind in kinds), key=ranks.index)
 
 
 def of_lane(operation, kind, operands):
-    """The bits of one lane of the result, of type `kind`, for operands that are pairs of type and bits."""
+    """Returns the bits of one lane of the result, whose type is `kind`. Operands are pairs of type and bits."""
     (first, bits), numbers = operands[0], [number(*operand) for operand in operands]
     if operation in COMPARISONS:
         shared = common_type(*(of for of, _ in operands))
@@ -125,7 +125,7 @@ def of_lane(operation, kind, operands):
         return bits ^ sign if operation == "neg" else bits & ~sign | (operands[1][1] & sign if operation == "copysign" else 0)
     if operation == "convert":
         if kind not in FORMATS and first in FORMATS and number(kind, bits_of(kind, numbers[0])) != math.trunc(numbers[0]):
-            raise Undefined  # beyond the integers
+            raise Undefined  # outside the integer type's range
         return bits_of(kind, numbers[0])
     if operation in ("<<", ">>"):
         amount = numbers[1] % BITS[kind]
@@ -148,7 +148,7 @@ def of_lane(operation, kind, operands):
 
 
 def exact(operation, operands, result):
-    """The only right value of the type of `result`, or None where the standard allows more than one or the operation is unknown."""
+    """Returns the only right value, which has the type of `result`, or None if several are allowed or the operation is unknown."""
     count = len(result.lanes)
     try:
         if operation.startswith("as_"):

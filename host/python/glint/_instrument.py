@@ -1,10 +1,10 @@
-"""Makes a kernel record its operations: every operator, conversion and call of a built-in function, with its operands and its result.
+"""Makes a kernel record every operator, conversion and call of a built-in function, with its operands and its result.
 
 `a + b` becomes a statement expression, which keeps the types that C gives to operands and result:
     ({ __auto_type a7 = a; __auto_type b7 = b; __auto_type r7 = a7 + b7; trace_id(trace, 7); trace_put(trace, a7); …; r7; })
-Each function gets the trace as its first parameter, NULL for work-items that are not traced. Functions overloaded by type store
-a value as its type and its bits, and a NaN as the same one on every device. Statement expressions, __auto_type and overloading
-are extensions of clang, from which OpenCL compilers are made.
+Each function receives the trace as its first parameter, NULL for work-items that are not traced. Functions overloaded by type store
+a value as its type and its bits, and every NaN as the same bits on all devices. Statement expressions, __auto_type and overloading
+are extensions of clang, on which OpenCL compilers are based.
 """
 import re
 import subprocess
@@ -18,10 +18,10 @@ from pycparserext.ext_c_parser import OpenCLCParser
 from ._exact import BITS, FORMATS, NAN, Value
 
 TYPES = [f"{base}{lanes}" for base in BITS if base != "bool" for lanes in ("", 2, 3, 4, 8, 16)] + ["bool"]
-HEAD = 3  # words before those of the trace: their number, how many of them are left out, how many there is space for
+HEAD = 3  # words before the trace: its number of words, those skipped at its start, and the capacity
 PARAMETERS = "global uint *trace_words, uint trace_x, uint trace_y"
 START = "  global uint *trace = get_global_id(0) == trace_x && get_global_id(1) == trace_y ? trace_words : 0;\n"
-# built-in functions that return nothing, must have constants as arguments, read memory or are part of control flow
+# built-in functions that return nothing, require constant arguments, access memory or are part of control flow
 UNRECORDED = re.compile("(v(load|store)|atomic_|prefetch|get_|barrier|mem_fence|__builtin_(expect|prefetch|shufflevector|ia32))")
 OPERATORS = {"-": "neg", "!": "!", "~": "~"}
 
@@ -32,9 +32,9 @@ class Site:
     operation: str
     function: str
     place: str
-    count: int  # of values, the result included
-    form: str = ""  # of the expression, with {0}, {1} … for operands
-    names: tuple = ()  # of parameters
+    count: int  # the number of values, including the result
+    form: str = ""  # the expression, with {0}, {1} … for operands
+    names: tuple = ()  # the parameters' names
 
     @property
     def is_entry(self):
@@ -42,13 +42,13 @@ class Site:
 
 
 def preprocess(text, definitions):
-    """The text as a compiler sees it that defines the given macros and otherwise only those of OpenCL."""
+    """Preprocesses the text with the given macros and otherwise only those of OpenCL."""
     command = ["cpp", "-undef", "-D__OPENCL_VERSION__=120", "-D__ENDIAN_LITTLE__=1", *(f"-D{each}" for each in definitions)]
     return subprocess.run(command, input=text, stdout=subprocess.PIPE, text=True, check=True).stdout
 
 
 class Names(c_ast.NodeVisitor):
-    """The names that occur in a node."""
+    """Collects the names that occur in a node."""
 
     def __init__(self, node):
         self.names = set()
@@ -59,7 +59,7 @@ class Names(c_ast.NodeVisitor):
 
 
 class Pruner(c_ast.NodeVisitor):
-    """Removes what constants rule out, which most features of a scene are: branches of `if`, and what follows `if (1) return`."""
+    """Removes code that constants rule out, since most features are constants: branches of `if`, and code after `if (1) return`."""
 
     def visit_If(self, n):
         value = constant_of(n.cond)
@@ -78,7 +78,7 @@ class Pruner(c_ast.NodeVisitor):
 
 
 def constant_of(n):
-    """The value of a condition of constants, or None."""
+    """Returns the value of a condition of constants, or None if it is not constant."""
     if isinstance(n, c_ast.Constant) and n.value.isdigit():
         return int(n.value)
     if isinstance(n, c_ast.UnaryOp) and n.op == "!":
@@ -96,11 +96,11 @@ def is_kernel(function):
 
 
 def parse(text, parser=OpenCLCParser):
-    """The program without what its kernels do not use, most of it, which would have to be compiled."""
+    """Parses the program and removes the functions that its kernels do not use, which are most, to save compiling them."""
     program = parser().parse(text, initial_type_symbols={"__auto_type"})
     Pruner().visit(program)
     functions = [each for each in program.ext if isinstance(each, c_ast.FuncDef)]
-    names = {}  # that occur in the functions of a name
+    names = {}  # names that occur in functions, by the functions' names
     for function in functions:
         names.setdefault(function.decl.name, set()).update(Names(function.body).names)
     used, waiting = set(), {function.decl.name for function in functions if is_kernel(function)}
@@ -112,7 +112,7 @@ def parse(text, parser=OpenCLCParser):
 
 
 class Generator(GnuCGenerator):
-    """Writes OpenCL C, in which a cast may be the literal of a vector: (float4)(a, b) and, a literal with a subscript, (float4)(a)[b]."""
+    """Writes OpenCL C, in which a cast may be a vector literal, such as (float4)(a, b), or one with a subscript, (float4)(a)[b]."""
 
     def visit_Cast(self, n):
         return f"(({self._generate_type(n.to_type, emit_declname=False)})({self.visit(n.expr)}))"
@@ -122,12 +122,12 @@ PUT = "static void __attribute__((overloadable, noinline)) trace_put(global uint
 
 
 def put_opaque(kind):
-    """The function that stores that a value is a pointer or a struct."""
+    """Returns the function that records that a value is a pointer or a struct."""
     return f"{PUT}, {kind} v) {{ if (trace) trace_word(trace, {len(TYPES)}); }}"
 
 
 def lane_write(base):
-    """The function that stores one number."""
+    """Returns the function that stores one number."""
     word, end = ("ulong", "UL") if BITS[base] == 64 else ("uint", "U")
     bits, statements = f"({word})v", ""
     if base in FORMATS:
@@ -139,7 +139,7 @@ def lane_write(base):
 
 
 def header(has_double):
-    """The functions that store values."""
+    """Returns the functions that store values."""
     lines = ["#pragma OPENCL EXTENSION cl_khr_fp64 : enable"] if has_double else []
     lines += ["static void trace_word(global uint *trace, uint word) { uint at = trace[0]++ - trace[1]; if (at < trace[2]) trace[3 + at] = word; }",
               "static void __attribute__((noinline)) trace_id(global uint *trace, uint id) { if (trace) trace_word(trace, id); }"]
@@ -157,7 +157,7 @@ def lane_count(name):
 
 
 def read_value(words, at):
-    """A value and the position behind it; None for a pointer."""
+    """Returns a value, or None for a pointer or a struct, and the position after it."""
     if words[at] == len(TYPES):
         return None, at + 1
     name = TYPES[words[at]]
@@ -169,7 +169,7 @@ def read_value(words, at):
 
 
 class Instrumenter(Generator):
-    """Writes the program with the selected sites recorded; None selects all."""
+    """Writes the program so that it records the selected sites, or all if `selected` is None."""
 
     def __init__(self, program, selected=None):
         super().__init__()
@@ -184,7 +184,7 @@ class Instrumenter(Generator):
         self.text = header("double" in text) + text
 
     def arithmetic(self, kind):
-        """The name of a type of numbers, or None for another type."""
+        """Returns the name of a numeric type, or None for another type."""
         while isinstance(kind, (c_ast.Typename, c_ast.TypeDecl)):
             kind = kind.type
         if isinstance(kind, c_ast.Enum):
@@ -198,13 +198,13 @@ class Instrumenter(Generator):
         return name if name in TYPES else None
 
     def site_add(self, node, operation, count, **members):
-        """The number of a new site, or None if it is not to be recorded."""
+        """Adds a site. Returns its number, or None if it is not to be recorded."""
         self.sites.append(Site(operation, self.function, f"{node.coord.file}:{node.coord.line}", count, **members))
         number = len(self.sites) - 1
         return number if self.selected is None or number in self.selected else None
 
     def record(self, node, operation, form, operands, plain):
-        """The text of an operation on operands, which are nodes; `plain` writes it without a record."""
+        """Returns the text of an operation on operands, which are nodes. `plain` writes it without recording."""
         if self.function is None or all(map(is_constant, operands)):
             return plain(node)
         number = self.site_add(node, operation, len(operands) + 1, form=form)
@@ -224,7 +224,7 @@ class Instrumenter(Generator):
         return self.record(n, OPERATORS[n.op], f"{n.op}{{0}}", [n.expr], plain) if n.op in OPERATORS else plain(n)
 
     def visit_Assignment(self, n):
-        """Writes `a += b` as `a = a + b`, unless `a` changes what it reads."""
+        """Writes `a += b` as `a = a + b`, unless evaluating `a` twice would change the result."""
         if n.op == "=" or not is_pure(n.lvalue, may_read=True):
             return super().visit_Assignment(n)
         return f"{self.visit(n.lvalue)} = {self.visit(c_ast.BinaryOp(n.op[:-1], n.lvalue, n.rvalue, n.coord))}"
@@ -235,7 +235,7 @@ class Instrumenter(Generator):
         return self.record(n, "convert", f"({kind}){{0}}", [n.expr], plain) if kind else plain(n)
 
     def visit_TernaryOp(self, n):
-        """Records a choice only between pure expressions, since others might have to stay uncomputed."""
+        """Records a choice only between pure expressions, since recording evaluates both."""
         plain = super().visit_TernaryOp
         can_compute = is_pure(n.iftrue) and is_pure(n.iffalse)
         return self.record(n, "select", "{0} ? {1} : {2}", [n.cond, n.iftrue, n.iffalse], plain) if can_compute else plain(n)
@@ -281,7 +281,7 @@ class Instrumenter(Generator):
 
 
 def is_constant(n):
-    """Whether a compiler knows the value."""
+    """Returns whether the value is a compile-time constant."""
     if isinstance(n, c_ast.Constant) or isinstance(n, c_ast.ID) and n.name.isupper():
         return True
     if isinstance(n, c_ast.Cast) or isinstance(n, c_ast.UnaryOp) and n.op in ("-", "~", "+"):
@@ -292,7 +292,7 @@ def is_constant(n):
 
 
 def is_pure(n, may_read=False):
-    """Whether computing the expression has no effect and cannot fail: it neither calls nor, unless it may, reads elements."""
+    """Returns whether evaluating the expression has no effect and cannot fail. `may_read` permits it to read elements."""
     if isinstance(n, (c_ast.ID, c_ast.Constant)):
         return True
     if isinstance(n, c_ast.StructRef):

@@ -1,4 +1,4 @@
-"""The C interface of libglint (glint.h) by ctypes."""
+"""Binds the C interface of libglint (glint.h) with ctypes."""
 import ctypes
 import importlib.util
 import os
@@ -65,7 +65,7 @@ _FUNCTIONS = {
 
 
 def pocl_of_pip(vendors="/etc/OpenCL/vendors"):
-    """The library of PoCL that pip installed as pocl-binary-distribution; None without it, or where the system has a driver."""
+    """Returns the PoCL library of pip's pocl-binary-distribution, or None if it is not installed or the system has a driver."""
     package = importlib.util.find_spec("pocl_binary_distribution")
     if not package or not package.origin or any(pathlib.Path(vendors).glob("*.icd")):
         return None
@@ -74,12 +74,12 @@ def pocl_of_pip(vendors="/etc/OpenCL/vendors"):
 
 
 def _open():
-    """Loads the library that GLINT_LIBRARY names, else the wheel's, else the system's. Names PoCL of pip in the environment."""
+    """Loads the library that GLINT_LIBRARY names, else the wheel's, else the system's. Sets environment variables to pip's PoCL."""
     bundled = pathlib.Path(__file__).with_name(NAME)
     driver = pocl_of_pip()
     if driver and "OCL_ICD_VENDORS" not in os.environ:
-        os.environ["OCL_ICD_VENDORS"] = driver  # ocl-icd accepts a library's path there,
-        os.environ.setdefault("OCL_ICD_FILENAMES", driver)  # Khronos' loader here
+        os.environ["OCL_ICD_VENDORS"] = driver  # ocl-icd accepts a library's path
+        os.environ.setdefault("OCL_ICD_FILENAMES", driver)  # the variable of Khronos' loader
     opened = ctypes.CDLL(os.environ.get("GLINT_LIBRARY") or (str(bundled) if bundled.exists() else NAME))
     for name, (result, *arguments) in _FUNCTIONS.items():
         function = getattr(opened, name)

@@ -4,9 +4,9 @@
     glint render scene.yaml --precision strict --capture launches
     python3 -m glint.locate launches --device "the suspect" --reference "another"
 
-Repeats each captured launch on both devices until a pixel differs, then that pixel's work-group by a kernel that records
-every operation, and finds the first one that has equal operands and unequal results. Writes it as a separate program.
-If the difference vanishes with all operations recorded, finds the fewest whose recording makes it vanish.
+Re-runs each captured launch on both devices until a pixel differs. Then re-runs that pixel's work-group with a kernel that
+records every operation, and finds the first one that has equal operands and unequal results. Writes it as a separate program.
+If the difference vanishes when all operations are recorded, finds a smallest set whose recording makes it vanish.
 """
 import argparse
 import base64
@@ -32,7 +32,7 @@ TRACE_WORDS = 1 << 22
 
 
 class Failure(Exception):
-    """What ends the search, with a message for the user."""
+    """Raised to end the search with a message for the user."""
 
 
 class Launch:
@@ -44,7 +44,7 @@ class Launch:
         self.text = (path.parent / index["text"]).read_text(encoding="utf-8")
         self.items, self.device = index["items"], index["device"]
         self.first, self.group = index.get("first") or [0] * len(self.items), index.get("group")
-        self.arguments = {}  # by index: the bytes of a buffer, or those of a value in a tuple
+        self.arguments = {}  # by index: the bytes of a buffer, or a tuple with those of a value
         for argument in index["arguments"]:
             if "value" in argument:
                 value = (base64.b64decode(argument["value"]),)
@@ -57,12 +57,12 @@ class Launch:
 
     @functools.lru_cache(maxsize=None)
     def program(self, definitions):
-        """The parsed text, for a compiler that defines the macros."""
+        """Returns the text as parsed for a compiler that defines the macros."""
         return instrument.parse(instrument.preprocess(self.text, definitions))
 
     @property
     def band(self):
-        """x and y of the first pixel, width and height."""
+        """Returns x and y of the first pixel, the width and the height."""
         return np.frombuffer(self.arguments[BAND][0], np.uint32)
 
 
@@ -92,7 +92,7 @@ class Device:
         return data
 
     def group_fit(self, kernel, group):
-        """The work-group reduced to what device and kernel allow, as host/opencl/launch.c does."""
+        """Returns the work-group reduced to what device and kernel allow, as in host/opencl/launch.c."""
         group, sides = list(group), self.device.max_work_item_sizes
         most = kernel.get_work_group_info(cl.kernel_work_group_info.WORK_GROUP_SIZE, self.device)
         while int(np.prod(group)) > most or any(side > limit for side, limit in zip(group, sides)):
@@ -101,7 +101,7 @@ class Device:
         return group
 
     def run(self, launch, text, item=None, extra=()):
-        """The film after the whole launch, or after that of the work-group of one item; and the buffers among `extra`."""
+        """Runs the whole launch, or one item's work-group. Returns the film and the buffers among `extra`."""
         kernel = self.kernel(text, launch.kernel, launch.options)
         buffers = {index: self.buffer(value) for index, value in launch.arguments.items() if isinstance(value, bytes)}
         for index, value in launch.arguments.items():
@@ -121,12 +121,12 @@ class Device:
 class Pixel(NamedTuple):
     x: int  # in the image
     y: int
-    at: int  # its index in the film
+    at: int  # index in the film
     item: tuple  # the work-item that renders it
 
 
 def first_pixel(launch, film, other):
-    """The first pixel whose bits differ, or None."""
+    """Returns the first pixel whose bits differ, or None."""
     left, top, width, height = map(int, launch.band)
     size = launch.pixel_words * width * height
     differing = np.nonzero(film[:size] != other[:size])[0]
@@ -147,7 +147,7 @@ class Record(NamedTuple):
 
 
 def records(words, sites):
-    """The records of a trace, each with the position behind it. Ends before one that is cut off."""
+    """Yields the records of a trace, each preceded by the position after it. Ends before a truncated record."""
     words = words.tolist()
     at = 0
     try:
@@ -174,13 +174,13 @@ class Finding(NamedTuple):
         return self.ours.site
 
     def first_lane(self):
-        """The number of lanes of the results, and the first that differs."""
+        """Returns the number of lanes of the results and the first that differs."""
         ours, theirs = (record.values[-1].lanes for record in (self.ours, self.theirs))
         return len(ours), [a == b for a, b in zip(ours, theirs)].index(False)
 
     @property
     def right(self):
-        """The only right result, or None."""
+        """Returns the only right result, or None if several are allowed or the operation is unknown."""
         return exact(self.site.operation, self.ours.operands, self.ours.values[-1])
 
 
@@ -192,14 +192,14 @@ class Search:
         self.program = launch.program(tuple(definitions))
 
     def color(self, film):
-        """The bits of the pixel."""
+        """Returns the bits of the pixel."""
         return film[self.launch.pixel_words * self.pixel.at:][:self.launch.pixel_words].tolist()
 
     def trace_arguments(self, begin, size):
         return [np.concatenate([np.array([0, begin, size], np.uint32), np.zeros(size, np.uint32)]), *map(np.uint32, self.pixel.item)]
 
     def is_equal(self, selected, device=None):
-        """Whether the suspect's pixel is the reference's by a kernel that records the selected sites (None: one without traces)."""
+        """Returns whether a device renders the reference's pixel with the selected sites recorded, or with no trace if None."""
         text = instrument.Generator().visit(self.program) if selected is None else instrument.Instrumenter(self.program, selected).text
         extra = () if selected is None else self.trace_arguments(0, 0)
         return self.color((device or self.suspect).run(self.launch, text, self.pixel.item, extra)[0]) == self.bits[1]
@@ -218,7 +218,7 @@ class Search:
         return self.vanished(traced) if self.is_equal(range(len(traced.sites))) else self.compare(traced.text)
 
     def compare(self, text):
-        """The first difference between the traces of the pixel's work-item."""
+        """Returns the first difference between the traces of the pixel's work-item."""
         begin, entries, first_other = 0, [], None
         while True:
             traces, totals = [], []
@@ -247,13 +247,13 @@ class Search:
                 return first_other
 
     def is_wrong(self, finding):
-        """Whether one of two results must be wrong. Bits of a NaN may differ, and quotients and roots that the kernel repairs."""
+        """Returns whether a result must be wrong. Bits of NaNs may differ, and quotients and roots that the kernel repairs."""
         is_of_nan = finding.site.operation.startswith("as_") and NAN.get(finding.ours.operands[0].type) in finding.ours.operands[0].lanes
         is_repaired = self.launch.repairs_divide and finding.site.function.startswith(("device_", "uniform_"))
         return finding.right is not None and not is_of_nan and not is_repaired
 
     def vanished(self, traced):
-        """The smallest set of functions whose recording makes the difference vanish, then of the sites in them."""
+        """Returns a smallest list of sites whose recording makes the difference vanish, within a smallest list of functions."""
         if self.is_equal(None):
             raise Failure("the preprocessed text gives equal pixels, so the difference is in a part of it for certain compilers, such as "
                           "#ifdef __clang__; define the macros that the compiler has by --define")
@@ -268,7 +268,7 @@ class Search:
 
 
 def smallest(units, holds):
-    """A smallest list of units for which `holds`, which is true for all of them, by one binary search per unit found."""
+    """Returns a smallest list of units for which `holds` is true, by one binary search per unit. It must hold for all units."""
     kept = []
     while not holds(kept):
         if not units:
@@ -288,7 +288,7 @@ def type_name(value):
 
 
 def words_of(value):
-    """The bits as 32-bit words."""
+    """Returns the bits as 32-bit words."""
     return [word for bits in value.lanes for word in ([bits & 0xFFFFFFFF, bits >> 32] if value.type in ("long", "ulong", "double") else [bits])]
 
 
@@ -325,7 +325,7 @@ def program_write(path, finding, launch):
 
 
 def program_run(path, device):
-    """The result of a written operation, and the expected one, as words."""
+    """Runs a written operation. Returns its result and the expected one as words."""
     text = Path(path).read_text(encoding="utf-8")
     options, inputs, expected = (re.search(rf"(?m)^// {name}: ([^(\n]*)", text)[1] for name in ("options", "inputs", "expected"))
     kernel = device.kernel(text, "operation", shlex.split(options))
@@ -336,7 +336,7 @@ def program_run(path, device):
 
 
 def describe_ray(entries):
-    """The sample, ray and hits of a work-item when it had entered the functions."""
+    """Describes a work-item's sample, ray and hits after it has entered the functions."""
     names = [entry.site.function for entry in entries]
     value = {(at, name): number(value.type, value.lanes[0])
              for at, entry in enumerate(entries) for name, value in zip(entry.site.names, entry.values)}
@@ -353,7 +353,7 @@ def describe_ray(entries):
 
 
 def report(search, found, path):
-    """What was found, as lines for the user; writes the program of an operation to `path`."""
+    """Yields the finding as lines for the user. Writes an operation's program to `path`."""
     suspect, reference = search.suspect, search.reference
     yield f"pixel {search.pixel.x},{search.pixel.y}: color " + " instead of ".join(" ".join(f"{bits:08x}" for bits in color) for color in search.bits)
     if isinstance(found, list):
@@ -388,7 +388,7 @@ def report(search, found, path):
 
 
 def device_find(name):
-    """The device that an index or a part of "PLATFORM, DEVICE" names."""
+    """Returns the device that an index or a part of "PLATFORM, DEVICE" names."""
     devices = [device for platform in cl.get_platforms() for device in platform.get_devices()]
     found = [device for index, device in enumerate(devices)
              if name == str(index) or not name.isdigit() and name.lower() in f"{device.platform.name}, {device.name}".lower()]

@@ -11,8 +11,8 @@ from . import MISS, Hits, load_mesh
 class RayMeshIntersector:
     """Ray queries on a trimesh.Trimesh, with the methods of trimesh.ray's classes.
 
-    First and any hits are traced at `precision`. At `certified`, `hits` reports which of them are proven. Queries for all
-    hits are traced in double and are not certified. After the mesh has changed, make another intersector.
+    Queries for the first hit or any hit are traced at `precision`. At `certified`, `hits` reports which results are proven.
+    Queries for all hits are traced in double and are not certified. If the mesh changes, create a new intersector.
     """
 
     def __init__(self, mesh: Any, precision: str = "certified", device: Union[None, int, str] = None):
@@ -44,7 +44,7 @@ class RayMeshIntersector:
     def intersects_id(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True, max_hits: int = 20,
                       return_locations: bool = False) -> tuple[np.ndarray, ...]:
         """Returns the triangles that rays hit and the indices of these rays, and with `return_locations` the hit points.
-        A ray's hits are sorted by t. Of triangles hit at the same t only the first is returned."""
+        A ray's hits are sorted by t. If several triangles are hit at the same t, only the first is returned."""
         origins, directions = (np.asarray(array, np.float64) for array in (ray_origins, ray_directions))
         if multiple_hits:
             found = self._scene.trace_all(origins, directions, hits_max=max_hits, device=self._device)
@@ -56,8 +56,8 @@ class RayMeshIntersector:
         return (*result, origins[rays] + t[:, None] * directions[rays]) if return_locations else result
 
     def contains_points(self, points: Any) -> np.ndarray:
-        """Returns whether each point lies inside the mesh, which must be watertight: a ray from an inside point leaves through
-        an odd number of triangles. The direction avoids the edges of common models."""
+        """Returns whether each point lies inside the mesh, which must be watertight. Rays from inside points hit an odd number
+        of triangles. Their direction avoids the edges of common models."""
         points = np.asarray(points, np.float64)
         directions = np.broadcast_to([0.4395064455, 0.617598629942, 0.652231566745], points.shape)
         found = self._scene.trace_all(points, directions, device=self._device)

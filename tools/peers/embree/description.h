@@ -1,5 +1,5 @@
-// A scene as tools/peers/embree.py writes it: lists of numbers, each after its name and how many items it
-// has.
+// A scene as tools/peers/embree.py writes it: lists of numbers, each preceded by its name and its number of
+// items.
 #pragma once
 
 #include <stdbool.h>
@@ -10,18 +10,18 @@ typedef struct {
 } Vector;
 
 typedef struct {
-    Vector eye, forward, right, up; // the last three unit and perpendicular
-    float half_tangent;             // of the vertical field of view
+    Vector eye, forward, right, up; // the last three are unit and perpendicular
+    float half_tangent;             // the tangent of half the vertical field of view
 } Camera;
 
 typedef struct {
-    Vector position, color; // of a directional light the position is the direction to it
+    Vector position, color; // a directional light's position is the direction to it
     bool is_directional;
 } Light;
 
-// Flat arrays, here and in a mesh: only from those do compilers gather.
+// Arrays are flat here and in meshes, because compilers gather only from flat arrays.
 enum {
-    MATERIAL_AMBIENT = 0, // a color; the ambient light and the material's own color are in it
+    MATERIAL_AMBIENT = 0, // a color, multiplied by the ambient light and the material's color
     MATERIAL_DIFFUSE = 3, // a color
     MATERIAL_SPECULAR = 6,
     MATERIAL_SHININESS = 7,
@@ -41,9 +41,9 @@ typedef struct {
 enum { INSTANCE_PARTS = 12 }; // the columns of a matrix 3x4: a rotation times a factor, and a translation
 
 typedef struct {
-    float *vertices, *normals; // three numbers of each; no normals: flat
-    int *faces;                // three vertices of each
-    float *instances;          // INSTANCE_PARTS of each; if there are any, only they are drawn
+    float *vertices, *normals; // three numbers each; without normals, flat
+    int *faces;                // three vertices each
+    float *instances;          // INSTANCE_PARTS each; replace the mesh itself
     size_t vertex_count, face_count, instance_count;
     size_t first_instance; // number of instances of earlier meshes
     int material;
@@ -53,7 +53,7 @@ typedef struct {
     Camera camera;
     Vector background;
     Light *lights;
-    float *materials; // MATERIAL_PARTS of each
+    float *materials; // MATERIAL_PARTS each
     Plane *planes;
     Sphere *spheres;
     int *sphere_materials;
@@ -61,9 +61,9 @@ typedef struct {
     size_t light_count, material_count, plane_count, sphere_count, mesh_count, instance_count;
 } Description;
 
-// Ends the program with a message if the file cannot be read or is not a description. The result lives until
-// the end of the program.
+// Reads a description, which lives until the program exits. Exits with a message if the file cannot be read
+// or is not a description.
 Description description_read(const char *path);
 
-// Zeroed and aligned for any vector; ends the program where there is no memory.
+// Allocates zeroed memory, aligned for any vector. Exits if there is none.
 void *memory_get(size_t count, size_t size);

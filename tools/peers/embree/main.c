@@ -1,4 +1,4 @@
-// The scene of a description by Embree, on all cores: the time of a frame, and the image.
+// Renders a description with Embree on all cores. Reports the time of a frame and writes the image.
 #include "packet.h"
 #include "spheres.h"
 
@@ -68,7 +68,7 @@ static void geometry_attach(RTCScene scene, RTCGeometry geometry, unsigned id, e
     rtcReleaseGeometry(geometry);
 }
 
-// A copy that Embree owns: it wants room after the end of what it reads.
+// Copies items into a buffer that Embree owns, because it needs padding after the data.
 static void buffer_copy(RTCGeometry geometry, enum RTCBufferType type, enum RTCFormat format,
                         const void *items, size_t size, size_t count)
 {
@@ -138,7 +138,7 @@ static void tiles_render(Crew *crew)
     }
 }
 
-// As Embree advises for each thread that calls it.
+// Sets the modes that Embree recommends for each thread that calls it.
 static void denormals_off(void)
 {
     const unsigned flush_to_zero = 0x8000, denormals_are_zero = 0x0040;
@@ -167,8 +167,8 @@ static double frame_render(Crew *crew)
     return clock_read(CLOCK_MONOTONIC) - start;
 }
 
-// Seconds of each frame, and of the processors for a frame on average; the first two frames, which warm the
-// caches, are not among them.
+// Measures the seconds of each frame, and the average processor seconds of a frame, excluding the first two
+// frames, which warm the caches.
 static size_t frames_measure(Crew *crew, double seconds, double *times, size_t limit,
                              double *processor_seconds)
 {

@@ -4,11 +4,10 @@
 #include <stdalign.h>
 #include <string.h>
 
-static const int valid_lane = -1; // as Embree has it
+static const int valid_lane = -1; // the value that Embree expects
 
 // Planes are intersected here, before Embree: 16 rays against one plane cost a few instructions and shorten
-// tfar. This is faster than two large triangles in its BVH. Plane k is noted in hits as geometry FIRST_PLANE
-// + k.
+// tfar. This is faster than two large triangles in its BVH. Hits record plane k as geometry FIRST_PLANE + k.
 enum { FIRST_PLANE = 1 << 30 };
 
 typedef struct {
@@ -19,8 +18,8 @@ typedef struct {
 typedef struct {
     alignas(64) int found[LANES]; // valid_lane or 0
     int geometry[LANES];
-    Vectors position, start; // start: a little off the surface, for shadow rays
-    Vectors normal;          // to shade with, unit, towards the eye
+    Vectors position, start; // `start` is slightly off the surface, for shadow rays
+    Vectors normal;          // shading normal, unit, facing the eye
     Vectors to_eye;          // unit
     Vectors diffuse, color;
     float specular[LANES], shininess[LANES];
@@ -60,7 +59,7 @@ static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, c
     }
 }
 
-// Ends the rays where they meet a plane.
+// Ends the rays where they hit a plane.
 static void planes_meet(const Description *scene, struct RTCRayHit16 *rays)
 {
     for (size_t k = 0; k < scene->plane_count; k++) {
@@ -144,7 +143,7 @@ static void rays_occlude(const Renderer *renderer, const int *valid, struct RTCR
     }
 }
 
-// Normals of a mesh's vertices, blended where the rays meet it, in place of the triangles' own.
+// Replaces the triangles' normals at hits of a mesh with normals interpolated between its vertices.
 static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit16 *hit, const int *flip,
                         Vectors *normal)
 {
@@ -167,7 +166,7 @@ static void mesh_smooth(const Mesh *mesh, unsigned geometry, const struct RTCHit
     }
 }
 
-// Turns the normals of hits on the mesh's instances from its space to the scene's, and makes them unit.
+// Transforms the normals of hits on the mesh's instances from its space to the scene's and normalizes them.
 static void mesh_turn(const Description *scene, size_t k, const struct RTCHit16 *hit, float *normal_x,
                       float *normal_y, float *normal_z)
 {
@@ -203,7 +202,7 @@ static void normals_face(Vectors *normal, const int *flip)
     }
 }
 
-// Which rays meet something, and of what material; 0 for those that do not.
+// Finds the rays that hit something and the materials they hit, 0 on a miss. Returns whether any ray hits.
 static bool surfaces_find(const Description *scene, const int *valid, const struct RTCHit16 *hit,
                           Surfaces *surfaces, int *material)
 {
@@ -260,7 +259,8 @@ static void surfaces_place(const Description *scene, struct RTCRayHit16 *rays, S
     const Vector eye = scene->camera.eye;
     FOR_LANES
     {
-        // Some roundings of a coordinate off the surface, so that it does not shade itself.
+        // Shadow rays start some rounding errors of a coordinate off the surface, so that it does not shade
+        // itself.
         const float roundings = 0x1p-18F;
         float t = ray->tfar[i];
         float x = ray->org_x[i] + t * ray->dir_x[i], y = ray->org_y[i] + t * ray->dir_y[i],
@@ -278,7 +278,7 @@ static void surfaces_place(const Description *scene, struct RTCRayHit16 *rays, S
     }
 }
 
-// Gathers from tables take long, and the rays of a packet mostly meet one material.
+// Returns whether all lanes have one material, as most packets do; gathers from tables are then avoided.
 static bool all_equal(const int *numbers)
 {
     int different = 0;
@@ -326,7 +326,7 @@ static void surfaces_color(const Description *scene, const int *material, Surfac
     }
 }
 
-// Takes the lanes out of `lit` between whose surface and the light a plane stands.
+// Clears the lanes of `lit` for which a plane lies between the surface and the light.
 static void planes_occlude(const Description *scene, const Surfaces *surfaces, const Light *light, int *lit)
 {
     const Vector place = light->position;

@@ -1,5 +1,5 @@
-// The colors of 4x4 pixels: camera rays, closest hits, Phong's reflection with a shadow ray to each light.
-// All 16 rays are shaded at once, in loops over lanes that the compiler makes vector instructions of.
+// Renders 4x4 pixels at once: camera rays, closest hits, and Phong shading with a shadow ray to each light.
+// All 16 rays are shaded together, in loops over lanes that the compiler vectorizes.
 #pragma once
 
 #include "description.h"
@@ -23,15 +23,15 @@ static inline bool lanes_any(const int *lanes)
 typedef struct {
     const Description *description;
     RTCScene scene;
-    bool one_by_one; // not in packets of 16
+    bool one_by_one; // traces single rays instead of packets of 16
     enum RTCIntersectContextFlags coherence;
     unsigned width, height, samples;
     const float *offsets; // x and y of each sample, from -1 to 1 across the pixel
     float *film;          // height * width * 3, from the top left
 } Renderer;
 
-// The IDs of geometries: 0 for the spheres, if there are any, then those of the meshes, then those of the
-// instances, mesh by mesh. A mesh that has instances keeps its ID in the scene that they share.
+// Geometry IDs are 0 for the spheres, if there are any, followed by those of the meshes and those of the
+// instances, mesh by mesh. A mesh with instances keeps its ID in the scene that they share.
 static inline unsigned mesh_geometry(const Description *scene, size_t mesh)
 {
     return (unsigned)mesh + (scene->sphere_count > 0);

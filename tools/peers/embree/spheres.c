@@ -26,8 +26,8 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *arguments)
     bounds->upper_z = sphere->center.z + sphere->radius;
 }
 
-// Embree hands a callback as many rays as the CPU has lanes, 16 or fewer, each member an array of that many:
-// those of a ray, then those of its hit.
+// Embree passes a callback as many rays as the CPU has lanes, at most 16. Each member of a ray, then each of
+// its hit, is an array of that length.
 enum {
     ORG_X,
     ORG_Y,
@@ -44,9 +44,9 @@ enum {
     GEOM_ID
 };
 
-// The first hits of `count` rays, whose directions are unit; `hit`: which of the valid rays have one. From
-// the ray's point nearest to the center, so that squares of large numbers do not cancel (Haines and others,
-// Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
+// Finds the first hits of `count` rays with unit directions and sets `hit` for the valid rays that have one.
+// Uses the ray's point nearest to the center, so that squares of large numbers do not cancel (Haines and
+// others, Precision improvements for ray/sphere intersection, Ray Tracing Gems, 2019).
 static inline __attribute__((always_inline)) void
 sphere_hits(Sphere sphere, const float *rays, unsigned count, const int *valid, int *hit, float *distance)
 {
@@ -106,7 +106,7 @@ occlude(const struct RTCOccludedFunctionNArguments *arguments, unsigned count)
         rays[TFAR * count + i] = hit[i] ? -far_away : rays[TFAR * count + i];
 }
 
-// A constant count makes vectors of the loops.
+// A constant count lets the compiler vectorize the loops.
 static void sphere_intersect(const struct RTCIntersectFunctionNArguments *arguments)
 {
     if (arguments->N == LANES)

@@ -7,5 +7,5 @@
 
 RTCGeometry spheres_embree(RTCDevice device, Sphere *spheres, size_t count);
 
-// For packets of 16 whose directions are unit alone. `spheres` must outlive the geometry.
+// Only packets of 16 rays with unit directions are supported. `spheres` must outlive the geometry.
 RTCGeometry spheres_user(RTCDevice device, Sphere *spheres, size_t count);
