@@ -36,7 +36,7 @@
 
 // host/render/rerender.c
 #define HOST_AOV_LIST(LAYER) \
-    LAYER(DOUBT, doubt, INTEGER, 1, "at certified 1 where re-rendered in double, 2 where uncertified, else 0")
+    LAYER(FLAG, flag, INTEGER, 1, "at certified 1 where re-rendered in double, 2 where uncertified, else 0")
 
 #define LAYER_LIST(LAYER) \
     HIT_AOV_LIST(LAYER) PATH_AOV_LIST(LAYER) SAMPLED_AOV_LIST(LAYER) COLOR_LAYER(LAYER) HOST_AOV_LIST(LAYER)

@@ -11,7 +11,7 @@
 
 static Random random_state;
 
-enum { AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT };
+enum { AOVS = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG };
 
 typedef struct {
     size_t wrong, wrong_decided; // pixels; the latter are not listed as uncertified

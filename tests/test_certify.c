@@ -17,7 +17,7 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
     CertifySample reference;
     assert_true(certify_sample_open(&reference, scene, settings.width, settings.height, count,
                                     (ReferencePath){.bounce_count = settings.bounce_count}, NULL));
-    Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT);
+    Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG);
     const CertifyErrors errors = certify_compare(&reference, &film);
     size_t uncertain = 0;
     for (size_t i = 0; i < reference.count; i++)

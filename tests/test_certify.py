@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""glint certify: errors are noticed, and undecided pixels counted. tests/test_certify.c has what needs no command.
+"""glint certify: errors are noticed, and uncertified pixels counted. tests/test_certify.c has what needs no command.
 
 run_tests: sanitize-long-only"""
 import unittest
@@ -148,7 +148,7 @@ class Certify(TestCase):
         precisions = "strict" + ",certified" * HAS_DOUBLE + ",single" * IS_LONG + ",double" * (IS_LONG and HAS_DOUBLE)
         for name, row in self.certify("scene.yaml", f"--precision {precisions}").items():
             if name == "certified":
-                self.assertEqual((row["wrong_decided"], row["undecided"]["pixels"]), (0, 0))
+                self.assertEqual((row["wrong_decided"], row["uncertified"]["pixels"]), (0, 0))
             else:
                 self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
@@ -178,21 +178,21 @@ class Certify(TestCase):
         write("mirrors.yaml", MIRRORS if IS_LONG else MIRRORS + OUTSIDE)
         report = self.json("certify mirrors.yaml --size 24x16 --pixels 384 --bounces 64 --precision certified --json")
         row = report["precisions"][0]
-        self.assertEqual((row["compared"], row["undecided"]["pixels"], row["wrong_decided"]), (384, 0, 0))
+        self.assertEqual((row["compared"], row["uncertified"]["pixels"], row["wrong_decided"]), (384, 0, 0))
 
     @unittest.skipUnless(HAS_DOUBLE, "no fp64")
-    def test_undecided_pixels(self):
-        """Only pixels on an edge through the centers of a column are undecided, where errors of double's size change the answer."""
+    def test_uncertified_pixels(self):
+        """Only pixels on an edge through the centers of a column are uncertified, where errors of double's size change the answer."""
         write("edge.yaml", EDGE if IS_LONG else EDGE + BEHIND)
         report = self.json("certify edge.yaml --size 33x33 --pixels 10000 --precision certified --json")
         row = report["precisions"][0]
-        self.glint("render edge.yaml --size 33x33 --precision certified --quiet --aov doubt -o edge.png")
-        undecided = [i for i, doubt in enumerate(npy_read("edge.doubt.npy")[2]) if doubt == 2]
-        count = len(undecided)
+        self.glint("render edge.yaml --size 33x33 --precision certified --quiet --aov flag -o edge.png")
+        uncertified = [i for i, flag in enumerate(npy_read("edge.flag.npy")[2]) if flag == 2]
+        count = len(uncertified)
         self.assertGreater(count, 10)
-        self.assertEqual({i % 33 for i in undecided}, {16})
-        self.assertEqual(report["reference_undecided"], count)
-        self.assertEqual(row["undecided"], {"pixels": count, "examined": count, "witnessed": count, "close": 0})
+        self.assertEqual({i % 33 for i in uncertified}, {16})
+        self.assertEqual(report["reference_uncertain"], count)
+        self.assertEqual(row["uncertified"], {"pixels": count, "examined": count, "witnessed": count, "close": 0})
         self.assertEqual([row[name] for name in ("wrong_decided", "unconfirmed", "contradicted")], [0, 0, 0])
 
     def test_refused(self):

@@ -17,7 +17,7 @@ typedef enum { NOTHING, AN_OBJECT, A_COLOR, THE_CHECKER, A_SHADOW } Change;
 typedef struct {
     const char *precision;
     Change change;
-    uint32_t doubt; // of the pixel
+    uint32_t flag; // of the pixel
 } Case;
 
 static Case wrong;
@@ -31,7 +31,7 @@ bool __wrap_renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
     if (!rendered || (wrong.change != AN_OBJECT && wrong.change != A_COLOR)) return rendered;
     film->object[pixel] += wrong.change == AN_OBJECT;
     if (wrong.change == A_COLOR) film->color[3 * pixel + 1] += 0x1p-7;
-    film->doubt[pixel] = wrong.doubt;
+    film->flag[pixel] = wrong.flag;
     return true;
 }
 

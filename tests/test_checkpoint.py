@@ -85,10 +85,10 @@ class Checkpoints(TestCase):
         resumed = self.json(f"{command} -o image.npy --device all --checkpoint saved", env=TWO)
         self.assertSameBytes("image.npy", "whole.npy")
         self.assertTrue(0 < sum(device["share"] for device in resumed["by_device"]) < 1)
-        self.assertGreater(whole["undecided_samples"], 0)
-        for key in "repeated_samples", "undecided_samples":
+        self.assertGreater(whole["uncertified_samples"], 0)
+        for key in "rerendered_samples", "uncertified_samples":
             self.assertEqual(resumed[key], whole[key])
-        self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['repeated_samples']} samples re-rendered in double, ")
+        self.assertRegex(png_read("whole.png")[2]["Certified"], f"^{whole['rerendered_samples']} samples re-rendered in double, ")
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_devices(self):

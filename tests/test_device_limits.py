@@ -32,7 +32,7 @@ WORKS = (
     (f"memory={16 * MEBI},buffer={4 * MEBI}", f"{STRICT} --size 1920x{270 * SCALE} --aov {ALL_AOVS}"),
     (f"memory={32 * MEBI},buffer={8 * MEBI}", f"{STRICT} --size 1920x512 --work-group 1x256 --aov {ALL_AOVS}"),
     (f"group=1,constant=16384,memory={64 * MEBI},buffer={16 * MEBI}", f"{RENDER} --precision certified --lanes 1 --samples 2"),
-    ("buffers=8", f"{RENDER} --precision certified --lanes 1 --samples 2 --aov t,path,doubt"),
+    ("buffers=8", f"{RENDER} --precision certified --lanes 1 --samples 2 --aov t,path,flag"),
     # the watchdog: no launch grows more than fourfold
     ("first=4096", f"{STRICT} --size {960 * SCALE}x400 --aov {ALL_AOVS}"),
     ("first=4096", f"{RENDER} --precision certified --lanes 1 --size {480 * SCALE}x300 --samples 2"),
@@ -128,7 +128,7 @@ class DeviceLimits(TestCase):
     def test_reference_device(self):
         """A device without 64-bit floating point takes its work in double from another one, chosen or found."""
         mirrors = f"{ROOT}/tests/scenes/mirror-balls.yaml"
-        certified = "--size 96x64 --samples 2 --precision certified --quiet --aov doubt,path,t"
+        certified = "--size 96x64 --samples 2 --precision certified --quiet --aov flag,path,t"
         two = POCL | {"POCL_DEVICES": "basic pthread"}
         names = [device["name"] for device in self.json("devices --json", env=two)["devices"]]
         basic, pthread = (re.match(r"[\w-]+", name)[0] for name in names)  # PoCL 3.1's, of which 6.0 makes cpu-minimal-… and cpu-…
@@ -139,12 +139,12 @@ class DeviceLimits(TestCase):
         for option, message in ("", chosen), (f"--reference-device {pthread}", "^$"), ("--reference-device 1", "^$"):
             process = self.glint(f"render {mirrors} {certified} --device {basic} {option} -o image.npy", env=limited)
             self.assertRegex(process.stderr, re.compile(message, re.MULTILINE))
-            for end in "npy", "doubt.npy", "path.npy", "t.npy":
+            for end in "npy", "flag.npy", "path.npy", "t.npy":
                 self.assertSameBytes(f"one.{end}", f"image.{end}")
-        self.assertIn(1, npy_read("one.doubt.npy")[2], "no pixel was rendered in double")
+        self.assertIn(1, npy_read("one.flag.npy")[2], "no pixel was rendered in double")
         report = self.json(f"render {mirrors} {certified} --device {basic} -o image.npy --timing=json", env=limited)
         self.assertRegex(report["by_device"][0]["double_by"], f"^{pthread}")
-        self.assertIn("repeat", [launch["name"] for launch in report["by_device"][0]["launches"]])
+        self.assertIn("re-render", [launch["name"] for launch in report["by_device"][0]["launches"]])
 
         accuracy = f"accuracy {mirrors} --size 48x32 --precision single --json --seconds 0.1 --device"
         expected = self.json(f"{accuracy} {pthread} --save one", env=limited)["scenes"][0]

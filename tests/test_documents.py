@@ -142,7 +142,7 @@ def budget_long(seconds):
 
 def certified_compared(precision):
     rows = measured("certified")["rows"]
-    compared = sum(row["pixels"] - row["reference_undecided"] for row in rows)
+    compared = sum(row["pixels"] - row["reference_uncertain"] for row in rows)
     return compared - sum(sum(row["wrong"][precision].values()) for row in rows), compared
 
 

@@ -25,7 +25,7 @@ class DriverOptions(TestCase):
             self.glint(f"{common} -o default.npy")
             for width, height in ((1, 1), (16, 4), (3, 5)) if IS_LONG else ((3, 5),):  # for each, kernels are compiled
                 for launch in self.launches(f"{common} --work-group {width}x{height} -o fixed.npy"):
-                    lists_pixels = launch["name"] == "repeat"
+                    lists_pixels = launch["name"] == "re-render"
                     self.assertEqual(launch["local"], [width * height, 1] if lists_pixels else [width, height])
                 for name in "fixed.npy", "fixed.t.npy", "fixed.path.npy":
                     self.assertSameBytes(name, name.replace("fixed", "default"))

@@ -14,7 +14,7 @@ import sys
 import unittest
 
 import json_reference
-from glint import BALLS, PLANET, PROGRAM, ROOT, TestCase, main, need_device, read, shim_build, write
+from glint import BALLS, PLANET, PROGRAM, ROOT, TestCase, main, need_device, read, run, shim_build, write
 
 WRITES = "--write" in sys.argv
 RARE = {"doubt", "clock_doubt"}  # of a device's clock that is not trusted, which no test can bring about
@@ -148,6 +148,12 @@ class Json(TestCase):
                            self.json("diff a.png a.png --max-rmse 0 --max-flip 0 --max-off 0 --json"),
                            self.json("diff a.t.npy a.t.npy --max-ulp 0 --json"))
 
+    def compared(self, command):
+        """Returns the report of a comparison. Its verdict, and so the exit status, depends on how noisy the machine is."""
+        process = run(command)
+        self.assertIn(process.returncode, (0, 3, 4), process.stderr)
+        return json.loads(process.stdout)
+
     def test_bench(self):
         fp64 = need_device()["fp64"]
         bench = self.glint(f"bench plain.yaml strong.yaml {SMALL} {QUICK} --samples 1,2 --launches --json")
@@ -165,14 +171,12 @@ class Json(TestCase):
         # the shim may come before the sanitizer, since it calls nothing before main
         metered = {"LD_PRELOAD": shim_build("rapl.so", read(ROOT / "tests/shims/rapl.c")),
                    "ASAN_OPTIONS": f"{os.environ.get('ASAN_OPTIONS', '')}:verify_asan_link_order=0"}
-        self.check_members("glint bench", self.json(
-            f"bench plain.yaml {rest} --samples 2,3 --compare bench.json", status=4),
+        self.check_members("glint bench", self.compared(f"bench plain.yaml {rest} --samples 2,3 --compare bench.json"),
             self.json(f"bench plain.yaml {rest} --samples 2", env=metered),
             json.loads(bench.stdout),
             self.json(f"bench plain.yaml {rest} --samples 2 --variant '' --variant '--work-group 4x4'"),
             self.json(f"bench plain.yaml {rest} --samples 2 --variant '--build-options -DUNUSED=1'"), *strong)
-        self.check_members("glint bench --against", self.json(
-            f"bench plain.yaml {rest} --against {PROGRAM}", status=4))
+        self.check_members("glint bench --against", self.compared(f"bench plain.yaml {rest} --against {PROGRAM}"))
 
     def test_certify(self):
         self.check_members("glint certify", self.json(f"certify plain.yaml {SMALL} --precision single,certified --json"),

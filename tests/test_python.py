@@ -52,7 +52,7 @@ class Images(unittest.TestCase):
         layers = glint.Scene(SPHERE).render_layers(tuple(glint.LAYERS), 40, 30, precision="certified")
         self.assertEqual({name: array.shape for name, array in layers.items()},
                          {"color": (30, 40, 3), "t": (30, 40), "normal": (30, 40, 3), "position": (30, 40, 3), "object": (30, 40),
-                          "shadow": (30, 40, 1), "doubt": (30, 40), "coverage": (30, 40), "backdrop": (30, 40, 3)})
+                          "shadow": (30, 40, 1), "flag": (30, 40), "coverage": (30, 40), "backdrop": (30, 40, 3)})
         hit = layers["object"] == 0
         self.assertTrue(np.all(layers["coverage"] == hit))
         np.testing.assert_allclose(layers["backdrop"], ~hit[..., None] * np.array(SPHERE["background"]), atol=1e-7)

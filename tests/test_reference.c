@@ -482,14 +482,14 @@ TEST(knows_highlights)
 // Whichever channel it is, and whether the pixel's decisions are right or wrong.
 TEST(nonfinite_colors_are_errors)
 {
-    uint32_t places[3][2] = {{0, 0}, {1, 0}, {2, 0}}, objects[3] = {0}, paths[3] = {0}, doubts[3] = {0};
+    uint32_t places[3][2] = {{0, 0}, {1, 0}, {2, 0}}, objects[3] = {0}, paths[3] = {0}, flags[3] = {0};
     ReferencePixel pixels[3];
     for (size_t i = 0; i < COUNT(pixels); i++)
         pixels[i] = (ReferencePixel){.color = {0.5, 0.25, 0.125}, .margin = 1};
     double colors[9] = {0.5, 0.25, 0.25, 0.5, 0.25, 0.125, 0.5, 0.25, 0.125};
     CertifySample sample = {.width = 3, .height = 1, .count = 1, .places = places, .pixels = pixels};
     const Film film = {
-        .width = 3, .height = 1, .object = objects, .path = paths, .color = colors, .doubt = doubts};
+        .width = 3, .height = 1, .object = objects, .path = paths, .color = colors, .flag = flags};
     assert_true(certify_compare(&sample, &film).wrong_color == 0.125);
     sample.count = 3;
     for (size_t channel = 0; channel < 3; channel++) {

@@ -110,8 +110,8 @@ class Shutter(TestCase):
         self.assertLess(self.furthest("certified.npy", "double.npy"), 1e-6)
         pixels = npy_read("double.npy")[2]
         hits = sum(color != pixels[0] for color in pixels)
-        self.assertTrue(3 * hits < report["repeated_samples"] < 9 * hits, (hits, report["repeated_samples"]))
-        self.assertLess(report["undecided_samples"], hits / 10)
+        self.assertTrue(3 * hits < report["rerendered_samples"] < 9 * hits, (hits, report["rerendered_samples"]))
+        self.assertLess(report["uncertified_samples"], hits / 10)
         device = report["by_device"][0]
         self.assertGreaterEqual(sum(launch["name"] == "render" for launch in device["launches"]), 6)
         self.assertGreaterEqual(device["bands"], 6)  # of each time

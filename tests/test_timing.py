@@ -108,7 +108,7 @@ class Timing(TestCase):
         self.assertTrue(all(abs(a["ts"] + a["dur"] - b["ts"]) < 1 for a, b in zip(host, host[1:])))
         self.assertTrue(all(a["ts"] + a["dur"] <= b["ts"] + 1 for a, b in zip(bands, bands[1:])))
         self.assertEqual({event["name"] for event in commands}, {"render", "aov", "read-back"})
-        certified = self.json("render mesh.yaml --size 64x36 --quiet --timing=trace -o trace.png --aov doubt,t --precision certified")
+        certified = self.json("render mesh.yaml --size 64x36 --quiet --timing=trace -o trace.png --aov flag,t --precision certified")
         spans = [event for event in certified["traceEvents"] if event["ph"] == "X"]
         self.assertTrue(all(event["dur"] >= 0 for event in spans))
         whole = [event for event in spans if event["name"] == "band"]

@@ -152,7 +152,7 @@ typedef struct {
     double *position; // 3 per pixel: the hit point, in the scene's coordinates
     uint32_t *object;
     uint32_t *shadow; // glint_scene_light_count per pixel: 1 where that light is occluded, 0 elsewhere
-    uint32_t *doubt;  // at GLINT_CERTIFIED 1 where re-rendered in double, 2 where uncertified, otherwise 0
+    uint32_t *flag;   // at GLINT_CERTIFIED 1 where re-rendered in double, 2 where uncertified, otherwise 0
     double *coverage; // fraction of the samples that hit an object
     double *backdrop; // 3 per pixel: the background's part of the color
 } GlintImage;

@@ -17,7 +17,7 @@ static unsigned layers_set(Film *film, const GlintImage *image)
     film->position = image->position;
     film->object = image->object;
     film->shadow = image->shadow;
-    film->doubt = image->doubt;
+    film->flag = image->flag;
     film->coverage = image->coverage;
     film->backdrop = image->backdrop;
     unsigned aovs = 0;

@@ -32,7 +32,7 @@ static const ResultTable certify_table = {
                 {"largest error", "color.max_right"},
                 {"largest wrong", "color.max_wrong"},
                 {"certain and wrong", "wrong_decided"},
-                {"uncertain", "undecided.pixels"},
+                {"uncertain", "uncertified.pixels"},
                 {"claim", "claim"}},
     .name_count = 3,
     .verdicts = {"claim"},
@@ -64,7 +64,7 @@ static const CommandLine command_line = {
         "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
         "pixels: "
         "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not "
-        "list as undecided.\n",
+        "list as uncertified.\n",
     .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CertifyOptions, common),
                OPTIONS_WITHIN(device_option, CertifyOptions, common),
                OPTIONS_WITHIN(reference_option, CertifyOptions, common),
@@ -172,7 +172,7 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
         json_text(json, "claim", errors->wrong_decided > 0 ? "broken" : "kept");
         json_int64(json, "unconfirmed", (int64_t)errors->unconfirmed);
         json_int64(json, "contradicted", (int64_t)errors->contradicted);
-        json_begin_object(json, "undecided");
+        json_begin_object(json, "uncertified");
         json_int64(json, "pixels", (int64_t)uncertified->count);
         json_int64(json, "examined", (int64_t)uncertified->examined);
         json_int64(json, "witnessed", (int64_t)uncertified->witnessed);
@@ -192,7 +192,7 @@ static Json *certify_json(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
     Json *json = json_open();
-    json_int64(json, "schema", 1);
+    json_int64(json, "schema", 2);
     json_text(json, "glint", glint_version());
     json_begin_object(json, "device");
     device_json(json, certification->compute->device);
@@ -209,7 +209,7 @@ static Json *certify_json(const Certification *certification)
     size_t uncertain = 0;
     for (size_t i = 0; i < sample->count; i++)
         uncertain += reference_is_uncertain(&sample->pixels[i]);
-    json_int64(json, "reference_undecided", (int64_t)uncertain);
+    json_int64(json, "reference_uncertain", (int64_t)uncertain);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured)
@@ -239,7 +239,7 @@ static int precision_compare(Certification *certification, RenderSettings settin
         return EXIT_DONE;
     }
     messages_print(&messages, NULL);
-    const unsigned aovs = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_DOUBT;
+    const unsigned aovs = AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG;
     Film film;
     const bool whole = renderer && renderer_render_film(renderer, aovs, &film);
     if (whole) {

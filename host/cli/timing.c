@@ -266,7 +266,7 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
                         const RenderSettings *settings, const HostTimes *host)
 {
     Json *json = json_open();
-    json_int64(json, "schema", 3);
+    json_int64(json, "schema", 4);
     json_text(json, "glint", glint_version());
     json_text(json, "scene", host->scene);
     if (!isnan(host->frame)) json_number(json, "frame", host->frame);
@@ -274,8 +274,8 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     json_int64(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     if (settings->precision == PRECISION_CERTIFIED) {
-        json_int64(json, "repeated_samples", (int64_t)host->rerenders.rerendered);
-        json_int64(json, "undecided_samples", (int64_t)host->rerenders.uncertified);
+        json_int64(json, "rerendered_samples", (int64_t)host->rerenders.rerendered);
+        json_int64(json, "uncertified_samples", (int64_t)host->rerenders.uncertified);
     }
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);

@@ -66,7 +66,7 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
     // a kernel fills all of its layers, but computes shadows only on request
     const unsigned filled = AOV_COLOR | (aovs & AOVS_OF_HIT ? AOVS_OF_HIT : 0u) |
                             (aovs & AOVS_OF_SAMPLES ? AOVS_OF_SAMPLES : 0u) |
-                            (aovs & (AOVS_OF_PATH | AOV_DOUBT));
+                            (aovs & (AOVS_OF_PATH | AOV_FLAG));
     size_t end = (size_t)padded_size(2 * film_layer_size(film, LAYER_COLOR)); // with its compensation
     if (buffers) {
         buffers->layers = filled;

@@ -42,7 +42,7 @@ static inline RerenderCounts rerender_counts_add(RerenderCounts a, RerenderCount
     return (RerenderCounts){a.rerendered + b.rerendered, a.uncertified + b.uncertified};
 }
 
-// Values of the AOV `doubt`: the pixel was flagged and re-rendered in double precision; it remained
+// Values of the AOV `flag`: the pixel was flagged and re-rendered in double precision; it remained
 // uncertified.
 enum { FLAG_RERENDERED = 1, FLAG_UNCERTIFIED };
 

@@ -203,7 +203,7 @@ bool renderer_trace_closest(Renderer *renderer, const TraceRay *rays, size_t ray
 
 // The time of a kernel launch or a transfer.
 typedef struct {
-    const char *name; // "render", "aov", "path", "coverage", "repeat", "read-back"
+    const char *name; // "render", "aov", "path", "coverage", "re-render", "read-back"
     LaunchTime time;
 } NamedLaunch;
 

@@ -68,7 +68,7 @@ static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_l
 static void launches_collect(RenderReport *report, RenderReport *of_next)
 {
     for (size_t i = 0; i < of_next->launches.count; i++)
-        array_push(report->launches, ((NamedLaunch){"repeat", of_next->launches.items[i].time}));
+        array_push(report->launches, ((NamedLaunch){"re-render", of_next->launches.items[i].time}));
     for (size_t i = 0; i < of_next->reads.count; i++)
         array_push(report->reads, of_next->reads.items[i]);
     report->build_seconds += of_next->build_seconds;
@@ -91,20 +91,20 @@ typedef struct {
 
 void band_clear_flags(Renderer *renderer, const BandBuffers *buffers, BandRows rows)
 {
-    if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
+    if (!layer_in(buffers->layers, LAYER_FLAG)) return;
     const Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
-    const size_t size = film_layer_size(&band, LAYER_DOUBT);
-    void *values = band_map(renderer, buffers, LAYER_DOUBT, CL_MAP_READ | CL_MAP_WRITE);
+    const size_t size = film_layer_size(&band, LAYER_FLAG);
+    void *values = band_map(renderer, buffers, LAYER_FLAG, CL_MAP_READ | CL_MAP_WRITE);
     if (values) memset(values, 0, size);
     renderer_unmap(renderer, buffers->film, values);
 }
 
-// Raises the value of the layer `doubt` of the list's pixels to at least `flag`.
+// Raises the value of the layer `flag` of the list's pixels to at least `flag`.
 static void flags_raise(Renderer *renderer, const RerenderedBand *band, const PixelList *list, uint32_t flag)
 {
     const BandBuffers *buffers = band->buffers;
-    if (!layer_in(buffers->layers, LAYER_DOUBT)) return;
-    uint32_t *values = band_map(renderer, buffers, LAYER_DOUBT, CL_MAP_READ | CL_MAP_WRITE);
+    if (!layer_in(buffers->layers, LAYER_FLAG)) return;
+    uint32_t *values = band_map(renderer, buffers, LAYER_FLAG, CL_MAP_READ | CL_MAP_WRITE);
     for (size_t i = 0; values && i < list->count; i++) {
         uint32_t *value = &values[list->items[i].index];
         if (*value < flag) *value = flag;

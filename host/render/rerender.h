@@ -8,6 +8,6 @@ void band_clear_flags(Renderer *renderer, const BandBuffers *buffers, BandRows r
 
 // Re-renders in double precision, with bounds, the pixels that a kernel flagged. Re-renders those that remain
 // uncertified as at `double`. Adds the number of both to the buffers' counts and records them in the layer
-// `doubt` if the buffers have it. Returns false if the device failed or settings.stop ended the render.
+// `flag` if the buffers have it. Returns false if the device failed or settings.stop ended the render.
 bool band_rerender(Renderer *renderer, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
                    BandRows rows);

@@ -130,7 +130,7 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
         const uint32_t *place = sample->places[i];
         const size_t pixel = (size_t)place[1] * film->width + place[0];
         const Fault fault = fault_of(sample, i, film, pixel);
-        const bool claimed = film->doubt[pixel] != FLAG_UNCERTIFIED;
+        const bool claimed = film->flag[pixel] != FLAG_UNCERTIFIED;
         if (fault && claimed) wrong_decided_add(&errors, place, expected->margin);
         if (reference_is_uncertain(expected)) {
             errors.unconfirmed += claimed;
@@ -200,11 +200,11 @@ CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, siz
 {
     CertifyUncertified found = {0};
     for (size_t i = 0; i < film_pixel_count(film); i++)
-        found.count += film->doubt[i] == FLAG_UNCERTIFIED;
+        found.count += film->flag[i] == FLAG_UNCERTIFIED;
     const size_t step = found.count / most + 1;
     size_t *pixels = memory_allocate(found.count / step + 1, sizeof *pixels), chosen = 0;
     for (size_t i = 0, seen = 0; i < film_pixel_count(film); i++)
-        if (film->doubt[i] == FLAG_UNCERTIFIED && seen++ % step == 0) pixels[chosen++] = i;
+        if (film->flag[i] == FLAG_UNCERTIFIED && seen++ % step == 0) pixels[chosen++] = i;
     Uncertainty *uncertainties = memory_allocate(chosen + 1, sizeof *uncertainties);
     ReferenceScene reference = reference_scene_open(scene);
     Examination examination = {&reference, film, pixels, path, stop, uncertainties};

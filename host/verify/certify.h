@@ -20,7 +20,7 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
                          size_t count, ReferencePath path, bool (*stop)(void));
 void certify_sample_close(CertifySample *sample);
 
-// `certified` makes this claim about each pixel that AOV_DOUBT does not list as uncertified. Its object,
+// `certified` makes this claim about each pixel that AOV_FLAG does not list as uncertified. Its object,
 // path and the lights that reach it are those of exact arithmetic on the scene's numbers and the camera's
 // vectors in double. Its color, unless a texture is on the path, is within CERTIFIED_COLOR_ERROR of its
 // largest channel, or of 1 if that is more. The color thus covers a checker's square or a shadow that is
@@ -37,7 +37,7 @@ typedef struct {
     // The largest distance of a wrong pixel's exact ray from the curve where its answer changes, relative to
     // the hit's distance. Faults of single precision are at most some units of roundoff from it.
     double margin;
-    // Pixels that are uncertain in the reference but not in AOV_DOUBT, and how many of them differ from it.
+    // Pixels that are uncertain in the reference but not in AOV_FLAG, and how many of them differ from it.
     size_t unconfirmed, contradicted;
     // Pixels that violate the claim, because they are wrong or contradicted but not uncertified, and the one
     // with the largest margin.
@@ -46,7 +46,7 @@ typedef struct {
     double wrong_decided_margin;
 } CertifyErrors;
 
-// Compares a film, which needs AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_DOUBT and the color, with the sample.
+// Compares a film, which needs AOV_OBJECT, AOV_SHADOW, AOV_PATH, AOV_FLAG and the color, with the sample.
 CertifyErrors certify_compare(const CertifySample *sample, const Film *film);
 
 // Pixels that an image at `certified` leaves uncertified, classified by cause. Witnessed: one of 16 tries

@@ -31,7 +31,7 @@ MISS = 0xFFFFFFFF  #: the object of a miss
 PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
 #: the layers of an image, with their values per pixel (0 means one per light) and their type
 LAYERS = {"color": (3, np.float64), "t": (1, np.float64), "normal": (3, np.float64), "position": (3, np.float64),
-          "object": (1, np.uint32), "shadow": (0, np.uint32), "doubt": (1, np.uint32),
+          "object": (1, np.uint32), "shadow": (0, np.uint32), "flag": (1, np.uint32),
           "coverage": (1, np.float64), "backdrop": (3, np.float64)}
 
 

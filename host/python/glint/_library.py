@@ -22,7 +22,7 @@ Mesh = structure("Mesh", ("real", c_int), ("vertices", c_void_p), ("normals", c_
 RenderSettings = structure("RenderSettings", ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32), ("bounces", c_uint32),
                            ("precision", c_int), ("lanes", c_uint32), ("progress", Progress), ("context", c_void_p),
                            ("min_contribution", c_double))
-Image = structure("Image", *((name, c_void_p) for name in ("color", "t", "normal", "position", "object", "shadow", "doubt", "coverage", "backdrop")))
+Image = structure("Image", *((name, c_void_p) for name in ("color", "t", "normal", "position", "object", "shadow", "flag", "coverage", "backdrop")))
 TraceSettings = structure("TraceSettings", ("precision", c_int), ("lanes", c_uint32))
 Rays = structure("Rays", ("count", c_size_t), ("real", c_int), ("origins", c_void_p), ("directions", c_void_p), ("tmin", c_void_p),
                  ("tmax", c_void_p))
