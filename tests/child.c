@@ -34,6 +34,7 @@ ChildEnd child_run(void (*work)(void *result), void *result, size_t size)
     }
     int status;
     if (waitpid(child, &status, 0) == child && WIFEXITED(status)) end.status = WEXITSTATUS(status);
+    if (end.status < 0) end.signal = WTERMSIG(status);
     fseek(errors, 0, SEEK_SET);
     end.errors[fread(end.errors, 1, sizeof end.errors - 1, errors)] = '\0';
     fclose(errors);

@@ -5,6 +5,7 @@
 
 typedef struct {
     int status;        // the argument of exit(), or -1 if a signal ended the process
+    int signal;        // that signal, or 0
     char errors[8192]; // the start of its standard error
 } ChildEnd;
 

@@ -576,6 +576,9 @@ class Aovs(CliTestCase):
             self.assertAlmostEqual(sum(parts) / len(parts), disc / image, delta=1e-3)
             self.assertTrue({0, 1} < set(parts) and all(16 * part == int(16 * part) for part in parts))
             self.glint(f"{render} --alpha --bits 16 --transfer none -o alpha.png")
+            os.makedirs("folder", exist_ok=True)  # whose images are PNG
+            self.glint(f"{render.replace('disc.yaml', 'disc.yaml sphere.yaml')} --alpha -o folder")
+            self.assertEqual(png_read("folder/disc.png")[0][3], 6)
             (*size, bits, kind), rows, *_ = png_read("alpha.png")
             self.assertEqual((size, bits, kind), ([width, height], 16, 6))
             row_size = 1 + 8 * width

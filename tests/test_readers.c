@@ -1,6 +1,5 @@
-// Damaged files: what the readers of tests/fuzz/readers.c get here, by chance, in a sanitized build.
-// tools/fuzz feeds them inputs that coverage guides.
-// run_tests: sanitized
+// Feeds randomly damaged files to the readers of tests/fuzz/readers.c in a sanitized build. tools/fuzz
+// generates inputs guided by coverage. run_tests: sanitized
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/compile/random_shape.h"
@@ -13,8 +12,8 @@
 #include <string.h>
 #include <unistd.h>
 
-// A reader that takes longer ends by SIGALRM.
-enum { SECONDS_MAX = 120, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };
+// A reader that takes longer for one input ends by SIGALRM.
+enum { SECONDS_MAX = 20, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };
 
 typedef struct {
     Text *items;
@@ -160,7 +159,29 @@ static void text_damage(Text *text, const Seeds *seeds)
     }
 }
 
-static void seeds_add(Seeds *seeds, const char *pattern, const char *reader)
+// Appends each scene of a table (tests/broken), without its directives and messages.
+static void table_add(Seeds *seeds, const Text *table)
+{
+    const char *section = strstr(table->items, "#### scene ");
+    Text start = {0};
+    text_append(&start, table->items, (size_t)(section - table->items));
+    for (; section; section = strstr(section + 1, "#### scene ")) {
+        Text scene = {0};
+        const char *end = strstr(section, "#### expected");
+        for (const char *line = section, *next; line < end; line = next) {
+            next = strchr(line, '\n') + 1;
+            if (strncmp(line, "#### start\n", strlen("#### start\n")) == 0)
+                text_append(&scene, start.items, start.count);
+            else if (strncmp(line, "#### ", strlen("#### ")) != 0)
+                text_append(&scene, line, (size_t)(next - line));
+        }
+        if (scene.count > 0) array_push(*seeds, scene);
+    }
+    text_free(&start);
+}
+
+// Appends the files that a pattern for the reader's name matches.
+static void files_add(Seeds *seeds, const char *pattern, const char *reader)
 {
     char *text = text_format(pattern, reader);
     glob_t paths;
@@ -169,6 +190,7 @@ static void seeds_add(Seeds *seeds, const char *pattern, const char *reader)
             Text seed = {0};
             MessageList messages = {0};
             assert_true(text_read_file(&seed, paths.gl_pathv[i], &messages));
+            if (seed.count > LENGTH_MAX) seed.count = LENGTH_MAX;
             array_push(*seeds, seed);
         }
         globfree(&paths);
@@ -176,46 +198,43 @@ static void seeds_add(Seeds *seeds, const char *pattern, const char *reader)
     free(text);
 }
 
-// Returns a copy of a seed, or of one scene of a table of broken scenes.
-static Text seed_pick(const Seeds *seeds)
+static void seeds_free(Seeds *seeds)
 {
-    const Text *seed = &seeds->items[random_below(seeds->count)];
-    const char *start = strstr(seed->items + random_below(seed->count), "#### scene ");
-    const char *end = start ? strstr(start, "#### expected") : NULL;
-    Text text = {0};
-    if (end)
-        text_append(&text, start, (size_t)(end - start));
-    else
-        text_append(&text, seed->items, seed->count < LENGTH_MAX ? seed->count : LENGTH_MAX);
-    return text;
+    for (size_t i = 0; i < seeds->count; i++)
+        text_free(&seeds->items[i]);
+    free(seeds->items);
 }
 
 typedef struct {
     const char *reader;
-    size_t run_count;
+    size_t run_count, run; // the current one
 } Feeding;
 
+// Feeds the reader. The inputs are the same in each run of the test.
 static void reader_feed(void *context)
 {
-    const Feeding *feeding = context;
+    Feeding *feeding = context;
     setenv("GLINT_FUZZ", feeding->reader, 1);
     LLVMFuzzerInitialize(NULL, NULL);
-    Seeds seeds = {0};
-    seeds_add(&seeds, "tests/fuzz/corpus/%s/*", feeding->reader);
-    seeds_add(&seeds, "tests/broken/%s.txt", feeding->reader);
-    seeds_add(&seeds, "tests/scenes/*.%s", feeding->reader);
+    Seeds seeds = {0}, tables = {0};
+    files_add(&seeds, "tests/fuzz/corpus/%s/*", feeding->reader);
+    files_add(&seeds, "tests/scenes/*.%s", feeding->reader);
+    files_add(&tables, "tests/broken/%s.txt", feeding->reader);
+    for (size_t i = 0; i < tables.count; i++)
+        table_add(&seeds, &tables.items[i]);
     assert_true(seeds.count > 0);
     random_state = (Random){1};
-    alarm(SECONDS_MAX);
-    for (size_t run = 0; run < feeding->run_count; run++) {
-        Text text = seed_pick(&seeds);
+    for (feeding->run = 0; feeding->run < feeding->run_count; feeding->run++) {
+        const Text *seed = &seeds.items[random_below(seeds.count)];
+        Text text = {0};
+        text_append(&text, seed->items, seed->count);
         text_damage(&text, &seeds);
+        alarm(SECONDS_MAX);
         LLVMFuzzerTestOneInput((const uint8_t *)text.items, text.count);
         text_free(&text);
     }
-    for (size_t i = 0; i < seeds.count; i++)
-        text_free(&seeds.items[i]);
-    free(seeds.items);
+    seeds_free(&tables);
+    seeds_free(&seeds);
 }
 
 TEST(test_readers_survive_damage)
@@ -224,9 +243,11 @@ TEST(test_readers_survive_damage)
                                           "ply", "stl",  "gltf",  "glb",        "yaml",  "rt",      "cfg",
                                           "nff", "dat",  "reply", "checkpoint", "cache", "baseline"};
     for (size_t i = 0; i < COUNT_OF(readers); i++) {
-        Feeding feeding = {readers[i], tests_are_long() ? 20000 : 1000};
+        Feeding feeding = {readers[i], tests_are_long() ? 20000 : 1000, 0};
         const ChildEnd end = child_run(reader_feed, &feeding, sizeof feeding);
-        if (end.status != 0) fail_msg("reader %s: status %d: %s", readers[i], end.status, end.errors);
+        if (end.status != 0)
+            fail_msg("reader %s, input %zu: exit status %d, signal %d: %s", readers[i], feeding.run,
+                     end.status, end.signal, end.errors);
     }
 }
 

@@ -121,7 +121,7 @@ class Report(TestCase):
     def test_refused(self):
         self.refuses(f"{SMALL} --seconds 0", "--seconds: expected a number above 0")
         self.refuses(f"{SMALL} --lanes 3", "--lanes: expected 1")
-        self.refuses(f"{SMALL} --precision certified", "certified is only for images")
+        self.refuses(f"{SMALL} --precision certified", "--precision: expected single, strict or double, not .certified")
         self.refuses("report -o none/r.tar.gz", "none")
         self.refuses("verify S1 --keep-kernels none/kernels", "--keep-kernels: cannot create the folder 'none/kernels'")
         self.assertEqual(sorted(os.listdir()), ["home", "temporary"])

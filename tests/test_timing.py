@@ -46,9 +46,10 @@ def perfetto_query(folder, query):
         command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={Path('browser').resolve()}",
                    "--remote-debugging-port=0", f"http://127.0.0.1:{server.server_port}/trace_processor.html"]  # fmt: skip
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:
-            server.is_answered.wait(120)
+            is_answered = server.is_answered.wait(120)
             browser.terminate()
         server.shutdown()
+        assert is_answered, "Perfetto's trace processor did not answer"
         return server.answer.rstrip("\0")
 
 
@@ -137,6 +138,7 @@ class Timing(TestCase):
         events = json.loads(read("trace.json"))["traceEvents"]
         names = {event["tid"]: event["args"]["name"] for event in events if event["ph"] == "M"}
         spans = [event for event in events if event["ph"] == "X"]
+        self.assertTrue(answer.startswith("["), answer)
         found = sorted(map(tuple, json.loads(answer)))
         self.assertGreater(len(found), 10)
         start = min(event["ts"] for event in spans)

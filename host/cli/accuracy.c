@@ -39,7 +39,7 @@ static const Option options_own[] = {
     {"save", "FOLDER", "write all compared arrays there, as .npy", option_folder,
      offsetof(AccuracyOptions, folder)},
     {"html", "FILE", "self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
-    {"precision", "LIST", "of single, strict, double, certified (default: the first three)", option_set,
+    {"precision", "LIST", "any of single, strict, double, certified (default: the first three)", option_set,
      offsetof(AccuracyOptions, variants.precisions), NAMES(precision_names)}};
 
 static const CommandLine command_line = {

@@ -57,7 +57,7 @@ static const Option options_own[] = {
      "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
      variant_keep, 0}};
 static const Option precisions_option[] = {
-    {"precision", "LIST", "of single, strict, double, certified (default: single)", option_set,
+    {"precision", "LIST", "any of single, strict, double, certified (default: single)", option_set,
      offsetof(VariantOptions, precisions), NAMES(precision_names)}};
 
 static const CommandLine command_line = {

@@ -53,7 +53,7 @@ static const Option options_own[] = {
     {"size", "WxH", "image size (default: as glint render)", option_size, offsetof(CertifyOptions, size)},
     {"pixels", "N", "compare about N pixels (default: 2000)", option_count, offsetof(CertifyOptions, pixels),
      NUMBERS(1, PIXELS_MOST)},
-    {"precision", "LIST", "of single, strict, double, certified (default: all that fit)", option_set,
+    {"precision", "LIST", "any of single, strict, double, certified (default: all that fit)", option_set,
      offsetof(CertifyOptions, precisions), NAMES(precision_names)},
     BOUNCES_OPTION(CertifyOptions, bounce_count),
     MIN_CONTRIBUTION_OPTION(CertifyOptions, min_contribution)};

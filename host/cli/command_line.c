@@ -5,7 +5,6 @@
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "host/scene/scene.h"
-#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <getopt.h>
@@ -79,6 +78,8 @@ bool option_number(const Option *option, const char *value, void *options)
         *(double *)option_field(option, options) = number;
         return true;
     }
+    if (option->is_above && option->high < INFINITY)
+        return option_fault(option, value, "a number above %g, at most %g", option->low, option->high);
     if (option->is_above) return option_fault(option, value, "a number above %g", option->low);
     if (option->high == INFINITY) return option_fault(option, value, "a number of at least %g", option->low);
     return option_fault(option, value, "a number from %g to %g", option->low, option->high);
@@ -154,14 +155,15 @@ static bool name_read(const Option *option, const char *value, void *index)
 {
     *(size_t *)index = name_find(option, value);
     return *(size_t *)index < option->name_count ||
-           names_fault(option, value, "names separated by commas, of ");
+           names_fault(option, value, "a list, with commas between, of ");
 }
 
 bool option_set(const Option *option, const char *value, void *options)
 {
-    enum { NAMES_MAX = 64 };
-    size_t indices[NAMES_MAX], count;
-    if (!option_list(option, value, name_read, indices, sizeof *indices, NAMES_MAX, &count)) return false;
+    enum { VALUES_MAX = 64, NAMES_MAX = 32 };
+    if (option->name_count > NAMES_MAX) fault("--%s with more than %d names", option->name, NAMES_MAX);
+    size_t indices[VALUES_MAX], count;
+    if (!option_list(option, value, name_read, indices, sizeof *indices, VALUES_MAX, &count)) return false;
     unsigned set = 0;
     for (size_t i = 0; i < count; i++)
         set |= 1u << indices[i];
@@ -263,7 +265,7 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
     size_t count = 0;
     for (const OptionGroup *group = line->groups; group->items; group++)
         for (size_t i = 0; i < group->count; i++, count++) {
-            assert(count < OPTIONS_MAX);
+            if (count == OPTIONS_MAX) fault("a command with more than %d options", OPTIONS_MAX);
             const Option *option = listed[count].option = &group->items[i];
             listed[count].fields = (char *)options + group->offset;
             const int has_argument = !option->argument          ? no_argument

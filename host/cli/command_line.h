@@ -50,9 +50,9 @@ typedef struct {
 enum { OPTION_GROUPS_MAX = 16 };
 
 typedef struct {
-    const char *usage;         // what the help prints before the options; NULL for no help
-    void (*usage_print)(void); // prints more between the usage and the options; may be NULL
-    OptionGroup groups[OPTION_GROUPS_MAX];
+    const char *usage;                         // what the help prints before the options; NULL for no help
+    void (*usage_print)(void);                 // prints more between the usage and the options; may be NULL
+    OptionGroup groups[OPTION_GROUPS_MAX + 1]; // up to the first without items
 } CommandLine;
 
 // The result of reading a command line if the command must run. Any other result is the exit status.
@@ -78,7 +78,8 @@ void *option_field(const Option *option, void *options);
 // Reads at most `most` values, separated by commas, each into the next `item_size` bytes of `items`.
 bool option_list(const Option *option, const char *value, OptionReader *read, void *items, size_t item_size,
                  size_t most, size_t *count);
-// Reads decimal digits only. *end receives the position after them. Returns false if there are none.
+// Reads decimal digits only, until their number exceeds 2^31. *end receives the position after them. Returns
+// false if there are none.
 bool digits_read(const char *value, const char **end, uint64_t *result);
 // Prints what the option expects, as a format, and the value. Returns false.
 bool option_fault(const Option *option, const char *value, const char *expected, ...)

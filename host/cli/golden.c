@@ -67,10 +67,10 @@ typedef struct {
 } Finding;
 
 static const Option options_own[] = {
-    {"file", "FILE", "of the lines (default: golden.txt)", option_text, offsetof(GoldenOptions, file)},
-    {"size", "WxH", "to write (default: 320x180)", option_size, offsetof(GoldenOptions, size)},
-    {"samples", "N", "per pixel, to write (default: 1)", option_count, offsetof(GoldenOptions, samples),
-     NUMBERS(1, SAMPLES_MAX)},
+    {"file", "FILE", "the file of hashes (default: golden.txt)", option_text, offsetof(GoldenOptions, file)},
+    {"size", "WxH", "image size, for write (default: 320x180)", option_size, offsetof(GoldenOptions, size)},
+    {"samples", "N", "samples per pixel, for write (default: 1)", option_count,
+     offsetof(GoldenOptions, samples), NUMBERS(1, SAMPLES_MAX)},
     BOUNCES_OPTION(GoldenOptions, bounces)};
 
 static const CommandLine command_line = {

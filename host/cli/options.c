@@ -28,7 +28,7 @@ bool option_error_budget(const Option *option, const char *value, void *options)
 bool option_precision(const Option *option, const char *value, void *options)
 {
     CommonOptions *common = options;
-    const Option names = {option->name, NAMES(precision_names)};
+    const Option names = {option->name, .names = precision_names, .name_count = option->name_count};
     common->has_precision = true;
     return option_choice(&names, value, &common->precision);
 }
@@ -98,8 +98,8 @@ const Option reference_option[] = {{"reference-device", "D",
                                     "renders references and the pixels that certified re-renders (default: "
                                     "the device itself, else one with fp64)",
                                     option_text, FIELD(reference_device)}};
-const Option precision_option[] = {
-    {"precision", "P", "single, strict, double or certified (default: single)", option_precision, 0}};
+const Option precision_option[] = {{"precision", "P", "single, strict, double or certified (default: single)",
+                                    option_precision, 0, NAMES(precision_names)}};
 const Option common_options[] = {
     [COMMON_LANES] = {"lanes", "N",
                       "rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)", lanes_read,
@@ -108,7 +108,7 @@ const Option common_options[] = {
                     FIELD(bvh), NAMES(bvh_choice_names)},
     [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(no_cache)},
     [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)},
-    [COMMON_MAX_PIXELS] = {"max-pixels", "N", "of an image that is read (default: 134217728)",
+    [COMMON_MAX_PIXELS] = {"max-pixels", "N", "refuse input images with more pixels (default: 134217728)",
                            max_pixels_read, 0, NUMBERS(1, UINT32_MAX)}};
 const Option set_options[] = {
     {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable", override_add, 0},

@@ -119,8 +119,10 @@ static bool stdout_fits(const RenderOptions *options)
 static bool display_fits(const ImageOutputOptions *output)
 {
     const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
-    const ImageFormat format =
-        is_to_stdout(output) || !output->path ? output->stdout_format : image_format_of(output->path);
+    const ImageFormat format = is_to_stdout(output) ? output->stdout_format
+                               : !output->path || output_is_folder(output->path)
+                                   ? IMAGE_PNG
+                                   : image_format_of(output->path);
     if (is_changed && image_output_holds_floats(format))
         option_usage_fault(
             "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");

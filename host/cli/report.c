@@ -53,7 +53,7 @@ static const Option archive_options[] = {{"output", "FILE", "the archive (defaul
                                           NUMBERS_ABOVE(0, SECONDS_MAX)}};
 static const Option precision_own[] = {
     {"precision", "P", "single, strict or double (default: all for verify, single for bench)",
-     option_precision, 0}};
+     option_precision, 0, .names = precision_names, .name_count = ARITHMETIC_COUNT}};
 static const Option page_option[] = {{"html", "FILE", "self-contained HTML page of this comparison",
                                       option_text, offsetof(ReportChoice, page)}};
 
@@ -411,9 +411,6 @@ int command_report(int argument_count, char **arguments)
 {
     ReportChoice choice = {0};
     int status = command_line_read(&command_line, &choice, argument_count, arguments);
-    if (status == OPTIONS_READ && choice.common.precision == PRECISION_CERTIFIED)
-        status = option_usage_fault(
-            "report", "--precision certified is only for images; choose single, strict or double");
     passed_list(&choice);
     choice.cases = arguments + optind;
     choice.case_count = (size_t)(argument_count - optind);

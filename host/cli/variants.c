@@ -28,9 +28,10 @@ static bool samples_read(const Option *option, const char *value, void *options)
 const Option variant_choice_options[] = {
     {"samples", "LIST", "per pixel, one row each (default: 1)", samples_read, 0, NUMBERS(1, SAMPLES_MAX)},
     BOUNCES_OPTION(VariantOptions, bounce_count),
-    {"lanes", "LIST", "of 1, 4, 8, 16 (default and CPU maximum: vector width)", option_set, FIELD(lanes),
+    {"lanes", "LIST", "any of 1, 4, 8, 16 (default and CPU maximum: vector width)", option_set, FIELD(lanes),
      NAMES(lanes_choice_names)},
-    {"bvh", "LIST", "of auto, on, off (default: auto)", option_set, FIELD(bvhs), NAMES(bvh_choice_names)}};
+    {"bvh", "LIST", "any of auto, on, off (default: auto)", option_set, FIELD(bvhs),
+     NAMES(bvh_choice_names)}};
 const Option variant_set_options[] = {
     {"size", "WxH", "image size (default: as glint render)", option_size, FIELD(size)},
     {"seconds", "MAX", "time limit of the measurement, converged or not (default: 5 per row)", option_number,

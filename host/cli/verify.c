@@ -54,10 +54,11 @@ typedef struct {
 static const Option options_own[] = {
     {"quick", NULL, "a sixteenth of the random rays, and fewer pixels", option_flag,
      offsetof(VerifyOptions, quick)},
-    {"lean", NULL, "build kernels of what each scene needs alone: more of them, for a slow compiler",
-     option_flag, offsetof(VerifyOptions, lean)}};
+    {"lean", NULL, "build one small kernel per scene instead of one for all, for slow compilers", option_flag,
+     offsetof(VerifyOptions, lean)}};
 static const Option precision_own[] = {
-    {"precision", "P", "single, strict or double (default: all that the device has)", option_precision, 0}};
+    {"precision", "P", "single, strict or double (default: all that the device has)", option_precision, 0,
+     .names = precision_names, .name_count = ARITHMETIC_COUNT}};
 
 static const CommandLine command_line = {
     .usage =
@@ -438,9 +439,6 @@ static int options_read(VerifyOptions *options, int argument_count, char **argum
     *options = (VerifyOptions){0};
     const int status = command_line_read(&command_line, options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    if (options->common.precision == PRECISION_CERTIFIED)
-        return option_usage_fault(
-            "verify", "--precision certified is only for images; choose single, strict or double");
     options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
     for (size_t i = 0; i < options->cases.count; i++)
         if (!is_case(options->cases.names[i])) return refuse_case(options->cases.names[i]);

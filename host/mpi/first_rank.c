@@ -151,7 +151,7 @@ static void message_receive(const Ranks *ranks, RankState *states, Scheduler *sc
     RankState *state = &states[index];
     char failure[sizeof ranks->items->failure];
     bool is_right = false;
-    if (status->MPI_TAG == TAG_TAKE) {
+    if (status->MPI_TAG == TAG_REQUEST) {
         is_right = request_receive(state, status);
     } else if (status->MPI_TAG == TAG_BAND && !state->is_rejected) {
         is_right = header_receive(ranks, state, status);

@@ -8,9 +8,9 @@
 #include <mpi.h>
 
 enum {
-    TAG_TAKE, // a Request
-    TAG_ROWS, // BandRows, the answer; no rows: the end
-    TAG_BAND, // a FilmHeader, followed by the layers with the next tag
+    TAG_REQUEST, // a Request
+    TAG_ROWS,    // BandRows, the answer; no rows: the end
+    TAG_BAND,    // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,
     TAG_END,        // to a rank that renders: the render has ended
     TAG_DONE,       // a rank's last: why its device failed, or an empty text

@@ -24,7 +24,7 @@ static bool has_ended(void *ended)
 static BandRows rows_acquire(void *ended, uint32_t rows_max, uint32_t step)
 {
     const Request request = {rows_max, step};
-    send_bytes(&request, sizeof request, 0, TAG_TAKE);
+    send_bytes(&request, sizeof request, 0, TAG_REQUEST);
     MPI_Status status;
     while (!has_message(0, TAG_ROWS, &status)) {
         has_ended(ended);

@@ -194,7 +194,7 @@ static CompileSettings compile_settings(const RenderSettings *settings, SceneVar
         .bounce_count = settings->bounce_count,
         .min_contribution = settings->min_contribution,
         .precision = settings->precision,
-        .certifies = settings->precision == PRECISION_CERTIFIED || variant.pass == PASS_IN_DOUBT,
+        .certifies = settings->precision == PRECISION_CERTIFIED || variant.pass == PASS_FLAGGED,
         .lanes = variant.lanes,
         .bvh = settings->bvh,
         .instances = settings->instances,
@@ -218,7 +218,7 @@ static RenderSettings pass_settings(const RenderSettings *settings, PixelPass pa
 
 bool renderer_certifies(const Renderer *renderer)
 {
-    return renderer->settings.precision == PRECISION_CERTIFIED || renderer->pass == PASS_IN_DOUBT;
+    return renderer->settings.precision == PRECISION_CERTIFIED || renderer->pass == PASS_FLAGGED;
 }
 
 static Renderer *prepare(Compute *compute, const RenderSettings *settings, PixelPass pass, Renderer *earlier)

@@ -73,7 +73,7 @@ enum { LANES_MAX = 16 };
 
 // The pixels that a renderer renders: all of them; at `certified`, then the flagged ones, in double precision
 // with bounds; then those that remain uncertified, so that these equal a render at `double`.
-typedef enum { PASS_ALL, PASS_IN_DOUBT, PASS_UNDECIDED, PASS_COUNT } PixelPass;
+typedef enum { PASS_ALL, PASS_FLAGGED, PASS_UNCERTIFIED, PASS_COUNT } PixelPass;
 
 // The inputs of a scene's compilation in addition to the settings. Devices with the same lanes read the same
 // arrays.

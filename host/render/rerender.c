@@ -42,16 +42,16 @@ static PixelList flagged_list(const Renderer *renderer, BandRows rows, const uin
 }
 
 // Copies a layer of the list's pixels, in double, to the band's layer, in float.
-static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_list,
-                        const BandBuffers *of_band, const PixelList *list, const Film *band)
+static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *list_buffers,
+                        const BandBuffers *band_buffers, const PixelList *list, const Film *band)
 {
     Renderer *next_pass = renderer->next_pass; // perhaps on another device
     const size_t components = film_components(band, layer);
     const bool is_length = layer_types[layer] == LAYER_TYPE_LENGTH;
-    void *values = band_map(renderer, of_band, layer, CL_MAP_READ | CL_MAP_WRITE);
-    void *rerendered = memory_allocate(of_list->layer_sizes[layer], 1);
-    const bool is_read = renderer_read(next_pass, of_list->film, of_list->layer_begins[layer],
-                                       of_list->layer_sizes[layer], rerendered);
+    void *values = band_map(renderer, band_buffers, layer, CL_MAP_READ | CL_MAP_WRITE);
+    void *rerendered = memory_allocate(list_buffers->layer_sizes[layer], 1);
+    const bool is_read = renderer_read(next_pass, list_buffers->film, list_buffers->layer_begins[layer],
+                                       list_buffers->layer_sizes[layer], rerendered);
     for (size_t i = 0; i < list->count && values && is_read; i++)
         for (size_t k = 0; k < components; k++) {
             const size_t from = i * components + k, to = list->items[i].index * components + k;
@@ -62,23 +62,23 @@ static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *of_l
                     (float)(((const double *)rerendered)[from] / (is_length ? renderer->compiled.unit : 1));
         }
     free(rerendered);
-    renderer_unmap(renderer, of_band->film, values);
+    renderer_unmap(renderer, band_buffers->film, values);
 }
 
-static void launches_collect(RenderReport *report, RenderReport *of_next)
+static void launches_collect(RenderReport *report, RenderReport *next_report)
 {
-    for (size_t i = 0; i < of_next->launches.count; i++)
-        array_push(report->launches, ((NamedLaunch){"re-render", of_next->launches.items[i].time}));
-    for (size_t i = 0; i < of_next->reads.count; i++)
-        array_push(report->reads, of_next->reads.items[i]);
-    report->build_seconds += of_next->build_seconds;
-    report->build_from_cache &= of_next->build_from_cache;
-    report->is_out_of_line |= of_next->is_out_of_line;
-    for (size_t i = 0; i < of_next->builds.count; i++)
-        array_push(report->builds, of_next->builds.items[i]);
-    of_next->build_seconds = 0;
-    of_next->builds.count = 0;
-    of_next->launches.count = of_next->reads.count = 0;
+    for (size_t i = 0; i < next_report->launches.count; i++)
+        array_push(report->launches, ((NamedLaunch){"re-render", next_report->launches.items[i].time}));
+    for (size_t i = 0; i < next_report->reads.count; i++)
+        array_push(report->reads, next_report->reads.items[i]);
+    report->build_seconds += next_report->build_seconds;
+    report->build_from_cache &= next_report->build_from_cache;
+    report->is_out_of_line |= next_report->is_out_of_line;
+    for (size_t i = 0; i < next_report->builds.count; i++)
+        array_push(report->builds, next_report->builds.items[i]);
+    next_report->build_seconds = 0;
+    next_report->builds.count = 0;
+    next_report->launches.count = next_report->reads.count = 0;
 }
 
 // A band whose flagged pixels are re-rendered: the kernel, the layers that it fills, and their buffers.

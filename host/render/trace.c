@@ -246,7 +246,8 @@ const char *trace_ray_fault(const TraceRay *ray, Precision precision)
         is_within &= fabs(ray->origin[axis]) <= farthest_of(precision) && isfinite(ray->direction[axis]);
         has_direction |= ray->direction[axis] != 0;
     }
-    if (!is_within) return "a number is beyond the precision's range; only tmax may be infinite";
+    if (!is_within)
+        return "a number is not finite or beyond the precision's range; only tmax may be infinite";
     if (!has_direction) return "a ray's direction cannot be 0 0 0";
     return precision == PRECISION_CERTIFIED && ray->tmin != 0
                ? "at certified a ray starts at its origin, tmin 0"
