@@ -148,8 +148,8 @@ static void hit_batch_write(void *context, size_t begin, size_t end)
 
 // Traces rays in batches to bound memory. Returns false with a message if a ray is invalid, or without one
 // if the device failed.
-static bool rays_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
-                       MessageList *messages)
+static bool batches_trace(GlintTracer *tracer, const GlintRays *rays, const TraceArrays *arrays,
+                          MessageList *messages)
 {
     const size_t batch = batch_rays(tracer, rays->count);
     TraceRay *scaled = memory_allocate(batch + 1, sizeof *scaled);
@@ -182,7 +182,7 @@ static GlintStatus call_trace(GlintTracer *tracer, const GlintRays *rays, const 
                               MessageList *list, char **messages)
 {
     pthread_mutex_lock(&tracer->device->mutex);
-    const bool is_sound = rays_trace(tracer, rays, arrays, list);
+    const bool is_sound = batches_trace(tracer, rays, arrays, list);
     const GlintStatus status =
         call_end(list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     pthread_mutex_unlock(&tracer->device->mutex);

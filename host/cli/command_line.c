@@ -39,7 +39,8 @@ bool option_fault(const Option *option, const char *value, const char *expected,
 bool option_flag(const Option *option, const char *value, void *options)
 {
     (void)value;
-    return *(bool *)option_field(option, options) = true;
+    *(bool *)option_field(option, options) = true;
+    return true;
 }
 
 bool option_text(const Option *option, const char *value, void *options)
@@ -58,15 +59,20 @@ bool digits_read(const char *value, const char **end, uint64_t *result)
     return at > value;
 }
 
-bool option_count(const Option *option, const char *value, void *options)
+bool count_read(const Option *option, const char *value, uint32_t *count)
 {
     const char *end;
     uint64_t number;
     if (!digits_read(value, &end, &number) || *end != '\0' || (double)number < option->low ||
         (double)number > option->high)
         return option_fault(option, value, "an integer from %.0f to %.0f", option->low, option->high);
-    *(uint32_t *)option_field(option, options) = (uint32_t)number;
+    *count = (uint32_t)number;
     return true;
+}
+
+bool option_count(const Option *option, const char *value, void *options)
+{
+    return count_read(option, value, option_field(option, options));
 }
 
 bool option_number(const Option *option, const char *value, void *options)
@@ -123,11 +129,17 @@ static size_t name_find(const Option *option, const char *name)
     return i;
 }
 
+bool choice_read(const Option *option, const char *value, unsigned *index)
+{
+    *index = (unsigned)name_find(option, value);
+    return *index < option->name_count || names_fault(option, value, "");
+}
+
 bool option_choice(const Option *option, const char *value, void *options)
 {
-    const size_t index = name_find(option, value);
-    if (index == option->name_count) return names_fault(option, value, "");
-    *(unsigned *)option_field(option, options) = (unsigned)index;
+    unsigned index;
+    if (!choice_read(option, value, &index)) return false;
+    *(unsigned *)option_field(option, options) = index;
     return true;
 }
 

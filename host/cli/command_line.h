@@ -73,6 +73,9 @@ OptionReader option_set;        // unsigned: one bit for each name, with commas 
 OptionReader option_folder;     // const char *: creates the folder, which must be writable
 OptionReader option_new_folder; // const char *: creates the folder, which must be writable and empty
 
+// What option_count and option_choice read, for readers that store it elsewhere.
+bool count_read(const Option *option, const char *value, uint32_t *count);
+bool choice_read(const Option *option, const char *value, unsigned *index);
 // Returns the field of the option.
 void *option_field(const Option *option, void *options);
 // Reads at most `most` values, separated by commas, each into the next `item_size` bytes of `items`.

@@ -152,7 +152,7 @@ static const char *hash_read(const char *at, const char *name, uint64_t *hash)
 }
 
 // Reads a prefix and a number of up to nine digits. Returns the position after them, or NULL if absent.
-static const char *count_read(const char *at, const char *prefix, uint32_t *value)
+static const char *line_count_read(const char *at, const char *prefix, uint32_t *value)
 {
     const size_t length = strlen(prefix);
     if (!at || strncmp(at, prefix, length) != 0) return NULL;
@@ -166,10 +166,10 @@ static const char *count_read(const char *at, const char *prefix, uint32_t *valu
 // Reads a line, which ends with a NUL. Returns false if it is not a line of the file's format.
 static bool golden_read(Golden *golden, const char *line)
 {
-    const char *at = count_read(line, "size=", &golden->width);
-    at = count_read(at, "x", &golden->height);
-    at = count_read(at, " samples=", &golden->samples);
-    at = count_read(at, " bounces=", &golden->bounces);
+    const char *at = line_count_read(line, "size=", &golden->width);
+    at = line_count_read(at, "x", &golden->height);
+    at = line_count_read(at, " samples=", &golden->samples);
+    at = line_count_read(at, " bounces=", &golden->bounces);
     at = hash_read(at, "scene", &golden->scene_hash);
     for (size_t i = 0; i < HASHED_COUNT; i++)
         at = hash_read(at, hashed[i].name, &golden->hashes[i]);

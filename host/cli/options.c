@@ -22,15 +22,21 @@ bool option_error_budget(const Option *option, const char *value, void *options)
     if (end == value || !(budget->limit > 0 && isfinite(budget->limit)) || (*end != ':' && *end != '\0'))
         return option_fault(option, value, "a number above 0, perhaps with a metric, such as 0.01:flip");
     const Option metric = {option->name, NAMES(error_metric_names)};
-    return *end == '\0' || option_choice(&metric, end + 1, &budget->metric);
+    unsigned index = ERROR_RMSE;
+    if (*end == ':' && !choice_read(&metric, end + 1, &index)) return false;
+    budget->metric = (ErrorMetric)index;
+    return true;
 }
 
 bool option_precision(const Option *option, const char *value, void *options)
 {
     CommonOptions *common = options;
     const Option names = {option->name, .names = precision_names, .name_count = option->name_count};
+    unsigned index;
+    if (!choice_read(&names, value, &index)) return false;
+    common->precision = (Precision)index;
     common->has_precision = true;
-    return option_choice(&names, value, &common->precision);
+    return true;
 }
 
 static bool lanes_read(const Option *option, const char *value, void *options)
@@ -45,7 +51,7 @@ static bool max_pixels_read(const Option *option, const char *value, void *optio
 {
     (void)options;
     uint32_t largest;
-    if (!option_count(option, value, &largest)) return false;
+    if (!count_read(option, value, &largest)) return false;
     image_limit_pixels(largest);
     return true;
 }

@@ -83,11 +83,10 @@ static bool format_read(const Option *option, const char *value, void *options)
     static const ImageFormat formats[] = {IMAGE_PNG, IMAGE_PPM, IMAGE_NPY};
     RenderOptions *render = options;
     unsigned choice;
-    Option names = *option;
-    names.offset = 0;
-    if (!option_choice(&names, value, &choice)) return false;
+    if (!choice_read(option, value, &choice)) return false;
     render->output.stdout_format = formats[choice];
-    return render->has_format = true;
+    render->has_format = true;
+    return true;
 }
 
 static bool is_to_stdout(const ImageOutputOptions *output)

@@ -13,7 +13,7 @@ bool timing_style_read(const Option *option, const char *value, void *options)
     static const char *const names[] = {"text", "json", "trace"};
     unsigned choice = 0;
     const Option styles = {option->name, NAMES(names)};
-    if (value && !option_choice(&styles, value, &choice)) return false;
+    if (value && !choice_read(&styles, value, &choice)) return false;
     *(TimingStyle *)option_field(option, options) = TIMING_TEXT + choice;
     return true;
 }

@@ -164,7 +164,7 @@ static bool hits_write(const TraceOptions *options, const TraceHit *hits, size_t
     return written;
 }
 
-static int rays_trace(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
+static int rays_answer(const TraceOptions *options, const Scene *scene, const RayList *rays, Compute *compute)
 {
     RenderSettings settings = settings_whole(&options->common, 1, 1);
     MessageList messages = {0};
@@ -215,7 +215,7 @@ int command_trace(int argument_count, char **arguments)
         device_open(&open, &options.common)) {
         if (options.common.precision != PRECISION_CERTIFIED ||
             reference_open(&open.compute, &open.devices, NULL))
-            status = rays_trace(&options, &scene, &rays, &open.compute);
+            status = rays_answer(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);
     }
     free(rays.items);

@@ -5,11 +5,12 @@
 #include <math.h>
 #include <stdlib.h>
 
-// Surfaces count as touching within this, relative to the scene's largest coordinate. It has to exceed 620 u,
-// about 2^-14.7 with the u of float: the kernels look for an opaque surface behind a transparent one up to 5
-// error bounds away (surface_find_opaque), each of at most 16 u per number of a shape, 7 of a cylinder, and 4
-// u per coordinate of the point. For double it is larger than needed. Five error bounds of an instance are
-// 140 u and 180 u times its condition at most, those of an oval 420 u and 120 u times its condition.
+// Surfaces count as touching within this distance, relative to the scene's largest coordinate. It must exceed
+// 620 u, about 2^-14.7 with the u of float, because the kernels look for an opaque surface behind a
+// transparent one up to five error bounds away (surface_find_opaque). A bound is at most 16 u per number of a
+// shape, of which a cylinder has 7, plus 4 u per coordinate of the point. Five bounds of an instance are at
+// most 140 u and 180 u times its condition, those of an oval 420 u and 120 u times its condition. For double
+// the distance is larger than needed.
 #define NEARNESS 0x1p-14
 
 // More pairs than this, 5 to 30 ms of them, are not compared. A box around all bounded opaque primitives
