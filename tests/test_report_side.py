@@ -135,7 +135,7 @@ class SideBySide(TestCase):
         self.assertIn("1 row, 0 with times in A and here\n", out)
 
     def test_lanes(self):
-        """A device's number of lanes does not make another row, but several numbers do. There is no verdict if they differ."""
+        """A device's number of lanes does not make another row, but several numbers do. If they differ, no verdict is printed."""
         out, data = self.compared(report(run(10)), report(run(1, lanes=1), name="gpu-x", kind="gpu"), report(run(9, lanes=8)))
         self.assertEqual([[cell["lanes"] for cell in row["cells"]] for row in data["rows"]], [[16, 1, 8]])
         self.assertIn("their lanes differ", data["rows"][0]["cells"][2]["why_not"])

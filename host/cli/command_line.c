@@ -166,8 +166,7 @@ bool option_list(const Option *option, const char *value, OptionReader *read, vo
 static bool name_read(const Option *option, const char *value, void *index)
 {
     *(size_t *)index = name_find(option, value);
-    return *(size_t *)index < option->name_count ||
-           names_fault(option, value, "a list, with commas between, of ");
+    return *(size_t *)index < option->name_count || names_fault(option, value, "a comma-separated list of ");
 }
 
 bool option_set(const Option *option, const char *value, void *options)

@@ -69,7 +69,7 @@ OptionReader option_count;      // uint32_t: an integer from `low` to `high`
 OptionReader option_number;     // double, from `low` to `high`
 OptionReader option_size;       // uint32_t[2], of WxH
 OptionReader option_choice;     // an enum: the index of the name
-OptionReader option_set;        // unsigned: one bit for each name, with commas between
+OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
 OptionReader option_folder;     // const char *: creates the folder, which must be writable
 OptionReader option_new_folder; // const char *: creates the folder, which must be writable and empty
 

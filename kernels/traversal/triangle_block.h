@@ -19,8 +19,8 @@ typedef struct {
     SeenRectangles seen;
     Vector edges[3]; // a x b, b x c and c x a, signed so that values inside are positive
     RealLanes error; // the error of the edge values
-    // For shadow rays, an upper bound on the triangle's w, LARGEST if it may reach the light; a vertex on
-    // the frame's axes, but not from its origin; and the normal, to either side.
+    // Used by shadow rays. `w_far` is an upper bound on the triangle's w, or LARGEST if it may reach the
+    // light. `vertex` is on the frame's axes, but not from its origin, and `normal` faces either side.
     RealLanes w_far;
     Vector vertex, normal;
     real normal_squared, longest;
