@@ -8,8 +8,9 @@
 // Returns the lanes whose rays may hit what is inside the sphere. A line along d through a common origin
 // misses a sphere around v, seen from there, if (v . d)^2 < p d^2 for the origin's power p = v^2 - r^2, which
 // is lowered by 256 u v^2, on the host, and here by 128 u d^2, the ray's cull slack. A shadow ray's |d| is
-// the distance to the light; rays from the eye start there and need only the former. docs/numerics.md derives
-// this and the cull of several packets.
+// the distance to the light; rays from the eye start there and need only the former. For the shape's error
+// and a shadow ray's line, which misses the origin by up to u |d|, the sphere is enlarged by 64 u (|v| +
+// |d|), which lowers p by at most 192 u v^2 + 64 u d^2. Roundings take 16 u v^2 + 2 u d^2.
 static inline mask ray_hits_cull_sphere(const Ray *ray, global const CullSphere *sphere)
 {
     global const scalar *center_power = (global const scalar *)sphere;
@@ -29,13 +30,16 @@ static inline global const CullSphere *ray_cull_spheres(const Scene *scene, cons
     return scene->cull_spheres + (size_t)(ray->common_origin - COMMON_ORIGIN_EYE) * count;
 }
 
-// Bounds of the unit directions in which rays are seen from their common origin.
+// Bounds of the unit directions in which rays are seen from their common origin. If directions x lie within h
+// of c in each component, v . x <= m = v . c + |v| . h, |v| by components, and no ray hits a sphere where
+// max(m, 0)^2 < p - 128 u D^2 for the longest shadow ray's length D.
 typedef struct {
     scalar4 center, reach; // per component
     scalar slack;          // the largest cull slack
 } DirectionBounds;
 
-// Exceeds the error of inverse_root_estimate and all roundings here and in directions_hit_cull_spheres.
+// Exceeds the error of inverse_root_estimate, 2^-14, and all roundings here and in
+// directions_hit_cull_spheres, 20 u.
 #define DIRECTION_REACH_SLACK ((scalar)(0x1p-13f))
 
 // Bounds the active rays of `packets`, given as bits. Returns false if a length is too small to square.

@@ -15,8 +15,12 @@
 // Packets with a larger slope in the frame take packet traversal.
 #define SLOPE_MAX ((real)(4))
 
-// Rounding bounds in u, derived in docs/numerics.md: a box's slope, relative to itself; a ray's slope,
-// relative to 1; and the enlargement of boxes beyond their slack, relative to the coordinates.
+// Rounding bounds in units of roundoff u: a box's slope, relative to itself; a ray's slope, relative to 1;
+// and the enlargement of boxes beyond their slack, relative to the coordinates. A box's slope needs 7 u. A
+// ray's needs 24 u: a quotient, which may be off by 5 u, and a product, times SLOPE_MAX. In addition, a ray's
+// line misses a light by u of each component of the whole ray d, in all 4 u |d|_1, and the difference of a
+// plane and the origin is off by 8 u w. The sum is below 64 u of the larger of w and d, which are at most the
+// 1-norms, seen from the eye, of the hit or the ray's start plus that of the light.
 enum { BOX_SLOPE_SLACK = 32, RAY_SLOPE_SLACK = 64, TILE_POSITION_SLACK = 64 };
 // Error bounds in u of a triangle's vertex across a ray: in the full test, relative to its distance from the
 // ray's start, and in a block, relative to its distance from the common origin.
@@ -113,7 +117,7 @@ static inline Vector frame_load(const OriginFrame *frame, global const scalar *r
 static inline real tile_reach(const MacroTile *tile, uint packet)
 {
     const Traversal *traversal = &tile->traversals[packet];
-    real t = (real)(1 + 16 * UNIT_ROUNDOFF);
+    real t = (real)(1 + 16 * UNIT_ROUNDOFF); // the product below needs 2 u
     real limit = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;
     if (tile->frame.leaving) t = t * real_min(limit, (real)(LARGEST / 2));
     return lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
@@ -205,7 +209,7 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     if (IS_CERTIFIED) {
         tile->slack += lanes_largest(mask_all(), bounds->place_error);
         const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
-        // six times the test's error, of 1-norms that may be 2.4 times the distance (docs/numerics.md)
+        // six times the test's error, of 1-norms that may be 2.4 times the distance (triangle_block.h)
         const scalar error1 = (scalar)(6 * 2.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
         const scalar origin_error = lanes_largest(mask_all(), bounds->origin_error);
         tile->vertex_error0 = 6 * (origin_error + (scalar)(2 * UNIT_ROUNDOFF) * origin);
