@@ -209,8 +209,8 @@ def lanes_frame(lanes):
 NUMBER = r"([\d.,]*\d(?:e[-+]?\d+)?)"
 # Document, a pattern with a group for each number or name, and what these are by the measurements.
 CLAIMS = [  # N stands for a number
-    ("README.md", "a mesh of a million triangles takes N ms, with Embree's packets N ms; N spheres take N ms, with Embree's own spheres N ms "
-                  "and with glint's sphere test as a callback N ms",
+    ("README.md", "a mesh of a million triangles takes N ms, and N ms with Embree's packets. N spheres take N ms, and with Embree N ms, "
+                  "or N ms if it calls glint's sphere test",
      lambda: (frame("bunny-1000000"), frame("bunny-1000000", "Embree packets"), 16, frame("spheres-16"), frame("spheres-16", "Embree packets"),
               frame("spheres-16", "Embree packets, our spheres"))),
     ("README.md", "None of N pixels compared in N scenes",
