@@ -1,9 +1,16 @@
-// The size of an array, and growing arrays: any struct with `Item *items; size_t count, capacity;`.
+// The size of an array, and growing arrays.
 #pragma once
 
 #include <stddef.h>
 
 #define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
+
+// A growing array, which is empty if it is zeroed. Any struct with these members is one.
+#define ARRAY_OF(Item)                                                                                       \
+    struct {                                                                                                 \
+        Item *items;                                                                                         \
+        size_t count, capacity;                                                                              \
+    }
 
 // Ensures capacity for `extra` more items by doubling. `array` is an lvalue of such a struct.
 #define array_reserve(array, extra)                                                                          \

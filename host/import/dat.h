@@ -1,6 +1,7 @@
 // Reads a Tachyon scene: its words, its textures and the statements that glint does not show.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
 
@@ -16,10 +17,7 @@ typedef struct {
     Scene *scene;
     bool has_resolution, has_camera, is_at_end;
     bool dims_clear; // opacity dims what a transparent surface shows, as in VMD
-    struct {
-        DatTexture *items;
-        size_t count, capacity;
-    } textures;
+    ARRAY_OF(DatTexture) textures;
     uint32_t *slots; // of a hash table: 1 + index of a texture; 0: free
     size_t slot_count;
 } DatReader;

@@ -74,10 +74,7 @@ bool dat_polycylinder(DatReader *reader)
     const size_t offset = reader->line.start;
     unsigned count;
     double radius;
-    struct {
-        Vector3 *items;
-        size_t count, capacity;
-    } points = {0};
+    ARRAY_OF(Vector3) points = {0};
     bool read = dat_expect(reader, "points") && count_read(reader, "points", &count);
     for (unsigned i = 0; read && i < count; i++) {
         Vector3 point;
@@ -247,19 +244,13 @@ typedef struct {
         uint32_t (*items)[3];
         size_t count, capacity;
     } triangles;
-    struct {
-        uint32_t *items;
-        size_t count, capacity;
-    } materials;
+    ARRAY_OF(uint32_t) materials;
 } VertexArray;
 
 // Reads one vector per vertex. Reports an error and returns NULL on failure.
 static Vector3 *vectors_read(DatReader *reader, const char *name, unsigned count, bool are_colors)
 {
-    struct {
-        Vector3 *items;
-        size_t count, capacity;
-    } vectors = {0};
+    ARRAY_OF(Vector3) vectors = {0};
     array_reserve(vectors, 1);
     for (unsigned i = 0; i < count; i++) {
         Vector3 vector = {0};

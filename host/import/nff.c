@@ -15,14 +15,8 @@ typedef struct {
     Scene *scene;
     uint32_t material; // of what follows
     bool has_material, has_background, has_view, has_fault;
-    struct {
-        size_t *items;
-        size_t count, capacity;
-    } white_lights; // indices of the lights without a color
-    struct {
-        Vector3 *items;
-        size_t count, capacity;
-    } corners, normals; // of the polygon being read
+    ARRAY_OF(size_t) white_lights;      // indices of the lights without a color
+    ARRAY_OF(Vector3) corners, normals; // of the polygon being read
     PolygonTriangles triangles;
 } NffReader;
 

@@ -1,13 +1,11 @@
 // Finds the files of a scene and the lines that define its objects.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/message.h"
 #include "host/scene/scene.h"
 
-typedef struct {
-    size_t *items; // ascending
-    size_t count, capacity;
-} Offsets;
+typedef ARRAY_OF(size_t) Offsets; // ascending
 
 typedef struct {
     Offsets line_starts;

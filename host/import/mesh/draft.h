@@ -10,10 +10,7 @@
 
 typedef enum { DRAFT_POSITION, DRAFT_UV, DRAFT_NORMAL, DRAFT_PART_COUNT } DraftPart;
 
-typedef struct {
-    uint32_t *items;
-    size_t count, capacity;
-} DraftIndices;
+typedef ARRAY_OF(uint32_t) DraftIndices;
 
 // The material of all triangles from a corner on.
 typedef struct {
@@ -44,10 +41,7 @@ typedef struct {
     DraftPlaces places;
     Report report; // of the file
 
-    struct {
-        Vector3 *items;
-        size_t count, capacity;
-    } positions, normals;
+    ARRAY_OF(Vector3) positions, normals;
     struct {
         double (*items)[2];
         size_t count, capacity;
@@ -56,19 +50,10 @@ typedef struct {
     // that shares the indices of the positions and has one value for each of them.
     DraftIndices corners[DRAFT_PART_COUNT];
     bool is_shared[DRAFT_PART_COUNT];
-    struct {
-        DraftPolygon *items;
-        size_t count, capacity;
-    } polygons; // all other corners are those of triangles
-    struct {
-        DraftMaterialRun *items;
-        size_t count, capacity;
-    } materials;
+    ARRAY_OF(DraftPolygon) polygons; // all other corners are those of triangles
+    ARRAY_OF(DraftMaterialRun) materials;
     // Positions that are not numbers. They are an error only if a face uses them.
-    struct {
-        DraftPlace *items;
-        size_t count, capacity;
-    } unread;
+    ARRAY_OF(DraftPlace) unread;
     // One more than the largest index per part that a corner names before the file defines it. draft_check
     // compares it with the final count.
     DraftPlace needed[DRAFT_PART_COUNT];

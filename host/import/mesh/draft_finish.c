@@ -91,10 +91,7 @@ typedef struct {
     MeshDraft *draft;
     DraftIndices corners[DRAFT_PART_COUNT];
     size_t run; // the next one of the materials
-    struct {
-        Vector3 *items;
-        size_t count, capacity;
-    } polygon;
+    ARRAY_OF(Vector3) polygon;
     PolygonTriangles cut;
 } Cutter;
 
@@ -211,10 +208,7 @@ typedef struct {
 typedef struct {
     MeshDraft *draft;
     uint32_t *first; // vertex of each position; DRAFT_NONE: none yet
-    struct {
-        Combination *items;
-        size_t count, capacity;
-    } combinations;
+    ARRAY_OF(Combination) combinations;
     size_t capacity;
     Mesh *mesh;
 } Combiner;

@@ -1,6 +1,7 @@
 // Reads meshes from files and places them in the world.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/import/load.h"
 #include "host/scene/affine.h"
 #include "host/scene/mesh.h"
@@ -13,10 +14,7 @@ typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 typedef struct {
     Camera camera;
     bool has_camera;
-    struct {
-        Light *items;
-        size_t count, capacity;
-    } lights;
+    ARRAY_OF(Light) lights;
 } MeshView;
 
 typedef struct {

@@ -29,14 +29,8 @@ typedef struct {
 
 typedef struct {
     MeshDraft *draft;
-    struct {
-        MtlMaterial *items;
-        size_t count, capacity;
-    } materials;
-    struct {
-        struct stat *items;
-        size_t count, capacity;
-    } files; // that were read
+    ARRAY_OF(MtlMaterial) materials;
+    ARRAY_OF(struct stat) files; // that were read
     // of the current file
     const char *path;
     Report report;

@@ -1,6 +1,7 @@
 // Reads the materials that an OBJ file names from its MTL files.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/mesh/draft.h"
 
@@ -11,14 +12,8 @@ typedef struct {
 } ObjMaterial;
 
 typedef struct {
-    struct {
-        ObjMaterial *items;
-        size_t count, capacity;
-    } used;
-    struct {
-        Word *items;
-        size_t count, capacity;
-    } libraries; // `mtllib`
+    ARRAY_OF(ObjMaterial) used;
+    ARRAY_OF(Word) libraries; // `mtllib`
 } ObjMaterials;
 
 // Adds the materials to the scene and to the draft. Warns of materials that are missing or cannot be used.

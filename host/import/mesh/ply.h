@@ -1,6 +1,7 @@
 // Reads a PLY file's header and lines.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/import/mesh/draft.h"
 #include "host/import/mesh/scan.h"
 
@@ -26,14 +27,8 @@ typedef enum { PLY_NO_FORMAT, PLY_ASCII, PLY_LITTLE_ENDIAN, PLY_BIG_ENDIAN } Ply
 
 typedef struct {
     PlyFormat format;
-    struct {
-        PlyElement *items;
-        size_t count, capacity;
-    } elements;
-    struct {
-        PlyProperty *items;
-        size_t count, capacity;
-    } properties; // of all elements, in their order
+    ARRAY_OF(PlyElement) elements;
+    ARRAY_OF(PlyProperty) properties; // of all elements, in their order
 } PlyHeader;
 
 typedef struct {

@@ -22,10 +22,7 @@ typedef enum {
     ROLE_NONE,
 } PlyRole;
 
-typedef struct {
-    double *items;
-    size_t count, capacity;
-} Numbers;
+typedef ARRAY_OF(double) Numbers;
 
 typedef struct {
     PlyHeader header;
@@ -33,10 +30,7 @@ typedef struct {
     Scan line;                 // the unread part of the row's line, in text
     const PlyElement *element; // of the current row, and the row's index
     size_t row;
-    struct {
-        PlyRole *items;
-        size_t count, capacity;
-    } roles; // of the element's properties
+    ARRAY_OF(PlyRole) roles; // of the element's properties
     bool has_role[ROLE_NONE + 1];
     double numbers[ROLE_NONE + 1]; // of the current vertex
     size_t unread;                 // the offset of its first coordinate that is not a number in range, or 0

@@ -16,10 +16,7 @@ typedef struct {
     uint32_t node;
 } Key;
 
-typedef struct {
-    Key *items;
-    size_t count, capacity;
-} Keys;
+typedef ARRAY_OF(Key) Keys;
 
 static const YamlNode *node_at(const YamlReader *reader, uint32_t index)
 {

@@ -1,6 +1,7 @@
 // Reads the mappings of a YAML scene by tables of typed fields, with a message for every mistake.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/import/load.h"
 #include "host/import/number.h"
 #include "host/import/place.h"
@@ -26,20 +27,11 @@ typedef struct {
     Report report;
     Scene *scene;
     const SceneOptions *options;
-    struct {
-        Source **items;
-        size_t count, capacity;
-    } included; // texts of files, which follow that of the scene's
-    struct {
-        MaterialName *items;
-        size_t count, capacity;
-    } names;                   // of materials, sorted
-    uint32_t default_material; // UINT32_MAX until an object needs it
-    Places places;             // of objects
-    struct {
-        Definition *items;
-        size_t count, capacity;
-    } definitions;
+    ARRAY_OF(Source *) included;  // texts of files, which follow that of the scene's
+    ARRAY_OF(MaterialName) names; // of materials, sorted
+    uint32_t default_material;    // UINT32_MAX until an object needs it
+    Places places;                // of objects
+    ARRAY_OF(Definition) definitions;
     bool warned_of_pattern; // warned once that a transform does not move a pattern
     size_t copy_count;      // objects of definitions, instances and repeated groups
     size_t key_count;       // animation keys that were read

@@ -30,10 +30,7 @@ typedef struct {
     size_t depth;
     size_t end;       // of the last event: the position of an empty value
     size_t value_end; // of the last value: a block of them ends there, before comments
-    struct {
-        Anchor *items;
-        size_t count, capacity;
-    } anchors;
+    ARRAY_OF(Anchor) anchors;
 } TreeBuilder;
 
 static void node_append(TreeBuilder *builder, YamlNode node)

@@ -2,6 +2,7 @@
 // children, so that no document expands while it is read.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/stage.h"
 #include "host/import/report.h"
 #include <stdint.h>
@@ -21,11 +22,8 @@ typedef struct {
 } YamlNode;
 
 typedef struct {
-    struct {
-        YamlNode *items;
-        size_t count, capacity;
-    } nodes;    // root first
-    Text texts; // of all scalars, each ended by a NUL
+    ARRAY_OF(YamlNode) nodes; // root first
+    Text texts;               // of all scalars, each ended by a NUL
     bool has_aliases;
 } YamlTree;
 
