@@ -132,8 +132,9 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
 
 const char *texture_fallback(TextureContent content)
 {
-    return content == TEXTURE_NORMALS || content == TEXTURE_BUMPS ? "normals are not tilted"
-                                                                  : "the color is used";
+    return content == TEXTURE_COLORS    ? "the color is used"
+           : content == TEXTURE_OPACITY ? "nothing is cut out"
+                                        : "normals are not tilted";
 }
 
 static uint32_t texture_add(MeshDraft *draft, const char *path, TextureContent content, const char *owner)

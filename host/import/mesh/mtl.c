@@ -11,20 +11,27 @@
 #include <string.h>
 #include <sys/stat.h>
 
+// A number and its place in the file. The value is NAN if it is not given.
+typedef struct {
+    double value;
+    size_t offset;
+} MtlNumber;
+
+typedef struct {
+    char *path; // NULL: none
+    TextureContent content;
+    double strength; // -bm of a map of normals or heights
+} MtlImage;
+
 typedef struct {
     char *name;
     Material material;
-    char *image;           // of map_Kd, or NULL
-    char *opacity_image;   // of map_d, or NULL
-    char *normal_image;    // of norm or map_Bump, or NULL
-    bool has_bumps;        // normal_image is that of map_Bump
-    uint32_t scene_index;  // DRAFT_NONE: not in the scene yet
-    double dissolve;       // d: the opacity; NAN: not given
-    double transparency;   // Tr: 1 - d; NAN: not given
-    size_t opacity_offset; // of the last d or Tr
-    Color filter;          // Tf: factors of the transmitted light
-    double illumination;   // illum; NAN: not given
-    size_t illumination_offset;
+    MtlImage color_image, opacity_image, normal_image;
+    uint32_t scene_index;   // DRAFT_NONE: not in the scene yet
+    MtlNumber dissolve;     // d: the opacity
+    MtlNumber transparency; // Tr: 1 - d
+    Color filter;           // Tf: factors of the transmitted light
+    MtlNumber illumination; // illum
 } MtlMaterial;
 
 typedef struct {
@@ -51,26 +58,26 @@ static MtlMaterial *material_of(MtlReader *reader)
 // and bends light only with illum 6 and 7. Without illum, Ni alone decides.
 static void material_end(MtlReader *reader, MtlMaterial *material)
 {
-    const double illumination = material->illumination;
+    const double illumination = material->illumination.value, dissolve = material->dissolve.value,
+                 transparency = material->transparency.value;
     const bool refracts = illumination == 6 || illumination == 7,
-               is_glass = refracts || illumination == 4 || illumination == 9,
-               has_dissolve = !isnan(material->dissolve), has_transparency = !isnan(material->transparency);
+               is_glass = refracts || illumination == 4 || illumination == 9;
     Material *look = &material->material;
     if (illumination >= 3 && illumination <= 8 && look->specular > 0 && !reader->has_reflection) {
-        report_warning(&reader->report, material->illumination_offset,
+        report_warning(&reader->report, material->illumination.offset,
                        "the reflections of illum 3 to 8 are not shown");
         reader->has_reflection = true;
     }
-    if (is_glass && !has_dissolve && !has_transparency)
-        report_warning(&reader->report, material->illumination_offset,
+    if (is_glass && isnan(dissolve) && isnan(transparency))
+        report_warning(&reader->report, material->illumination.offset,
                        "illum %g is for glass, but d and Tr are missing: opaque", illumination);
-    if (has_dissolve && has_transparency && fabs(1 - material->transparency - material->dissolve) > 1e-3)
-        report_warning(&reader->report, material->opacity_offset,
-                       "Tr %g does not fit d %g, which it subtracts from 1: d is used",
-                       material->transparency, material->dissolve);
-    const double opacity = has_dissolve       ? material->dissolve
-                           : has_transparency ? 1 - material->transparency
-                                              : 1;
+    if (fabs(1 - transparency - dissolve) > 1e-3) // false if one is not given
+        report_warning(
+            &reader->report,
+            material->dissolve.offset > material->transparency.offset ? material->dissolve.offset
+                                                                      : material->transparency.offset,
+            "Tr %g does not fit d %g, which it subtracts from 1: d is used", transparency, dissolve);
+    const double opacity = !isnan(dissolve) ? dissolve : !isnan(transparency) ? 1 - transparency : 1;
     if (opacity == 1) return;
     const double specular = look->specular, ior = look->ior;
     material_set_opacity(look, opacity);
@@ -80,27 +87,44 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
     if (refracts || isnan(illumination)) look->ior = ior;
 }
 
-static void name_read(MtlReader *reader, MtlMaterial *previous)
+static void material_start(MtlReader *reader)
 {
-    if (previous) material_end(reader, previous);
     const Word name = scan_rest(&reader->scan);
     MtlMaterial material = {.name = memory_copy_part(name.text, name.length),
                             .material = material_default(),
                             .scene_index = DRAFT_NONE,
-                            .dissolve = NAN,
-                            .transparency = NAN,
+                            .dissolve = {.value = NAN},
+                            .transparency = {.value = NAN},
                             .filter = {1, 1, 1},
-                            .illumination = NAN};
+                            .illumination = {.value = NAN}};
     material.material.ior = 1;
     array_push(reader->materials, material);
 }
 
-// Reads a number. Returns false with a warning if it is not a number in the range.
-static bool number_of_line(MtlReader *reader, const Range *range, double *value)
+// Moves to the line's next word, or to its end, and returns its offset.
+static size_t word_offset(MtlReader *reader)
 {
-    double number;
     scan_more(&reader->scan);
-    const size_t offset = scan_offset(&reader->scan);
+    return scan_offset(&reader->scan);
+}
+
+// A statement of a material and the member that it sets.
+typedef struct Statement Statement;
+struct Statement {
+    const char *word;
+    // Reads the words after the keyword into the target. If they are invalid, warns, keeps the default and
+    // returns false. NULL: ignores them.
+    bool (*read)(MtlReader *reader, const Statement *statement, void *target);
+    size_t target;          // offset in MtlMaterial
+    const Range *range;     // of each number
+    TextureContent content; // of an image
+};
+
+static bool factor_read(MtlReader *reader, const Statement *statement, void *target)
+{
+    const Range *range = statement->range;
+    double number;
+    const size_t offset = word_offset(reader);
     if (scan_number(&reader->scan, &number) != NUMBER_READ) {
         report_warning(&reader->report, offset, "no number up to %g: the default is used", NUMBER_MAX);
         return false;
@@ -110,81 +134,52 @@ static bool number_of_line(MtlReader *reader, const Range *range, double *value)
                        number);
         return false;
     }
-    *value = number;
+    *(double *)target = number;
     return true;
 }
 
-// Reads a color from three numbers, or from one for all channels.
-static bool color_of_line(MtlReader *reader, Color *color)
+// Reads a factor and its place into an MtlNumber.
+static bool placed_factor_read(MtlReader *reader, const Statement *statement, void *target)
 {
-    double numbers[3];
-    int count = 0;
-    do
-        if (!number_of_line(reader, &range_not_negative, &numbers[count])) return false;
-    while (++count < 3 && scan_more(&reader->scan));
-    if (count == 1) numbers[1] = numbers[0];
-    if (count < 3) numbers[2] = numbers[1];
-    *color = (Color){numbers[0], numbers[1], numbers[2]};
-    return true;
+    MtlNumber *number = target;
+    number->offset = word_offset(reader);
+    return factor_read(reader, statement, &number->value);
 }
 
-static void diffuse_read(MtlReader *reader, MtlMaterial *material)
+static bool dissolve_read(MtlReader *reader, const Statement *statement, void *target)
 {
-    color_of_line(reader, &material->material.color);
-}
-
-// Reads the specular color and keeps only its strength, because highlights have the light's color.
-static void specular_read(MtlReader *reader, MtlMaterial *material)
-{
-    Color color;
-    if (color_of_line(reader, &color)) material->material.specular = (color.x + color.y + color.z) / 3;
-}
-
-static void emission_read(MtlReader *reader, MtlMaterial *material)
-{
-    color_of_line(reader, &material->material.emission);
-}
-
-static void filter_read(MtlReader *reader, MtlMaterial *material)
-{
-    color_of_line(reader, &material->filter);
-}
-
-static void shininess_read(MtlReader *reader, MtlMaterial *material)
-{
-    number_of_line(reader, &range_not_negative, &material->material.shininess);
-}
-
-static void ior_read(MtlReader *reader, MtlMaterial *material)
-{
-    number_of_line(reader, &range_positive, &material->material.ior);
-}
-
-static void transparency_read(MtlReader *reader, MtlMaterial *material)
-{
-    scan_more(&reader->scan);
-    material->opacity_offset = scan_offset(&reader->scan);
-    number_of_line(reader, &range_unit, &material->transparency);
-}
-
-static void dissolve_read(MtlReader *reader, MtlMaterial *material)
-{
+    MtlNumber *number = target;
     Scan ahead = reader->scan;
     const Word word = scan_word(&ahead);
-    material->opacity_offset = word.offset;
+    number->offset = word.offset;
     if (word_is(word, "-halo")) {
         unused_record(&reader->unused, &reader->report, word, "is not used");
         reader->scan = ahead;
     }
-    number_of_line(reader, &range_unit, &material->dissolve);
+    return factor_read(reader, statement, &number->value);
 }
 
-static void illumination_read(MtlReader *reader, MtlMaterial *material)
+// Reads a color from three numbers, or from one for all channels.
+static bool color_read(MtlReader *reader, const Statement *statement, void *target)
 {
-    static const Range range_illumination = {0, 10, false, "from 0 to 10"};
-    scan_more(&reader->scan);
-    material->illumination_offset = scan_offset(&reader->scan);
-    number_of_line(reader, &range_illumination, &material->illumination);
+    double numbers[3];
+    int count = 0;
+    do
+        if (!factor_read(reader, statement, &numbers[count])) return false;
+    while (++count < 3 && scan_more(&reader->scan));
+    if (count == 1) numbers[1] = numbers[0];
+    if (count < 3) numbers[2] = numbers[1];
+    *(Color *)target = (Color){numbers[0], numbers[1], numbers[2]};
+    return true;
+}
+
+// Reads a color and keeps only its strength, because highlights have the light's color.
+static bool strength_read(MtlReader *reader, const Statement *statement, void *target)
+{
+    Color color;
+    if (!color_read(reader, statement, &color)) return false;
+    *(double *)target = (color.x + color.y + color.z) / 3;
+    return true;
 }
 
 // Reads a texture's option, which starts with `-` and has up to three numbers or one word. Stores the value
@@ -207,14 +202,18 @@ static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
     return true;
 }
 
-// Reads the name of an image. `otherwise` describes its replacement if it cannot be read. `multiplier`
-// receives the value of -bm and may be NULL.
-static void image_read_name(MtlReader *reader, const char *otherwise, char **image, double *multiplier)
+// Reads the name of an image.
+static bool texture_read(MtlReader *reader, const Statement *statement, void *target)
 {
-    scan_more(&reader->scan);
-    const size_t offset = scan_offset(&reader->scan);
+    MtlImage *image = target;
+    const bool has_normals = statement->content == TEXTURE_NORMALS || statement->content == TEXTURE_BUMPS;
+    const size_t offset = word_offset(reader);
+    if (has_normals && image->path)
+        report_warning(&reader->report, offset, "a second map of normals or heights: it replaces the first");
+    free(image->path);
+    *image = (MtlImage){.content = statement->content, .strength = 1};
     bool has_options = false, is_used;
-    while (texture_option_read(&reader->scan, multiplier, &is_used))
+    while (texture_option_read(&reader->scan, has_normals ? &image->strength : NULL, &is_used))
         has_options |= !is_used;
     if (has_options) report_warning(&reader->report, offset, "options of textures are not used");
     const Word name = scan_rest(&reader->scan);
@@ -225,74 +224,39 @@ static void image_read_name(MtlReader *reader, const char *otherwise, char **ima
                        path);
     const SceneOptions *options = reader->draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);
-    free(*image);
-    *image = NULL;
-    const char *obstacle = file_obstacle(path);
+    const char *obstacle = file_obstacle(path), *fallback = texture_fallback(statement->content);
     if (obstacle)
-        report_warning(&reader->report, name.offset, "cannot read '%s': %s: %s", path, obstacle, otherwise);
+        report_warning(&reader->report, name.offset, "cannot read '%s': %s: %s", path, obstacle, fallback);
     else if (!image_is_known(path))
         report_warning(&reader->report, name.offset, "'%s' is not a PNG, JPEG, PPM or EXR: %s", path,
-                       otherwise);
+                       fallback);
     else
-        *image = memory_copy_text(path);
+        image->path = memory_copy_text(path);
     free(path);
+    return image->path != NULL;
 }
 
-static void texture_read(MtlReader *reader, MtlMaterial *material)
-{
-    image_read_name(reader, texture_fallback(TEXTURE_COLORS), &material->image, NULL);
-}
+static const Range range_illumination = {0, 10, false, "from 0 to 10"};
 
-static void opacity_texture_read(MtlReader *reader, MtlMaterial *material)
-{
-    image_read_name(reader, "nothing is cut out", &material->opacity_image, NULL);
-}
+#define LOOK(member) offsetof(MtlMaterial, material.member)
 
-static void normal_texture_read(MtlReader *reader, MtlMaterial *material)
-{
-    scan_more(&reader->scan);
-    if (material->normal_image)
-        report_warning(&reader->report, scan_offset(&reader->scan),
-                       "a second map of normals or heights: it replaces the first");
-    material->material.normal_strength = 1;
-    image_read_name(reader, texture_fallback(TEXTURE_NORMALS), &material->normal_image,
-                    &material->material.normal_strength);
-    material->has_bumps = false;
-}
-
-static void bump_texture_read(MtlReader *reader, MtlMaterial *material)
-{
-    normal_texture_read(reader, material);
-    material->has_bumps = true;
-}
-
-static void nothing_read(MtlReader *reader, MtlMaterial *material)
-{
-    (void)reader;
-    (void)material;
-}
-
-static const struct {
-    const char *word;
-    void (*read)(MtlReader *reader, MtlMaterial *material);
-} statements[] = {
-    {"newmtl", name_read},
-    {"Kd", diffuse_read},
-    {"Ks", specular_read},
-    {"Ns", shininess_read},
-    {"Ni", ior_read},
-    {"Tr", transparency_read},
-    {"d", dissolve_read},
-    {"map_Kd", texture_read},
-    {"Ka", nothing_read},
-    {"illum", illumination_read},
-    {"Ke", emission_read},
-    {"Tf", filter_read},
-    {"map_d", opacity_texture_read},
-    {"norm", normal_texture_read},
-    {"map_Bump", bump_texture_read},
-    {"map_bump", bump_texture_read},
-    {"bump", bump_texture_read},
+static const Statement statements[] = {
+    {"Kd", color_read, LOOK(color), &range_not_negative},
+    {"Ks", strength_read, LOOK(specular), &range_not_negative},
+    {"Ns", factor_read, LOOK(shininess), &range_not_negative},
+    {"Ni", factor_read, LOOK(ior), &range_positive},
+    {"Tr", placed_factor_read, offsetof(MtlMaterial, transparency), &range_unit},
+    {"d", dissolve_read, offsetof(MtlMaterial, dissolve), &range_unit},
+    {"Ka"},
+    {"illum", placed_factor_read, offsetof(MtlMaterial, illumination), &range_illumination},
+    {"Ke", color_read, LOOK(emission), &range_not_negative},
+    {"Tf", color_read, offsetof(MtlMaterial, filter), &range_not_negative},
+    {"map_Kd", texture_read, offsetof(MtlMaterial, color_image), NULL, TEXTURE_COLORS},
+    {"map_d", texture_read, offsetof(MtlMaterial, opacity_image), NULL, TEXTURE_OPACITY},
+    {"norm", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_NORMALS},
+    {"map_Bump", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
+    {"map_bump", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
+    {"bump", texture_read, offsetof(MtlMaterial, normal_image), NULL, TEXTURE_BUMPS},
 };
 
 static void line_read(MtlReader *reader)
@@ -300,12 +264,18 @@ static void line_read(MtlReader *reader)
     const Word word = scan_word(&reader->scan);
     MtlMaterial *material = material_of(reader);
     if (word.length == 0) return;
-    for (size_t i = 0; i < COUNT_OF(statements); i++) {
-        if (!word_is(word, statements[i].word)) continue;
-        if (i > 0 && !material)
+    if (word_is(word, "newmtl")) {
+        if (material) material_end(reader, material);
+        material_start(reader);
+        return;
+    }
+    for (const Statement *statement = statements; statement < statements + COUNT_OF(statements);
+         statement++) {
+        if (!word_is(word, statement->word)) continue;
+        if (!material)
             report_warning(&reader->report, word.offset, "a line before the first newmtl is not used");
-        else
-            statements[i].read(reader, material);
+        else if (statement->read)
+            statement->read(reader, statement, (char *)material + statement->target);
         return;
     }
     unused_record(&reader->unused, &reader->report, word, "is not used");
@@ -413,16 +383,17 @@ static int name_compare(const void *name, const void *material)
     return order != 0 ? order : other->name[word->length] == '\0' ? 0 : -1;
 }
 
-// Adds an image to the scene. Returns 0 with a warning if it cannot be used.
-static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const char *image,
-                          TextureContent content)
+// Adds an image to the scene. Returns 0 if there is none, or with a warning if it cannot be used.
+static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const MtlImage *image)
 {
+    if (!image->path) return 0;
     if (!draft_has(draft, DRAFT_UV)) {
-        draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", image,
+        draft_warn(draft, "no texture coordinates for the image '%s' of material '%.40s'", image->path,
                    material->name);
         return 0;
     }
-    const uint32_t texture = scene_add_texture(draft->scene, image, NULL, content, draft->import->offset);
+    const uint32_t texture =
+        scene_add_texture(draft->scene, image->path, NULL, image->content, draft->import->offset);
     if (texture == 0)
         draft_warn(draft, "too many images in one scene: that of material '%.40s' is not used",
                    material->name);
@@ -434,21 +405,18 @@ static uint32_t image_add(MeshDraft *draft, const MtlMaterial *material, const c
 static void textures_use(MeshDraft *draft, MtlMaterial *material)
 {
     Material *look = &material->material;
-    const bool is_one_file =
-        material->image && material->opacity_image && strcmp(material->image, material->opacity_image) == 0;
-    if (material->image)
-        look->texture =
-            image_add(draft, material, material->image, is_one_file ? TEXTURE_OPACITY : TEXTURE_COLORS);
+    MtlImage *color = &material->color_image;
+    const MtlImage *opacity = &material->opacity_image;
+    if (color->path && opacity->path && strcmp(color->path, opacity->path) == 0)
+        color->content = TEXTURE_OPACITY;
+    look->texture = image_add(draft, material, color);
     if (look->texture > 0) {
-        look->diffuse = (Color){look->diffuse.x * look->color.x, look->diffuse.y * look->color.y,
-                                look->diffuse.z * look->color.z};
+        look->diffuse = vector_multiply(look->diffuse, look->color);
         look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
     }
-    if (material->normal_image)
-        look->normal_texture = image_add(draft, material, material->normal_image,
-                                         material->has_bumps ? TEXTURE_BUMPS : TEXTURE_NORMALS);
-    if (material->opacity_image)
-        look->cutout_texture = image_add(draft, material, material->opacity_image, TEXTURE_OPACITY);
+    look->normal_texture = image_add(draft, material, &material->normal_image);
+    if (look->normal_texture > 0) look->normal_strength = material->normal_image.strength;
+    look->cutout_texture = image_add(draft, material, opacity);
     if (look->cutout_texture == 0) return;
     look->cutout = CUTOUT_OF_BLENDED;
     look->cutout_blends = true;
@@ -487,10 +455,11 @@ void obj_materials_read(MeshDraft *draft, const ObjMaterials *materials)
             ((DraftMaterialRun){used->first_corner, material_use(draft, material ? material : &otherwise)}));
     }
     for (size_t i = 0; i < reader.materials.count; i++) {
-        free(reader.materials.items[i].name);
-        free(reader.materials.items[i].image);
-        free(reader.materials.items[i].opacity_image);
-        free(reader.materials.items[i].normal_image);
+        MtlMaterial *material = &reader.materials.items[i];
+        free(material->name);
+        free(material->color_image.path);
+        free(material->opacity_image.path);
+        free(material->normal_image.path);
     }
     free(reader.materials.items);
     free(reader.files.items);
