@@ -146,7 +146,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     const BlockKey *key = key_find(block, word);
     if (!key)
         return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
-                            word_shown(word), word.text);
+                            WORD_TEXT(word));
     if (seen[key - keys]) return report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
     seen[key - keys] = true;
     size_t offset = line_peek(line).offset;
@@ -222,7 +222,7 @@ static const Block *block_find(CfgReader *reader)
     for (size_t i = 0; i < COUNT_OF(blocks); i++) {
         if (word_is(name, blocks[i].name)) return line_end(&reader->line) ? &blocks[i] : NULL;
     }
-    report_error(&reader->report, name.offset, "unknown block '%.*s'", word_shown(name), name.text);
+    report_error(&reader->report, name.offset, "unknown block '%.*s'", WORD_TEXT(name));
     return NULL;
 }
 
@@ -265,7 +265,7 @@ static void blocks_read(CfgReader *reader)
         if (word_opens_block(word))
             block_open(reader);
         else
-            report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
+            report_warning(&reader->report, word.offset, "skipped '%.*s'", WORD_TEXT(word));
         places_record(&places, reader->scene, word.offset);
     }
     places_close(&places);

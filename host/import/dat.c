@@ -58,7 +58,7 @@ bool dat_expect(DatReader *reader, const char *keyword)
     if (dat_skip(reader, keyword)) return true;
     if (!word.length) return report_error(&reader->report, word.offset, "'%s' is missing", keyword);
     return report_error(&reader->report, word.offset, "'%s' is missing before '%.*s'", keyword,
-                        word_shown(word), word.text);
+                        WORD_TEXT(word));
 }
 
 bool dat_value_in_range(DatReader *reader, const char *name, const Range *range, double *value)
@@ -123,7 +123,7 @@ static bool shader_mode_read(DatReader *reader)
     if (!dat_is(quality, "full"))
         dat_warn(reader, quality.offset,
                  "shader mode '%.*s' leaves something out, such as shadows: shown in full",
-                 word_shown(quality), quality.text);
+                 WORD_TEXT(quality));
     while (!dat_skip(reader, "end_shader_mode")) {
         const Line before = reader->line;
         const Word word = dat_word(reader);
@@ -229,7 +229,7 @@ static void statement_read(DatReader *reader)
     const Word word = dat_word(reader);
     const size_t index = statement_find(word);
     if (index == STATEMENT_COUNT) {
-        report_error(&reader->report, word.offset, "unknown statement '%.*s'", word_shown(word), word.text);
+        report_error(&reader->report, word.offset, "unknown statement '%.*s'", WORD_TEXT(word));
     } else if (statements[index].read) {
         if (statements[index].read(reader)) return;
     } else {

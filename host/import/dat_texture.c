@@ -134,8 +134,7 @@ static bool key_read(DatReader *reader, Word word, Texture *texture)
     if (dat_is(word, "outline")) return outline_read(reader, "outline");
     if (dat_is(word, "outline_width")) return outline_read(reader, "outline_width");
     if (!word.length) return report_error(&reader->report, word.offset, "the texture lacks its 'texfunc'");
-    return report_error(&reader->report, word.offset, "unknown key '%.*s' of a texture", word_shown(word),
-                        word.text);
+    return report_error(&reader->report, word.offset, "unknown key '%.*s' of a texture", WORD_TEXT(word));
 }
 
 bool dat_texture_body(DatReader *reader, Material *material)
@@ -186,7 +185,7 @@ static uint32_t texture_find(DatReader *reader, Word name)
         reader->slot_count ? slot_of(reader, name, hash_bytes(HASH_START, name.text, name.length)) : 0;
     if (reader->slot_count && reader->slots[slot])
         return reader->textures.items[reader->slots[slot] - 1].material;
-    dat_warn(reader, name.offset, "unknown texture '%.*s': white", word_shown(name), name.text);
+    dat_warn(reader, name.offset, "unknown texture '%.*s': white", WORD_TEXT(name));
     const Material white = dat_texture_default();
     const uint32_t material = scene_add_material(reader->scene, &white, "");
     texture_add(reader, name, material);

@@ -31,8 +31,7 @@ static bool projection_read(DatReader *reader)
     } else if (dat_is(name, "fisheye")) {
         report_warning(&reader->report, name.offset, "the fisheye projection becomes one in perspective");
     } else if (!dat_is(name, "perspective")) {
-        return report_error(&reader->report, name.offset, "unknown projection '%.*s'", word_shown(name),
-                            name.text);
+        return report_error(&reader->report, name.offset, "unknown projection '%.*s'", WORD_TEXT(name));
     }
     return true;
 }

@@ -67,11 +67,6 @@ bool word_is_number(Word word)
     return number_read(word.text, word.length, &number) != NUMBER_MALFORMED;
 }
 
-int word_shown(Word word)
-{
-    return word.length < WORD_SHOWN ? (int)word.length : WORD_SHOWN;
-}
-
 // Returns the next word, or reports an error if there is none.
 static bool line_field(Line *line, const char *name, Word *word)
 {
@@ -83,8 +78,7 @@ static bool line_field(Line *line, const char *name, Word *word)
 bool line_number(Line *line, const char *name, const Range *range, double *value)
 {
     Word word;
-    return line_field(line, name, &word) &&
-           number_read_field(line->report, word.offset, name, word.text, word.length, range, value);
+    return line_field(line, name, &word) && number_read_field(line->report, word, name, range, value);
 }
 
 bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value)
@@ -138,26 +132,22 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3
     if (has_blanks && !line->joins_blanks && comma_count(word) == 2)
         return report_error(line->report, word.offset,
                             "'%s' has blanks next to commas, '%.*s'; --lenient reads them", name,
-                            word_shown(word), word.text);
+                            WORD_TEXT(word));
     if (comma_count(word) != 2)
         return report_error(line->report, word.offset,
                             "'%s' must be three numbers with commas between, not '%.*s'", name,
-                            word_shown(word), word.text);
+                            WORD_TEXT(word));
     double values[3];
-    size_t start = 0;
-    for (size_t i = 0; i < 3; i++) {
-        size_t end = start;
-        while (end < word.length && word.text[end] != ',')
-            end++;
-        size_t length = end - start;
-        for (; length > 0 && is_blank(word.text[start]); length--)
-            start++;
-        while (length > 0 && is_blank(word.text[start + length - 1]))
-            length--;
-        if (!number_read_field(line->report, word.offset + start, name, word.text + start, length, range,
-                               &values[i]))
-            return false;
-        start = end + 1;
+    for (size_t i = 0, start = 0; i < 3; i++) {
+        Word part = {word.text + start, word.offset + start, 0};
+        while (start + part.length < word.length && part.text[part.length] != ',')
+            part.length++;
+        start += part.length + 1;
+        while (part.length > 0 && is_blank(part.text[0]))
+            part = (Word){part.text + 1, part.offset + 1, part.length - 1};
+        while (part.length > 0 && is_blank(part.text[part.length - 1]))
+            part.length--;
+        if (!number_read_field(line->report, part, name, range, &values[i])) return false;
     }
     *value = (Vector3){values[0], values[1], values[2]};
     return true;
@@ -178,7 +168,6 @@ bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3
 bool line_end(Line *line)
 {
     Word word = line_word(line);
-    if (word.length)
-        report_error(line->report, word.offset, "unexpected '%.*s'", word_shown(word), word.text);
+    if (word.length) report_error(line->report, word.offset, "unexpected '%.*s'", WORD_TEXT(word));
     return !word.length;
 }

@@ -5,11 +5,6 @@
 #include "host/scene/vector.h"
 
 typedef struct {
-    const char *text; // in the source, without a terminating NUL
-    size_t offset, length;
-} Word;
-
-typedef struct {
     Report *report;
     size_t start, at, end; // of the line; read position; its newline or comment
     size_t next;           // start of the next line
@@ -31,7 +26,6 @@ Word line_word(Line *line);
 bool word_is(Word word, const char *text);
 bool words_equal(Word a, Word b);
 bool word_is_number(Word word); // accepts numbers that are out of range
-int word_shown(Word word);      // number of its bytes that a message shows
 
 // Reads the next word as a number. Reports an error and returns false if it is missing or invalid.
 bool line_number(Line *line, const char *name, const Range *range, double *value);

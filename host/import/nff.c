@@ -330,9 +330,9 @@ static void element_read(NffReader *reader)
     reader->has_fault = true;
     if (is_number)
         report_error(&reader->report, name.offset, "expected an element, not the number %.*s",
-                     word_shown(name), name.text);
+                     WORD_TEXT(name));
     else
-        report_error(&reader->report, name.offset, "unknown element '%.*s'", word_shown(name), name.text);
+        report_error(&reader->report, name.offset, "unknown element '%.*s'", WORD_TEXT(name));
 }
 
 // Sets the intensities, which the format leaves unspecified. Its author proposes this formula for each of n

@@ -120,20 +120,24 @@ bool range_holds(const Range *range, double value)
                        : value >= range->low && value <= range->high;
 }
 
-bool number_read_field(Report *report, size_t offset, const char *name, const char *text, size_t length,
-                       const Range *range, double *value)
+int word_shown(Word word)
 {
-    switch (number_read(text, length, value)) {
+    return word.length < WORD_SHOWN ? (int)word.length : WORD_SHOWN;
+}
+
+bool number_read_field(Report *report, Word word, const char *name, const Range *range, double *value)
+{
+    switch (number_read(word.text, word.length, value)) {
     case NUMBER_MALFORMED:
-        if (!length) return report_error(report, offset, "'%s' must be a number, not nothing", name);
-        return report_error(report, offset, "'%s' must be a number, not '%.*s'", name,
-                            (int)(length < WORD_SHOWN ? length : WORD_SHOWN), text);
+        if (!word.length)
+            return report_error(report, word.offset, "'%s' must be a number, not nothing", name);
+        return report_error(report, word.offset, "'%s' must be a number, not '%.*s'", name, WORD_TEXT(word));
     case NUMBER_TOO_LARGE:
-        return report_error(report, offset, "'%s' is too large: numbers reach to %g", name, NUMBER_MAX);
+        return report_error(report, word.offset, "'%s' is too large: numbers reach to %g", name, NUMBER_MAX);
     case NUMBER_READ:
         break;
     }
     if (range && !range_holds(range, *value))
-        return report_error(report, offset, "'%s' must be %s", name, range->must);
+        return report_error(report, word.offset, "'%s' must be %s", name, range->must);
     return true;
 }

@@ -18,6 +18,16 @@ NumberStatus number_read(const char *text, size_t length, double *value);
 NumberStatus number_scan(const char **text, const char *end, double *value);
 
 typedef struct {
+    const char *text; // in the source, without a terminating NUL
+    size_t offset, length;
+} Word;
+
+// Returns the number of the word's bytes that a message shows.
+int word_shown(Word word);
+// The word in a message, for printf's %.*s.
+#define WORD_TEXT(word) word_shown(word), (word).text
+
+typedef struct {
     double low, high;
     bool open;        // excludes the limits
     const char *must; // the requirement as messages state it
@@ -28,7 +38,6 @@ extern const Range range_positive, range_not_negative, range_unit, range_byte, r
 
 bool range_holds(const Range *range, double value);
 
-// Reads the number called `name`. Reports an error and returns false if it is invalid. A `range` of NULL
-// allows any number.
-bool number_read_field(Report *report, size_t offset, const char *name, const char *text, size_t length,
-                       const Range *range, double *value);
+// Reads the number called `name` from a whole word. Reports an error and returns false if it is invalid. A
+// `range` of NULL allows any number.
+bool number_read_field(Report *report, Word word, const char *name, const Range *range, double *value);

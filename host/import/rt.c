@@ -50,9 +50,9 @@ static bool element_end(RtReader *reader)
     const Word first = line_peek(&reader->line);
     if (!reader->lenient && first.length > 0)
         return report_error(&reader->report, first.offset, "unexpected '%.*s'; --lenient skips it",
-                            word_shown(first), first.text);
+                            WORD_TEXT(first));
     for (Word word; (word = line_word(&reader->line)).length;)
-        report_warning(&reader->report, word.offset, "skipped '%.*s'", word_shown(word), word.text);
+        report_warning(&reader->report, word.offset, "skipped '%.*s'", WORD_TEXT(word));
     return true;
 }
 
@@ -301,11 +301,10 @@ static void element_read(RtReader *reader)
         }
     }
     if (reader->lenient)
-        report_warning(&reader->report, name.offset, "skipped unknown element '%.*s'", word_shown(name),
-                       name.text);
+        report_warning(&reader->report, name.offset, "skipped unknown element '%.*s'", WORD_TEXT(name));
     else
         report_error(&reader->report, name.offset, "unknown element '%.*s'; --lenient skips it",
-                     word_shown(name), name.text);
+                     WORD_TEXT(name));
 }
 
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)

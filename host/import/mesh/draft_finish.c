@@ -48,8 +48,8 @@ static bool position_fails(MeshDraft *draft, uint32_t position)
     Scan scan = {source->bytes + place->offset, source->bytes + source->length, source->bytes};
     const Word word = scan_word(&scan);
     if (word.length == 0) return draft_fails(draft, place->offset, "a coordinate of the vertex is missing");
-    return draft_fails(draft, place->offset, "'%.*s' is not a coordinate: a number up to %g",
-                       word_shown(word), word.text, NUMBER_MAX);
+    return draft_fails(draft, place->offset, "'%.*s' is not a coordinate: a number up to %g", WORD_TEXT(word),
+                       NUMBER_MAX);
 }
 
 // Checks the positions that faces use.

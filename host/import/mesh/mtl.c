@@ -220,8 +220,7 @@ static bool texture_read(MtlReader *reader, const Statement *statement, void *ta
     bool is_moved;
     char *path = draft_find_file(reader->path, name.text, name.length, &is_moved);
     if (is_moved)
-        report_warning(&reader->report, name.offset, "no '%.*s': '%s' is used", word_shown(name), name.text,
-                       path);
+        report_warning(&reader->report, name.offset, "no '%.*s': '%s' is used", WORD_TEXT(name), path);
     const SceneOptions *options = reader->draft->import->options;
     if (options && options->file_named) options->file_named(options->context, path);
     const char *obstacle = file_obstacle(path), *fallback = texture_fallback(statement->content);
@@ -330,8 +329,7 @@ static bool library_of_word_read(MtlReader *reader, Word name)
     char *path = draft_find_file(draft->import->path, name.text, name.length, &is_moved);
     const bool read = library_read(reader, path);
     if (is_moved && read)
-        report_warning(&draft->report, name.offset, "no '%.*s': '%s' is used", word_shown(name), name.text,
-                       path);
+        report_warning(&draft->report, name.offset, "no '%.*s': '%s' is used", WORD_TEXT(name), path);
     free(path);
     return read;
 }
@@ -364,7 +362,7 @@ static bool libraries_read(MtlReader *reader, const ObjMaterials *materials)
         if (libraries_of_line_read(reader, name) || fallback_read(reader)) continue;
         report_warning(&reader->draft->report, name.offset,
                        "the material file '%.*s' cannot be read: the default material is used",
-                       word_shown(name), name.text);
+                       WORD_TEXT(name));
         return false;
     }
     return true;

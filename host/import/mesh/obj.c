@@ -76,8 +76,7 @@ static bool corner_fails(ObjReader *reader, const char *start)
 {
     reader->scan.at = start;
     const Word word = scan_word(&reader->scan);
-    return draft_fails(reader->draft, word.offset, "'%.*s' is not a corner of a face", word_shown(word),
-                       word.text);
+    return draft_fails(reader->draft, word.offset, "'%.*s' is not a corner of a face", WORD_TEXT(word));
 }
 
 // Handles an index of a missing element. Returns false with an error for a vertex. For other parts, warns

@@ -41,8 +41,7 @@ static bool format_read(PlyHeader *header, PlyReading *reading, Scan line)
     for (PlyFormat format = PLY_ASCII; format <= PLY_BIG_ENDIAN; format++)
         if (word_is(word, names[format])) header->format = format;
     return header->format != PLY_NO_FORMAT ||
-           draft_fails(reading->draft, word.offset, "'%.*s' is not a format of PLY", word_shown(word),
-                       word.text);
+           draft_fails(reading->draft, word.offset, "'%.*s' is not a format of PLY", WORD_TEXT(word));
 }
 
 // Reads a count of at most 18 digits. No file has as many rows as a longer number.
@@ -62,8 +61,8 @@ static bool element_read(PlyHeader *header, PlyReading *reading, Scan line)
     PlyElement element = {.name = ply_word(&line), .first_property = header->properties.count};
     Word count = ply_word(&line);
     if (!count_read(count, &element.count))
-        return draft_fails(reading->draft, count.offset, "'%.*s' is not a number of '%.*s'",
-                           word_shown(count), count.text, word_shown(element.name), element.name.text);
+        return draft_fails(reading->draft, count.offset, "'%.*s' is not a number of '%.*s'", WORD_TEXT(count),
+                           WORD_TEXT(element.name));
     array_push(header->elements, element);
     return true;
 }
@@ -86,8 +85,7 @@ static const PlyType *type_of(Word word)
 static bool type_read(PlyReading *reading, Word word, const PlyType **type)
 {
     *type = type_of(word);
-    return *type || draft_fails(reading->draft, word.offset, "'%.*s' is not a type of PLY", word_shown(word),
-                                word.text);
+    return *type || draft_fails(reading->draft, word.offset, "'%.*s' is not a type of PLY", WORD_TEXT(word));
 }
 
 static bool property_read(PlyHeader *header, PlyReading *reading, Scan line)

@@ -79,7 +79,7 @@ static bool elements_are_sound(PlyReader *reader)
         for (size_t k = 0; k < i && is_wanted(&elements[i]); k++)
             if (words_equal(name, elements[k].name))
                 return draft_fails(reader->reading.draft, name.offset, "the header declares '%.*s' twice",
-                                   word_shown(name), name.text);
+                                   WORD_TEXT(name));
     }
     return true;
 }
@@ -92,13 +92,13 @@ static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
     for (size_t i = 0; i < element->property_count; i++) {
         const PlyProperty *property = &properties_of(reader, element)[i];
         if (reader->roles.items[i] != ROLE_NONE) continue;
-        text_appendf(&unused, "%s '%.*s'", first ? "," : "", word_shown(property->name), property->name.text);
+        text_appendf(&unused, "%s '%.*s'", first ? "," : "", WORD_TEXT(property->name));
         if (!first) first = property;
     }
     const Word name = element->name;
     if (!is_wanted(element))
         report_warning(&reader->reading.draft->report, name.offset, "the element '%.*s' is not used",
-                       word_shown(name), name.text);
+                       WORD_TEXT(name));
     else if (first)
         report_warning(&reader->reading.draft->report, first->name.offset, "not used:%s", text_c(&unused));
     text_free(&unused);
@@ -119,8 +119,7 @@ static bool value_missing(PlyReader *reader, const PlyProperty *property)
 {
     Word element = reader->element->name;
     return draft_fails(reader->reading.draft, place_of(reader), "%.*s %zu (from 0) lacks its '%.*s'",
-                       word_shown(element), element.text, reader->row, word_shown(property->name),
-                       property->name.text);
+                       WORD_TEXT(element), reader->row, WORD_TEXT(property->name));
 }
 
 // Reads a whole number of 32 bits.
@@ -172,7 +171,7 @@ static bool word_read(PlyReader *reader, const PlyType *type, double *value, boo
     }
     const Word word = ply_word(&reader->line);
     return draft_fails(reader->reading.draft, word.offset, "'%.*s' is not a number of type %s",
-                       word_shown(word), word.text, type->name);
+                       WORD_TEXT(word), type->name);
 }
 
 static size_t bytes_left(const PlyReader *reader)
@@ -215,8 +214,8 @@ static bool list_fails(PlyReader *reader, const PlyProperty *property, size_t of
     Word element = reader->element->name;
     return draft_fails(reader->reading.draft, offset,
                        "%.*s %zu (from 0) declares %.15g numbers of '%.*s', the %s has %zu more",
-                       word_shown(element), element.text, reader->row, promised, word_shown(property->name),
-                       property->name.text, is_binary(reader) ? "file" : "line", held);
+                       WORD_TEXT(element), reader->row, promised, WORD_TEXT(property->name),
+                       is_binary(reader) ? "file" : "line", held);
 }
 
 static bool is_count(double number)
@@ -277,8 +276,8 @@ static bool row_start(PlyReader *reader)
     do {
         if (!ply_line(&reader->reading, &reader->line))
             return draft_fails(reader->reading.draft, scan_offset(&reader->reading.left),
-                               "the file ends before %.*s %zu (from 0) of %zu", word_shown(name), name.text,
-                               reader->row, reader->element->count);
+                               "the file ends before %.*s %zu (from 0) of %zu", WORD_TEXT(name), reader->row,
+                               reader->element->count);
         ply_blanks_skip(&reader->line);
     } while (reader->line.at == reader->line.end);
     return true;

@@ -17,5 +17,5 @@ void unused_record(UnusedWords *unused, Report *report, Word word, const char *w
         if (words_equal(unused->words[i], word)) return;
     if (unused->count == COUNT_OF(unused->words)) return;
     unused->words[unused->count++] = word;
-    report_warning(report, word.offset, "'%.*s' %s", word_shown(word), word.text, what);
+    report_warning(report, word.offset, "'%.*s' %s", WORD_TEXT(word), what);
 }

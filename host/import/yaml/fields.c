@@ -189,8 +189,8 @@ bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, v
 {
     if (node->type != YAML_SCALAR) return expected_report(reader, field->name, "a number", node);
     const char *text = yaml_text(&reader->tree, node);
-    return number_read_field(&reader->report, node->offset, field->name, text, strlen(text), field->range,
-                             target);
+    const Word word = {text, node->offset, strlen(text)};
+    return number_read_field(&reader->report, word, field->name, field->range, target);
 }
 
 bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
