@@ -162,15 +162,6 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     return read && line_end(line);
 }
 
-// Moves to the next nonblank line. Returns false at the end of the source.
-static bool line_next_filled(Line *line)
-{
-    while (line_next(line, '\0')) {
-        if (line_peek(line).length) return true;
-    }
-    return false;
-}
-
 static bool word_opens_block(Word word)
 {
     return word.length >= 2 && !memcmp(word.text, "=>", 2);
@@ -228,7 +219,7 @@ static const Block *block_find(CfgReader *reader)
 
 static void block_skip(Line *line)
 {
-    while (line_next(line, '\0') && !word_is(line_peek(line), "}"))
+    while (line_next(line) && !word_is(line_peek(line), "}"))
         continue;
 }
 
@@ -277,6 +268,6 @@ bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {0.2, 0.2, 0.2}};
     CfgReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report)) blocks_read(&reader);
+    if (line_open(&reader.line, &reader.report, '\0')) blocks_read(&reader);
     return scene_finish(scene, &reader.report, NULL);
 }

@@ -10,22 +10,15 @@
 #include <string.h>
 #include <strings.h>
 
-// Moves to the next line with a word on it unless words are left on this one.
-static void reach_word(DatReader *reader)
-{
-    while (!line_peek(&reader->line).length && line_next(&reader->line, '#'))
-        continue;
-}
-
 Word dat_peek(DatReader *reader)
 {
-    reach_word(reader);
+    line_reach_word(&reader->line);
     return line_peek(&reader->line);
 }
 
 Word dat_word(DatReader *reader)
 {
-    reach_word(reader);
+    line_reach_word(&reader->line);
     return line_word(&reader->line);
 }
 
@@ -63,7 +56,7 @@ bool dat_expect(DatReader *reader, const char *keyword)
 
 bool dat_value_in_range(DatReader *reader, const char *name, const Range *range, double *value)
 {
-    reach_word(reader);
+    line_reach_word(&reader->line);
     const size_t start = reader->line.at;
     const bool read = line_number(&reader->line, name, range, value);
     if (!read) reader->line.at = start;
@@ -77,7 +70,7 @@ bool dat_value(DatReader *reader, const char *name, double *value)
 
 bool dat_whole_number(DatReader *reader, const char *name, const Range *range, unsigned *value)
 {
-    reach_word(reader);
+    line_reach_word(&reader->line);
     const size_t start = reader->line.at;
     const bool read = line_whole_number(&reader->line, name, range, value);
     if (!read) reader->line.at = start;
@@ -244,7 +237,7 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {1, 1, 1}};
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report)) {
+    if (line_open(&reader.line, &reader.report, '#')) {
         Places places = places_open(source, NULL);
         if (!dat_is(dat_peek(&reader), "begin_scene"))
             report_error(&reader.report, dat_peek(&reader).offset, "a scene starts with 'begin_scene'");

@@ -4,10 +4,8 @@
 
 bool dat_resolution(DatReader *reader)
 {
-    const size_t offset = reader->line.start;
-    if (reader->has_resolution) return report_error(&reader->report, offset, "a second resolution");
-    reader->has_resolution = true;
-    return dat_whole_number(reader, "width", &range_pixels, &reader->scene->width) &&
+    return line_is_first(&reader->line, &reader->has_resolution, "resolution") &&
+           dat_whole_number(reader, "width", &range_pixels, &reader->scene->width) &&
            dat_whole_number(reader, "height", &range_pixels, &reader->scene->height);
 }
 
@@ -62,9 +60,8 @@ bool dat_camera(DatReader *reader)
 {
     const size_t offset = reader->line.start;
     CameraBlock block;
-    if (reader->has_camera) return report_error(&reader->report, offset, "a second camera");
-    reader->has_camera = true;
-    if (!camera_block_read(reader, &block)) return false;
+    if (!line_is_first(&reader->line, &reader->has_camera, "camera") || !camera_block_read(reader, &block))
+        return false;
     if (vector_is_zero(block.view))
         return report_error(&reader->report, offset, "'viewdir' must not be zero");
     double height = 1 / block.zoom;

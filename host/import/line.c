@@ -3,17 +3,17 @@
 
 #include <string.h>
 
-bool line_open(Line *line, Report *report)
+bool line_open(Line *line, Report *report, char comment)
 {
     const Source *source = report->source;
     bool has_mark = source->length >= 3 && !memcmp(source->bytes, "\xEF\xBB\xBF", 3);
-    *line = (Line){.report = report, .next = has_mark ? 3 : 0};
+    *line = (Line){.report = report, .next = has_mark ? 3 : 0, .comment = comment};
     const char *nul = source->length ? memchr(source->bytes, '\0', source->length) : NULL;
     if (nul) report_error(report, (size_t)(nul - source->bytes), "not text: a NUL character");
     return !nul;
 }
 
-bool line_next(Line *line, char comment)
+bool line_next(Line *line)
 {
     const Source *source = line->report->source;
     if (line->next >= source->length) return false;
@@ -24,8 +24,20 @@ bool line_next(Line *line, char comment)
            !text_ends_line(source->bytes + line->end, source->length - line->end))
         line->end++;
     line->next = line->end + 1;
-    const char *start_of_comment = comment ? memchr(bytes, comment, line->end - line->start) : NULL;
-    if (start_of_comment) line->end = (size_t)(start_of_comment - source->bytes);
+    const char *comment = line->comment ? memchr(bytes, line->comment, line->end - line->start) : NULL;
+    if (comment) line->end = (size_t)(comment - source->bytes);
+    return true;
+}
+
+bool line_next_filled(Line *line)
+{
+    return line_next(line) && line_reach_word(line);
+}
+
+bool line_reach_word(Line *line)
+{
+    while (!line_peek(line).length)
+        if (!line_next(line)) return false;
     return true;
 }
 
@@ -170,4 +182,11 @@ bool line_end(Line *line)
     Word word = line_word(line);
     if (word.length) report_error(line->report, word.offset, "unexpected '%.*s'", WORD_TEXT(word));
     return !word.length;
+}
+
+bool line_is_first(const Line *line, bool *has_one, const char *what)
+{
+    if (*has_one) return report_error(line->report, line->start, "a second %s", what);
+    *has_one = true;
+    return true;
 }

@@ -8,15 +8,19 @@ typedef struct {
     Report *report;
     size_t start, at, end; // of the line; read position; its newline or comment
     size_t next;           // start of the next line
+    char comment;          // that starts a comment, or '\0'
     bool joins_blanks;     // vectors may have blanks next to their commas
 } Line;
 
-// Moves before the first line of the report's source. Reports an error and returns false if it contains a
-// NUL.
-bool line_open(Line *line, Report *report);
-// Moves to the next line. Lines end with a newline, a carriage return or both; `comment` is the character
-// that starts a comment, or '\0'. Returns false at the end.
-bool line_next(Line *line, char comment);
+// Moves before the first line of the report's source. `comment` is the character that starts a comment, or
+// '\0'. Reports an error and returns false if the source contains a NUL.
+bool line_open(Line *line, Report *report, char comment);
+// Each of these moves to a line and returns false at the end of the source: line_next to the next line,
+// line_next_filled to the next one that has a word, and line_reach_word to that unless words are left on this
+// line. Lines end with a newline, a carriage return or both.
+bool line_next(Line *line);
+bool line_next_filled(Line *line);
+bool line_reach_word(Line *line);
 
 // Returns the next word, empty at the end of the line. Words are separated by spaces, tabs and carriage
 // returns.
@@ -37,3 +41,6 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3
 bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value);
 // Reports an error and returns false if anything is left on the line.
 bool line_end(Line *line);
+// Sets *has_one, which tells whether the source had a `what`. Reports an error at the line and returns false
+// if it was set.
+bool line_is_first(const Line *line, bool *has_one, const char *what);

@@ -22,19 +22,9 @@ typedef struct {
 
 static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
-// Moves to the next line that has a word unless words are left on this one. Returns false at the end of the
-// source.
-static bool reach_word(NffReader *reader)
-{
-    while (!line_peek(&reader->line).length) {
-        if (!line_next(&reader->line, '#')) return false;
-    }
-    return true;
-}
-
 static bool read_number(NffReader *reader, const char *name, const Range *range, double *value)
 {
-    reach_word(reader);
+    line_reach_word(&reader->line);
     return line_number(&reader->line, name, range, value);
 }
 
@@ -81,9 +71,9 @@ static bool read_hither(NffReader *reader)
 
 static bool read_resolution(NffReader *reader)
 {
-    reach_word(reader);
+    line_reach_word(&reader->line);
     if (!line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width)) return false;
-    reach_word(reader);
+    line_reach_word(&reader->line);
     return line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height);
 }
 
@@ -121,13 +111,12 @@ static bool view_is_complete(NffReader *reader, size_t offset, const bool *seen)
 static bool read_view(NffReader *reader)
 {
     size_t offset = reader->line.start;
-    if (reader->has_view) return report_error(&reader->report, offset, "a second view");
-    reader->has_view = true;
+    if (!line_is_first(&reader->line, &reader->has_view, "view")) return false;
     if (reader->scene->objects.count)
         return report_error(&reader->report, offset, "the view must stand before the objects");
     reader->scene->camera.field_axis = FIELD_VERTICAL;
     bool seen[VIEW_KEYS] = {false};
-    while (reach_word(reader)) {
+    while (line_reach_word(&reader->line)) {
         Word word = line_peek(&reader->line);
         size_t index = view_key_index(word);
         if (index == VIEW_KEYS) break;
@@ -142,10 +131,8 @@ static bool read_view(NffReader *reader)
 
 static bool read_background(NffReader *reader)
 {
-    if (reader->has_background)
-        return report_error(&reader->report, reader->line.start, "a second background");
-    reader->has_background = true;
-    return read_color(reader, &reader->scene->background) && line_end(&reader->line);
+    return line_is_first(&reader->line, &reader->has_background, "background") &&
+           read_color(reader, &reader->scene->background) && line_end(&reader->line);
 }
 
 static bool read_light(NffReader *reader)
@@ -199,7 +186,7 @@ static bool read_sphere(NffReader *reader)
     Object object = {.type = SHAPE_SPHERE};
     double radius;
     if (!read_vector(reader, "center", NULL, &object.as.sphere.center)) return false;
-    reach_word(reader);
+    line_reach_word(&reader->line);
     size_t offset = line_peek(&reader->line).offset;
     if (!read_number(reader, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
     if (radius == 0) return report_error(&reader->report, offset, "'radius' must not be 0");
@@ -249,14 +236,14 @@ static bool read_cone(NffReader *reader)
 static bool read_corners(NffReader *reader, bool smooth)
 {
     unsigned count;
-    reach_word(reader);
+    line_reach_word(&reader->line);
     if (!line_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
     reader->corners.count = reader->normals.count = 0;
     for (unsigned i = 0; i < count; i++) {
         Vector3 corner, normal = {0, 0, 0};
         if (!read_vector(reader, "vertex", NULL, &corner)) return false;
         if (smooth) {
-            reach_word(reader);
+            line_reach_word(&reader->line);
             size_t offset = line_peek(&reader->line).offset;
             if (!read_vector(reader, "normal", NULL, &normal)) return false;
             if (vector_is_zero(normal))
@@ -353,10 +340,10 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     NffReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report)) {
+    if (line_open(&reader.line, &reader.report, '#')) {
         bool is_empty = true;
         Places places = places_open(source, NULL);
-        while (!report_is_full(&reader.report) && reach_word(&reader)) {
+        while (!report_is_full(&reader.report) && line_reach_word(&reader.line)) {
             const size_t offset = line_peek(&reader.line).offset;
             is_empty = false;
             element_read(&reader);

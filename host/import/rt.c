@@ -93,10 +93,8 @@ static bool read_ambient(RtReader *reader)
 {
     double ratio;
     Color color;
-    if (reader->has_ambient)
-        return report_error(&reader->report, reader->line.start, "a second ambient light");
-    reader->has_ambient = true;
-    if (!read_ratio(reader, &ratio) || !read_color(&reader->line, &color) || !element_end(reader))
+    if (!line_is_first(&reader->line, &reader->has_ambient, "ambient light") || !read_ratio(reader, &ratio) ||
+        !read_color(&reader->line, &color) || !element_end(reader))
         return false;
     reader->scene->ambient = vector_scale(color, ratio);
     return true;
@@ -127,9 +125,8 @@ static bool read_camera(RtReader *reader, Camera *camera)
 
 static bool read_only_camera(RtReader *reader)
 {
-    if (reader->has_camera) return report_error(&reader->report, reader->line.start, "a second camera");
-    reader->has_camera = true;
-    return read_camera(reader, &reader->scene->camera);
+    return line_is_first(&reader->line, &reader->has_camera, "camera") &&
+           read_camera(reader, &reader->scene->camera);
 }
 
 // Reads the older subject's `c`, which a file may repeat.
@@ -156,9 +153,8 @@ static bool read_light(RtReader *reader)
 
 static bool read_resolution(RtReader *reader)
 {
-    if (reader->has_size) return report_error(&reader->report, reader->line.start, "a second resolution");
-    reader->has_size = true;
-    return line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
+    return line_is_first(&reader->line, &reader->has_size, "resolution") &&
+           line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width) &&
            line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height) &&
            element_end(reader);
 }
@@ -292,7 +288,6 @@ static const struct {
 static void element_read(RtReader *reader)
 {
     Word name = line_word(&reader->line);
-    if (!name.length) return;
     reader->has_element = true;
     for (size_t i = 0; i < COUNT_OF(elements); i++) {
         if (word_is(name, elements[i].name)) {
@@ -313,9 +308,9 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
     RtReader reader = {
         .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
     Places places = places_open(source, NULL);
-    if (line_open(&reader.line, &reader.report)) {
+    if (line_open(&reader.line, &reader.report, '#')) {
         reader.line.joins_blanks = reader.lenient;
-        while (!report_is_full(&reader.report) && line_next(&reader.line, '#')) {
+        while (!report_is_full(&reader.report) && line_next_filled(&reader.line)) {
             element_read(&reader);
             places_record(&places, scene, reader.line.start);
         }
