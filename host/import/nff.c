@@ -39,59 +39,37 @@ static bool read_color(NffReader *reader, Color *color)
     return read_vector(reader, "color", &range_not_negative, color);
 }
 
-static bool read_from(NffReader *reader)
+static bool read_whole_number(NffReader *reader, const char *name, const Range *range, unsigned *value)
 {
-    return read_vector(reader, "from", NULL, &reader->scene->camera.position);
+    line_reach_word(&reader->line);
+    return line_whole_number(&reader->line, name, range, value);
 }
 
-static bool read_at(NffReader *reader)
-{
-    return read_vector(reader, "at", NULL, &reader->scene->camera.look_at);
-}
+// The keys of a view, of which those before VIEW_REQUIRED are required.
+enum { VIEW_FROM, VIEW_AT, VIEW_UP, VIEW_ANGLE, VIEW_HITHER, VIEW_RESOLUTION, VIEW_KEYS };
+enum { VIEW_REQUIRED = VIEW_HITHER };
+static const char *const view_keys[VIEW_KEYS] = {"from", "at", "up", "angle", "hither", "resolution"};
 
-static bool read_up(NffReader *reader)
+// Reads the value of a key. Skips `hither`, because glint has no near clipping plane.
+static bool read_view_key(NffReader *reader, size_t key)
 {
-    return read_vector(reader, "up", NULL, &reader->scene->camera.up);
-}
-
-static bool read_angle(NffReader *reader)
-{
-    double degrees;
-    if (!read_number(reader, "angle", &range_field_of_view, &degrees)) return false;
-    reader->scene->camera.half_tangent = portable_tangent(degrees * (M_PI / 360));
+    Camera *camera = &reader->scene->camera;
+    Vector3 *const vectors[] = {&camera->position, &camera->look_at, &camera->up};
+    double number;
+    if (key < COUNT_OF(vectors)) return read_vector(reader, view_keys[key], NULL, vectors[key]);
+    if (key == VIEW_RESOLUTION)
+        return read_whole_number(reader, "width", &range_pixels, &reader->scene->width) &&
+               read_whole_number(reader, "height", &range_pixels, &reader->scene->height);
+    if (key == VIEW_HITHER) return read_number(reader, view_keys[key], NULL, &number);
+    if (!read_number(reader, view_keys[key], &range_field_of_view, &number)) return false;
+    camera->half_tangent = portable_tangent(number * (M_PI / 360));
     return true;
 }
-
-// Skips `hither`, because glint has no near clipping plane.
-static bool read_hither(NffReader *reader)
-{
-    double unused;
-    return read_number(reader, "hither", NULL, &unused);
-}
-
-static bool read_resolution(NffReader *reader)
-{
-    line_reach_word(&reader->line);
-    if (!line_whole_number(&reader->line, "width", &range_pixels, &reader->scene->width)) return false;
-    line_reach_word(&reader->line);
-    return line_whole_number(&reader->line, "height", &range_pixels, &reader->scene->height);
-}
-
-enum { VIEW_REQUIRED = 4, VIEW_KEYS = 6 };
-
-// The first ones are required.
-static const struct {
-    const char *name;
-    bool (*read)(NffReader *reader);
-} view_keys[VIEW_KEYS] = {
-    {"from", read_from},   {"at", read_at},         {"up", read_up},
-    {"angle", read_angle}, {"hither", read_hither}, {"resolution", read_resolution},
-};
 
 static size_t view_key_index(Word word)
 {
     size_t index = 0;
-    while (index < VIEW_KEYS && !word_is(word, view_keys[index].name))
+    while (index < VIEW_KEYS && !word_is(word, view_keys[index]))
         index++;
     return index;
 }
@@ -100,7 +78,7 @@ static bool view_is_complete(NffReader *reader, size_t offset, const bool *seen)
 {
     for (size_t i = 0; i < VIEW_REQUIRED; i++) {
         if (seen[i]) continue;
-        return report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i].name);
+        return report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i]);
     }
     const Camera *camera = &reader->scene->camera;
     bool looks = !vector_is_zero(vector_subtract(camera->look_at, camera->position));
@@ -120,11 +98,10 @@ static bool read_view(NffReader *reader)
         Word word = line_peek(&reader->line);
         size_t index = view_key_index(word);
         if (index == VIEW_KEYS) break;
-        if (seen[index])
-            return report_error(&reader->report, word.offset, "a second '%s'", view_keys[index].name);
+        if (seen[index]) return report_error(&reader->report, word.offset, "a second '%s'", view_keys[index]);
         seen[index] = true;
         line_word(&reader->line);
-        if (!view_keys[index].read(reader) || !line_end(&reader->line)) return false;
+        if (!read_view_key(reader, index) || !line_end(&reader->line)) return false;
     }
     return view_is_complete(reader, offset, seen);
 }
@@ -236,8 +213,7 @@ static bool read_cone(NffReader *reader)
 static bool read_corners(NffReader *reader, bool smooth)
 {
     unsigned count;
-    line_reach_word(&reader->line);
-    if (!line_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
+    if (!read_whole_number(reader, "vertex count", &range_corner_count, &count)) return false;
     reader->corners.count = reader->normals.count = 0;
     for (unsigned i = 0; i < count; i++) {
         Vector3 corner, normal = {0, 0, 0};
