@@ -156,14 +156,14 @@ static uint32_t keys_value(YamlReader *reader, const Keys *keys, Ease ease, doub
 static bool value_animate(YamlReader *reader, uint32_t index)
 {
     static const Field fields[] = {
-        {"keys", read_node, offsetof(Animation, keys), FORM_ANY, REQUIRED, NULL},
-        {"ease", read_ease, offsetof(Animation, ease), FORM_ANY, OPTIONAL, NULL},
+        {"keys", read_node, offsetof(Animation, keys), FORM_ANY, REQUIRED},
+        {"ease", read_ease, offsetof(Animation, ease), FORM_ANY, OPTIONAL},
     };
     Keys keys = {0};
     Animation animation = {.ease = EASE_LINEAR};
-    const bool is_read = fields_read(reader, node_at(reader, index), "animation", fields, COUNT_OF(fields),
-                                     &animation, NULL) &&
-                         keys_read(reader, animation.keys, &keys);
+    const bool is_read =
+        fields_read(reader, node_at(reader, index), "animation", fields, COUNT_OF(fields), &animation) &&
+        keys_read(reader, animation.keys, &keys);
     if (is_read) {
         YamlNode value = *node_at(reader, keys_value(reader, &keys, animation.ease, reader->options->frame));
         value.next = node_at(reader, index)->next;

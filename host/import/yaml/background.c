@@ -50,17 +50,17 @@ static bool read_sun(YamlReader *reader, const Field *field, const YamlNode *nod
     static const Field fields[] = {
         {"elevation", read_number, offsetof(SunFields, sun.position.elevation), FORM_POSITION, REQUIRED,
          &range_right_angle},
-        {"azimuth", read_number, offsetof(SunFields, sun.position.azimuth), FORM_POSITION, REQUIRED, NULL},
+        {"azimuth", read_number, offsetof(SunFields, sun.position.azimuth), FORM_POSITION, REQUIRED},
         {"latitude", read_number, offsetof(SunFields, latitude), FORM_TIME, REQUIRED, &range_right_angle},
         {"longitude", read_number, offsetof(SunFields, longitude), FORM_TIME, REQUIRED, &range_half_turn},
-        {"date", read_date, offsetof(SunFields, days), FORM_TIME, REQUIRED, NULL},
+        {"date", read_date, offsetof(SunFields, days), FORM_TIME, REQUIRED},
         {"hour", read_number, offsetof(SunFields, hour), FORM_TIME, REQUIRED, &range_hour},
         {"angle", read_number, offsetof(SunFields, sun.angle), FORM_ANY, OPTIONAL, &range_disc_angle},
-        {"light", read_boolean, offsetof(SunFields, sun.shines), FORM_ANY, OPTIONAL, NULL},
+        {"light", read_boolean, offsetof(SunFields, sun.shines), FORM_ANY, OPTIONAL},
     };
     SunFields read = {.sun.shines = true};
-    Form form;
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &read, &form)) return false;
+    const Form form = fields_read(reader, node, field->name, fields, COUNT_OF(fields), &read);
+    if (!form) return false;
     if (form == FORM_TIME)
         read.sun.position = sun_position(read.latitude, read.longitude, read.days + read.hour / 24);
     read.sun.node = node;
@@ -73,18 +73,18 @@ bool read_background(YamlReader *reader, const Field *field, const YamlNode *nod
     static const Range range_turbidity = {TURBIDITY_MIN, TURBIDITY_MAX, false, "from 2 to 10"};
     enum { FORM_COLORS = FORM_FIRST, FORM_IMAGE = FORM_SECOND, FORM_SUN = FORM_THIRD };
     static const Field fields[] = {
-        {"horizon", read_strength, offsetof(Background, horizon), FORM_COLORS, REQUIRED, NULL},
-        {"zenith", read_strength, offsetof(Background, zenith), FORM_COLORS, REQUIRED, NULL},
-        {"nadir", read_strength, offsetof(Background, nadir), FORM_COLORS, OPTIONAL, NULL},
-        {"image", read_texture, offsetof(Background, texture), FORM_IMAGE, REQUIRED, NULL},
-        {"sun", read_sun, offsetof(Background, sun), FORM_SUN, REQUIRED, NULL},
+        {"horizon", read_strength, offsetof(Background, horizon), FORM_COLORS, REQUIRED},
+        {"zenith", read_strength, offsetof(Background, zenith), FORM_COLORS, REQUIRED},
+        {"nadir", read_strength, offsetof(Background, nadir), FORM_COLORS, OPTIONAL},
+        {"image", read_texture, offsetof(Background, texture), FORM_IMAGE, REQUIRED},
+        {"sun", read_sun, offsetof(Background, sun), FORM_SUN, REQUIRED},
         {"turbidity", read_number, offsetof(Background, turbidity), FORM_SUN, OPTIONAL, &range_turbidity},
-        {"ground", read_color, offsetof(Background, ground), FORM_SUN, OPTIONAL, NULL},
+        {"ground", read_color, offsetof(Background, ground), FORM_SUN, OPTIONAL},
         {"intensity", read_number, offsetof(Background, intensity), FORM_IMAGE | FORM_SUN, OPTIONAL,
          &range_not_negative},
-        {"turn", read_number, offsetof(Background, turn), FORM_IMAGE | FORM_SUN, OPTIONAL, NULL},
-        {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL, NULL},
-        {"light", read_boolean, offsetof(Background, is_light), FORM_ANY, OPTIONAL, NULL},
+        {"turn", read_number, offsetof(Background, turn), FORM_IMAGE | FORM_SUN, OPTIONAL},
+        {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL},
+        {"light", read_boolean, offsetof(Background, is_light), FORM_ANY, OPTIONAL},
     };
     Background *background = target;
     if (node->type != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);
@@ -93,7 +93,7 @@ bool read_background(YamlReader *reader, const Field *field, const YamlNode *nod
     background->intensity = 1;
     background->turbidity = 3;
     background->ground = vector_all(0.2);
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), background, NULL)) return false;
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), background)) return false;
     if (isnan(background->nadir.x)) background->nadir = background->horizon;
     return true;
 }

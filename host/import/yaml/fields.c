@@ -109,7 +109,7 @@ static size_t field_find(const YamlReader *reader, const YamlNode *key, const Fi
 // Restricts `forms` to those that the key allows. Reports an error and returns false if none remains; `seen`
 // marks the fields before the key.
 static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *field, const Field *fields,
-                        const bool *seen, unsigned *forms)
+                        const bool *seen, Form *forms)
 {
     if (*forms & field->forms) {
         *forms &= field->forms;
@@ -122,13 +122,13 @@ static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *fi
                         other->name);
 }
 
-bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
-                 size_t field_count, void *target, Form *form)
+Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
+                 size_t field_count, void *target)
 {
     if (mapping->type != YAML_MAPPING) return expected_report(reader, what, "a mapping", mapping);
     size_t errors_before = reader->report.error_count;
     bool seen[FIELDS_MAX] = {false};
-    unsigned forms = FORM_ANY;
+    Form forms = FORM_ANY;
     bool mixed = false;
     const YamlNode *value;
     for (const YamlNode *key = yaml_first(&reader->tree, mapping); key && !report_is_full(&reader->report);
@@ -147,13 +147,12 @@ bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
             mixed = true;
         if (index < field_count) seen[index] = true;
     }
-    unsigned chosen = forms & -forms; // the first
+    const Form chosen = forms & -forms; // the first
     for (size_t i = 0; i < field_count && !mixed; i++) {
         if (fields[i].required && (fields[i].forms & chosen) && !seen[i])
             report_error(&reader->report, mapping->offset, "%s lacks '%s'", what, fields[i].name);
     }
-    if (form) *form = chosen;
-    return reader->report.error_count == errors_before;
+    return reader->report.error_count == errors_before ? chosen : 0;
 }
 
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name)
@@ -193,33 +192,33 @@ bool read_number(YamlReader *reader, const Field *field, const YamlNode *node, v
     return number_read_field(&reader->report, word, field->name, field->range, target);
 }
 
-bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
-                FieldReader *read, size_t size, void *target)
+const Items two_numbers = {2, "two numbers", read_number, sizeof(double)},
+            three_points = {3, "three points", read_vector, sizeof(Vector3)};
+
+bool read_items(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    if (node->type != YAML_SEQUENCE || node->child_count != count)
-        return expected_report(reader, field->name, what, node);
+    const Items *items = field->items;
+    Field item_field = *field;
+    item_field.items = items->items;
+    if (node->type != YAML_SEQUENCE || node->child_count != items->count)
+        return expected_report(reader, field->name, items->what, node);
     bool all_read = true;
     char *place = target;
     for (const YamlNode *item = yaml_first(&reader->tree, node); item;
-         item = yaml_next(&reader->tree, item)) {
-        all_read &= read(reader, field, item, place);
-        place += size;
-    }
+         item = yaml_next(&reader->tree, item), place += items->size)
+        all_read &= items->read(reader, &item_field, item, place);
     return all_read;
 }
 
 bool read_vector(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
+    static const Items three_numbers = {3, "three numbers", read_number, sizeof(double)};
     double values[3];
-    if (!items_read(reader, field, node, 3, "three numbers", read_number, sizeof *values, values))
-        return false;
+    Field list = *field;
+    list.items = &three_numbers;
+    if (!read_items(reader, &list, node, values)) return false;
     *(Vector3 *)target = (Vector3){values[0], values[1], values[2]};
     return true;
-}
-
-bool read_three_points(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 3, "three points", read_vector, sizeof(Vector3), target);
 }
 
 bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node, void *target)

@@ -38,6 +38,7 @@ typedef struct {
 } YamlReader;
 
 typedef struct Field Field;
+typedef struct Items Items;
 
 // Reads the value of `field` at `node` into `target`; reports an error and returns false if it is invalid.
 typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode *node, void *target);
@@ -55,12 +56,24 @@ struct Field {
     unsigned forms;
     bool required;      // within its forms
     const Range *range; // of its values; NULL: any
+    const Items *items; // of read_items
 };
 
-// Fills `target` from a mapping, called `what` in messages. Sets *form, unless `form` is NULL, to the
-// mapping's form. Missing fields leave their members unchanged. Returns true if it reported nothing.
-bool fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
-                 size_t field_count, void *target, Form *form);
+// The lists of exactly `count` values of `size` bytes that read_items reads with `read`.
+struct Items {
+    size_t count;
+    const char *what; // such as "three numbers"
+    FieldReader *read;
+    size_t size;
+    const Items *items; // of each value, if `read` is read_items
+};
+
+extern const Items two_numbers, three_points;
+
+// Fills `target` from a mapping, called `what` in messages. Missing fields leave their members unchanged.
+// Returns the mapping's form, or 0 if it reported an error.
+Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, const Field *fields,
+                 size_t field_count, void *target);
 
 // Returns the value of a key, or the node itself if the key is missing or the node is not a mapping.
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name);
@@ -73,9 +86,9 @@ bool key_is_word(YamlReader *reader, const YamlNode *key);
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,
                  const YamlNode **value);
 
-// Read a YamlNode pointer, double, Vector3, nonzero Vector3, Vector3[3] or bool. Numbers must be in the
-// field's range.
-FieldReader read_node, read_number, read_vector, read_direction, read_three_points, read_boolean;
+// Read a YamlNode pointer, double, Vector3, nonzero Vector3, list of the field's items or bool. Numbers must
+// be in the field's range.
+FieldReader read_node, read_number, read_vector, read_direction, read_items, read_boolean;
 
 // Read a Color from three numbers, from one for a gray, or from sRGB as "#rrggbb", "#rgb" or a name. Whole
 // numbers that look like values from 0 to 255 are an error if one is above 1 in a surface's color, or above
@@ -83,10 +96,6 @@ FieldReader read_node, read_number, read_vector, read_direction, read_three_poin
 FieldReader read_color, read_strength;
 // Returns whether a color may be written as the text: a name or "#rrggbb".
 bool is_color_text(const char *text);
-
-// Reads a list of exactly `count` values of `size` bytes with `read`; `what` is like "three numbers".
-bool items_read(YamlReader *reader, const Field *field, const YamlNode *node, size_t count, const char *what,
-                FieldReader *read, size_t size, void *target);
 
 // Reports at an offset that the name of a `type`, such as a material, was defined before, and in which file.
 void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before);

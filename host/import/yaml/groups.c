@@ -62,11 +62,11 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
         Affine transform;
     } Group;
     static const Field fields[] = {
-        {"objects", read_node, offsetof(Group, objects), FORM_ANY, REQUIRED, NULL},
-        {"transform", read_transform, offsetof(Group, transform), FORM_ANY, OPTIONAL, NULL},
+        {"objects", read_node, offsetof(Group, objects), FORM_ANY, REQUIRED},
+        {"transform", read_transform, offsetof(Group, transform), FORM_ANY, OPTIONAL},
     };
     Group group = {.transform = affine_identity};
-    if (!fields_read(reader, mapping, "group", fields, COUNT_OF(fields), &group, NULL) ||
+    if (!fields_read(reader, mapping, "group", fields, COUNT_OF(fields), &group) ||
         !copies_add(reader, GROUP_COST * (1 + (size_t)group.objects->child_count), mapping))
         return;
     const size_t first = reader->scene->objects.count;
@@ -113,7 +113,7 @@ static size_t definition_cost(const Definition *definition)
 
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 {
-    static const Field fields[] = {{"objects", read_node, 0, FORM_ANY, REQUIRED, NULL}};
+    static const Field fields[] = {{"objects", read_node, 0, FORM_ANY, REQUIRED}};
     if (node->type != YAML_MAPPING) {
         expected_report(reader, "define", "a mapping", node);
         return;
@@ -135,7 +135,7 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
             report_error(&reader->report, key->offset, "more than %d definitions", DEFINITIONS_MAX);
             return;
         }
-        if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects, NULL) &&
+        if (fields_read(reader, value, "definition", fields, COUNT_OF(fields), &objects) &&
             copies_add(reader, GROUP_COST * (1 + (size_t)objects->child_count), value))
             yaml_read_object_list(reader, objects, false);
         const Definition definition = definition_move(reader, key, first_object);
@@ -189,12 +189,12 @@ void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)
         uint32_t material;
     } Instance;
     static const Field fields[] = {
-        {"of", read_node, offsetof(Instance, of), FORM_ANY, REQUIRED, NULL},
-        {"transform", read_transform, offsetof(Instance, transform), FORM_ANY, OPTIONAL, NULL},
-        {"material", read_material, offsetof(Instance, material), FORM_ANY, OPTIONAL, NULL},
+        {"of", read_node, offsetof(Instance, of), FORM_ANY, REQUIRED},
+        {"transform", read_transform, offsetof(Instance, transform), FORM_ANY, OPTIONAL},
+        {"material", read_material, offsetof(Instance, material), FORM_ANY, OPTIONAL},
     };
     Instance instance = {.transform = affine_identity, .material = UINT32_MAX};
-    if (!fields_read(reader, mapping, "instance", fields, COUNT_OF(fields), &instance, NULL)) return;
+    if (!fields_read(reader, mapping, "instance", fields, COUNT_OF(fields), &instance)) return;
     const Definition *definition = definition_named(reader, instance.of);
     if (!definition || !copies_add(reader, definition_cost(definition), mapping)) return;
     Scene *scene = reader->scene;

@@ -29,39 +29,39 @@ static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode 
     }
     if (node->type != YAML_MAPPING)
         return expected_report(reader, field->name, "inverse_square or a mapping", node);
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), fading, NULL)) return false;
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), fading)) return false;
     return fading[0] + fading[1] + fading[2] > 0 ||
            report_error(&reader->report, node->offset, "'%s' needs a number above 0", field->name);
 }
 
 #define FALLOFF                                                                                              \
     {                                                                                                        \
-        "falloff", read_falloff, offsetof(LightFields, light.fading), FORM_ANY, OPTIONAL, NULL               \
+        "falloff", read_falloff, offsetof(LightFields, light.fading), FORM_ANY, OPTIONAL                     \
     }
 
 #define COLOR                                                                                                \
-    {"color", read_strength, offsetof(LightFields, light.color), FORM_ANY, OPTIONAL, NULL},                  \
+    {"color", read_strength, offsetof(LightFields, light.color), FORM_ANY, OPTIONAL},                        \
     {                                                                                                        \
         "intensity", read_number, offsetof(LightFields, intensity), FORM_ANY, OPTIONAL, &range_not_negative  \
     }
 
 static const Field point_fields[] = {
-    {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
+    {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
     FALLOFF,
     COLOR,
 };
 
 static const Field directional_fields[] = {
-    {"direction", read_direction, offsetof(LightFields, light.direction), FORM_ANY, REQUIRED, NULL},
+    {"direction", read_direction, offsetof(LightFields, light.direction), FORM_ANY, REQUIRED},
     {"angle", read_number, offsetof(LightFields, angle), FORM_ANY, OPTIONAL, &range_disc_angle},
     COLOR,
 };
 
 // `look_at` and `direction` share a member, in which a target finally becomes a direction.
 static const Field spot_fields[] = {
-    {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
-    {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED, NULL},
-    {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED, NULL},
+    {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
+    {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED},
+    {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED},
     {"angle", read_number, offsetof(LightFields, light.half_angle), FORM_ANY, REQUIRED, &range_half_turn},
     {"penumbra", read_number, offsetof(LightFields, light.penumbra), FORM_ANY, OPTIONAL, &range_not_negative},
     {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, OPTIONAL, &range_not_negative},
@@ -71,33 +71,30 @@ static const Field spot_fields[] = {
 
 #define VISIBLE                                                                                              \
     {                                                                                                        \
-        "visible", read_boolean, offsetof(LightFields, light.is_visible), FORM_ANY, OPTIONAL, NULL           \
+        "visible", read_boolean, offsetof(LightFields, light.is_visible), FORM_ANY, OPTIONAL                 \
     }
 
 static const Field sphere_fields[] = {
-    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
+    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
     {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
     VISIBLE,
     FALLOFF,
     COLOR,
 };
 
-static bool read_edges(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 2, "two vectors", read_direction, sizeof(Vector3), target);
-}
+static const Items two_directions = {2, "two vectors", read_direction, sizeof(Vector3)};
 
 static const Field rectangle_fields[] = {
-    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
-    {"edges", read_edges, offsetof(LightFields, edges), FORM_ANY, REQUIRED, NULL},
+    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
+    {"edges", read_items, offsetof(LightFields, edges), FORM_ANY, REQUIRED, NULL, &two_directions},
     VISIBLE,
     FALLOFF,
     COLOR,
 };
 
 static const Field disc_fields[] = {
-    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED, NULL},
-    {"normal", read_direction, offsetof(LightFields, normal), FORM_ANY, REQUIRED, NULL},
+    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
+    {"normal", read_direction, offsetof(LightFields, normal), FORM_ANY, REQUIRED},
     {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
     VISIBLE,
     FALLOFF,
@@ -105,7 +102,7 @@ static const Field disc_fields[] = {
 };
 
 static const Field triangle_fields[] = {
-    {"vertices", read_three_points, offsetof(LightFields, vertices), FORM_ANY, REQUIRED, NULL},
+    {"vertices", read_items, offsetof(LightFields, vertices), FORM_ANY, REQUIRED, NULL, &three_points},
     VISIBLE,
     FALLOFF,
     COLOR,
@@ -197,10 +194,9 @@ static void light_read(YamlReader *reader, const YamlNode *item)
         .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area = light_types[row].area},
         .intensity = 1,
     };
-    Form form;
-    if (!fields_read(reader, mapping, names[row], light_types[row].fields, light_types[row].field_count,
-                     &fields, &form))
-        return;
+    const Form form = fields_read(reader, mapping, names[row], light_types[row].fields,
+                                  light_types[row].field_count, &fields);
+    if (!form) return;
     if (fields.light.type == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
     const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1]));
     if (fields.light.area == AREA_RECTANGLE && vector_length(across) < 1e-9) {

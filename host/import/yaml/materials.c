@@ -12,19 +12,15 @@ typedef struct {
     double size;
 } Checker;
 
-static bool read_two_colors(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 2, "two colors", read_color, sizeof(Color), target);
-}
-
 static bool read_checker(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
+    static const Items two_colors = {2, "two colors", read_color, sizeof(Color)};
     static const Field fields[] = {
-        {"colors", read_two_colors, offsetof(Checker, colors), FORM_ANY, REQUIRED, NULL},
+        {"colors", read_items, offsetof(Checker, colors), FORM_ANY, REQUIRED, NULL, &two_colors},
         {"size", read_number, offsetof(Checker, size), FORM_ANY, OPTIONAL, &range_positive},
     };
     Checker checker = {.size = 1};
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &checker, NULL)) return false;
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &checker)) return false;
     Material *material = target;
     material->checker = true;
     memcpy(material->checker_colors, checker.colors, sizeof checker.colors);
@@ -53,7 +49,7 @@ static bool read_absorption(YamlReader *reader, const Field *field, const YamlNo
         {"distance", read_number, offsetof(Absorption, distance), FORM_ANY, OPTIONAL, &range_positive},
     };
     Absorption absorption = {.distance = 1};
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &absorption, NULL)) return false;
+    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &absorption)) return false;
     *(Color *)target = color_absorption(absorption.color, absorption.distance);
     return true;
 }
@@ -107,7 +103,7 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
         }
     } else if (node->type == YAML_SEQUENCE) {
         return expected_report(reader, field->name, "the name of a metal or a mapping of n and k", node);
-    } else if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &index, NULL)) {
+    } else if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &index)) {
         return false;
     }
     material->conductor_n = index.n;
@@ -149,12 +145,12 @@ static bool content_read(YamlReader *reader, const Field *field, const YamlNode 
         const YamlNode *file, *layer;
     } Names;
     static const Field fields[] = {
-        {"file", read_node, offsetof(Names, file), FORM_ANY, REQUIRED, NULL},
-        {"layer", read_node, offsetof(Names, layer), FORM_ANY, OPTIONAL, NULL},
+        {"file", read_node, offsetof(Names, file), FORM_ANY, REQUIRED},
+        {"layer", read_node, offsetof(Names, layer), FORM_ANY, OPTIONAL},
     };
     Names names = {.file = node};
     if (node->type == YAML_MAPPING &&
-        !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &names, NULL))
+        !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &names))
         return false;
     if (names.layer && (names.layer->type != YAML_SCALAR || !yaml_text(&reader->tree, names.layer)[0]))
         return expected_report(reader, "layer", "the name of a layer", names.layer);
@@ -249,28 +245,28 @@ static void textures_check(YamlReader *reader, const Material *material, const Y
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
-        {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL, NULL},
-        {"checker", read_checker, 0, FORM_SECOND, OPTIONAL, NULL},
-        {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED, NULL},
+        {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL},
+        {"checker", read_checker, 0, FORM_SECOND, OPTIONAL},
+        {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED},
         {"size", read_number, offsetof(Material, texture_size), FORM_FIRST | FORM_THIRD, OPTIONAL,
          &range_positive},
         {"cutout", read_number, offsetof(Material, cutout), FORM_THIRD, OPTIONAL, &range_unit},
-        {"normal_map", read_normal_map, offsetof(Material, normal_texture), FORM_FIRST | FORM_THIRD, OPTIONAL,
-         NULL},
+        {"normal_map", read_normal_map, offsetof(Material, normal_texture), FORM_FIRST | FORM_THIRD,
+         OPTIONAL},
         {"normal_strength", read_number, offsetof(Material, normal_strength), FORM_FIRST | FORM_THIRD,
          OPTIONAL, &range_not_negative},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL, NULL},
+        {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL},
         {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
         {"shininess", read_number, offsetof(Material, shininess), FORM_ANY, OPTIONAL, &range_not_negative},
         {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},
         {"transmission", read_transmission, 0, FORM_ANY, OPTIONAL, &range_unit},
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
-        {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL, NULL},
-        {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL, NULL},
-        {"conductor", read_conductor, 0, FORM_ANY, OPTIONAL, NULL},
-        {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL, NULL},
-        {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL, NULL},
+        {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL},
+        {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL},
+        {"conductor", read_conductor, 0, FORM_ANY, OPTIONAL},
+        {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL},
+        {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL},
     };
     Material material = material_default();
     const YamlNode *conductor = node ? field_node(reader, node, "conductor") : NULL;
@@ -279,8 +275,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         material.ambient = 0;
         material.diffuse = vector_all(0);
     }
-    const bool is_read =
-        node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material, NULL);
+    const bool is_read = node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material);
     if (is_read) textures_check(reader, &material, node);
     if (material.cutout > 0) material.cutout_texture = material.texture;
     if (conductor != node && (material.fresnel || material.transmission > 0))

@@ -15,13 +15,13 @@ typedef struct {
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
 {
     static const Field fields[] = {
-        {"file", read_node, offsetof(MeshFields, file), FORM_ANY, REQUIRED, NULL},
-        {"transform", read_transform, offsetof(MeshFields, transform), FORM_ANY, OPTIONAL, NULL},
-        {"material", read_material, offsetof(MeshFields, material), FORM_ANY, OPTIONAL, NULL},
-        {"smooth", read_boolean, offsetof(MeshFields, smooth), FORM_ANY, OPTIONAL, NULL},
+        {"file", read_node, offsetof(MeshFields, file), FORM_ANY, REQUIRED},
+        {"transform", read_transform, offsetof(MeshFields, transform), FORM_ANY, OPTIONAL},
+        {"material", read_material, offsetof(MeshFields, material), FORM_ANY, OPTIONAL},
+        {"smooth", read_boolean, offsetof(MeshFields, smooth), FORM_ANY, OPTIONAL},
     };
     MeshFields read = {.transform = affine_identity, .material = UINT32_MAX};
-    if (!fields_read(reader, mapping, "mesh", fields, COUNT_OF(fields), &read, NULL)) return;
+    if (!fields_read(reader, mapping, "mesh", fields, COUNT_OF(fields), &read)) return;
     char *path = yaml_read_path(reader, "file", read.file);
     if (!path) return;
     MeshSmoothing smoothing = SMOOTH_AS_FILE;

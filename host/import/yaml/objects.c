@@ -19,33 +19,33 @@ typedef struct {
 
 // The fields of every shape.
 #define MATERIAL_AND_TRANSFORM                                                                               \
-    {"material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL, NULL},                       \
+    {"material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL},                             \
     {                                                                                                        \
-        "transform", read_transform, offsetof(PlacedObject, transform), FORM_ANY, OPTIONAL, NULL             \
+        "transform", read_transform, offsetof(PlacedObject, transform), FORM_ANY, OPTIONAL                   \
     }
 
 static const Field sphere_fields[] = {
-    {"center", read_vector, offsetof(Object, as.sphere.center), FORM_ANY, REQUIRED, NULL},
+    {"center", read_vector, offsetof(Object, as.sphere.center), FORM_ANY, REQUIRED},
     {"radius", read_number, offsetof(Object, as.sphere.radius), FORM_ANY, REQUIRED, &range_positive},
     MATERIAL_AND_TRANSFORM,
 };
 
 static const Field plane_fields[] = {
-    {"point", read_vector, offsetof(Object, as.plane.point), FORM_ANY, REQUIRED, NULL},
-    {"normal", read_direction, offsetof(Object, as.plane.normal), FORM_ANY, REQUIRED, NULL},
+    {"point", read_vector, offsetof(Object, as.plane.point), FORM_ANY, REQUIRED},
+    {"normal", read_direction, offsetof(Object, as.plane.normal), FORM_ANY, REQUIRED},
     MATERIAL_AND_TRANSFORM,
 };
 
 static const Field disc_fields[] = {
-    {"center", read_vector, offsetof(Object, as.disc.center), FORM_ANY, REQUIRED, NULL},
-    {"normal", read_direction, offsetof(Object, as.disc.normal), FORM_ANY, REQUIRED, NULL},
+    {"center", read_vector, offsetof(Object, as.disc.center), FORM_ANY, REQUIRED},
+    {"normal", read_direction, offsetof(Object, as.disc.normal), FORM_ANY, REQUIRED},
     {"radius", read_number, offsetof(Object, as.disc.radius), FORM_ANY, REQUIRED, &range_positive},
     MATERIAL_AND_TRANSFORM,
 };
 
 static const Field box_fields[] = {
-    {"min", read_vector, offsetof(Object, as.box.min), FORM_ANY, REQUIRED, NULL},
-    {"max", read_vector, offsetof(Object, as.box.max), FORM_ANY, REQUIRED, NULL},
+    {"min", read_vector, offsetof(Object, as.box.min), FORM_ANY, REQUIRED},
+    {"max", read_vector, offsetof(Object, as.box.max), FORM_ANY, REQUIRED},
     MATERIAL_AND_TRANSFORM,
 };
 
@@ -61,12 +61,12 @@ static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, O
 // `from` and `to` share members with `point` and `axis`. Until cylinder_finish the axis holds the finite
 // form's `to`.
 static const Field cylinder_fields[] = {
-    {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FINITE, REQUIRED, NULL},
-    {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FINITE, REQUIRED, NULL},
-    {"point", read_vector, offsetof(Object, as.cylinder.from), FORM_INFINITE, REQUIRED, NULL},
-    {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_INFINITE, REQUIRED, NULL},
+    {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FINITE, REQUIRED},
+    {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FINITE, REQUIRED},
+    {"point", read_vector, offsetof(Object, as.cylinder.from), FORM_INFINITE, REQUIRED},
+    {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_INFINITE, REQUIRED},
     {"radius", read_number, offsetof(Object, as.cylinder.radius), FORM_ANY, REQUIRED, &range_positive},
-    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FINITE, OPTIONAL, NULL},
+    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FINITE, OPTIONAL},
     MATERIAL_AND_TRANSFORM,
 };
 
@@ -86,20 +86,16 @@ static bool cylinder_finish(YamlReader *reader, const YamlNode *mapping, Form fo
            axis_finish(reader, mapping, object->as.cylinder.from, &object->as.cylinder.axis);
 }
 
-static bool read_two_radii(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
-}
-
 // `from` and `to` share members with `apex` and `axis`. Until cone_finish the axis holds the finite form's
 // `to`, and the slope the infinite form's angle in degrees.
 static const Field cone_fields[] = {
-    {"from", read_vector, offsetof(Object, as.cone.from), FORM_FINITE, REQUIRED, NULL},
-    {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FINITE, REQUIRED, NULL},
-    {"radius", read_two_radii, offsetof(Object, as.cone.radius), FORM_FINITE, REQUIRED, &range_not_negative},
-    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FINITE, OPTIONAL, NULL},
-    {"apex", read_vector, offsetof(Object, as.cone.from), FORM_INFINITE, REQUIRED, NULL},
-    {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_INFINITE, REQUIRED, NULL},
+    {"from", read_vector, offsetof(Object, as.cone.from), FORM_FINITE, REQUIRED},
+    {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FINITE, REQUIRED},
+    {"radius", read_items, offsetof(Object, as.cone.radius), FORM_FINITE, REQUIRED, &range_not_negative,
+     &two_numbers},
+    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FINITE, OPTIONAL},
+    {"apex", read_vector, offsetof(Object, as.cone.from), FORM_INFINITE, REQUIRED},
+    {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_INFINITE, REQUIRED},
     {"angle", read_number, offsetof(Object, as.cone.slope), FORM_INFINITE, REQUIRED, &range_quarter_turn},
     MATERIAL_AND_TRANSFORM,
 };
@@ -118,14 +114,12 @@ static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
     return axis_finish(reader, mapping, object->as.cone.from, &object->as.cone.axis);
 }
 
-static bool read_three_directions(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 3, "three directions", read_direction, sizeof(Vector3), target);
-}
+static const Items three_directions = {3, "three directions", read_direction, sizeof(Vector3)};
 
 static const Field triangle_fields[] = {
-    {"vertices", read_three_points, offsetof(Object, as.triangle.vertices), FORM_ANY, REQUIRED, NULL},
-    {"normals", read_three_directions, offsetof(Object, as.triangle.normals), FORM_ANY, OPTIONAL, NULL},
+    {"vertices", read_items, offsetof(Object, as.triangle.vertices), FORM_ANY, REQUIRED, NULL, &three_points},
+    {"normals", read_items, offsetof(Object, as.triangle.normals), FORM_ANY, OPTIONAL, NULL,
+     &three_directions},
     MATERIAL_AND_TRANSFORM,
 };
 
@@ -140,8 +134,8 @@ static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form fo
 }
 
 static const Field torus_fields[] = {
-    {"center", read_vector, offsetof(Object, as.torus.center), FORM_ANY, REQUIRED, NULL},
-    {"axis", read_direction, offsetof(Object, as.torus.axis), FORM_ANY, REQUIRED, NULL},
+    {"center", read_vector, offsetof(Object, as.torus.center), FORM_ANY, REQUIRED},
+    {"axis", read_direction, offsetof(Object, as.torus.axis), FORM_ANY, REQUIRED},
     {"major", read_number, offsetof(Object, as.torus.major), FORM_ANY, REQUIRED, &range_positive},
     {"minor", read_number, offsetof(Object, as.torus.minor), FORM_ANY, REQUIRED, &range_positive},
     MATERIAL_AND_TRANSFORM,
@@ -149,14 +143,14 @@ static const Field torus_fields[] = {
 
 // Until paraboloid_finish the focal length holds `radius`, the radius of the rim.
 static const Field paraboloid_fields[] = {
-    {"apex", read_vector, offsetof(Object, as.paraboloid.apex), FORM_ANY, REQUIRED, NULL},
-    {"axis", read_direction, offsetof(Object, as.paraboloid.axis), FORM_ANY, REQUIRED, NULL},
+    {"apex", read_vector, offsetof(Object, as.paraboloid.apex), FORM_ANY, REQUIRED},
+    {"axis", read_direction, offsetof(Object, as.paraboloid.axis), FORM_ANY, REQUIRED},
     {"height", read_number, offsetof(Object, as.paraboloid.height), FORM_ANY, OPTIONAL, &range_positive},
     {"focal_length", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_FOCAL_LENGTH, REQUIRED,
      &range_positive},
     {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_RADIUS, REQUIRED,
      &range_positive},
-    {"caps", read_boolean, offsetof(Object, as.paraboloid.caps), FORM_ANY, OPTIONAL, NULL},
+    {"caps", read_boolean, offsetof(Object, as.paraboloid.caps), FORM_ANY, OPTIONAL},
     MATERIAL_AND_TRANSFORM,
 };
 
@@ -219,9 +213,9 @@ static void shape_read(YamlReader *reader, ShapeType type, const YamlNode *mappi
     PlacedObject placed = {.object = shape->start, .transform = affine_identity};
     Object *object = &placed.object;
     object->material = UINT32_MAX;
-    Form form;
-    if (!fields_read(reader, mapping, shape_names[type], shape->fields, shape->field_count, &placed, &form))
-        return;
+    const Form form =
+        fields_read(reader, mapping, shape_names[type], shape->fields, shape->field_count, &placed);
+    if (!form) return;
     if (shape->finish && !shape->finish(reader, mapping, form, object)) return;
     if (object->material == UINT32_MAX) object->material = material_default_index(reader);
     if (!yaml_material_fits(reader, object, field_node(reader, mapping, "material"))) return;

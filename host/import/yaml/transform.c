@@ -39,37 +39,29 @@ static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *n
 static bool read_rotation(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
-        {"axis", read_direction, offsetof(Rotation, axis), FORM_ANY, REQUIRED, NULL},
-        {"angle", read_number, offsetof(Rotation, angle), FORM_ANY, REQUIRED, NULL},
+        {"axis", read_direction, offsetof(Rotation, axis), FORM_ANY, REQUIRED},
+        {"angle", read_number, offsetof(Rotation, angle), FORM_ANY, REQUIRED},
     };
     Rotation *rotation = target;
     return node->type == YAML_MAPPING
-               ? fields_read(reader, node, field->name, fields, COUNT_OF(fields), rotation, NULL)
+               ? fields_read(reader, node, field->name, fields, COUNT_OF(fields), rotation) != 0
                : read_vector(reader, field, node, &rotation->angles);
-}
-
-static bool read_row(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 4, "rows of four numbers", read_number, sizeof(double), target);
-}
-
-static bool read_matrix(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 3, "three rows of four numbers", read_row, 4 * sizeof(double),
-                      target);
 }
 
 static bool step_read(YamlReader *reader, const Field *field, const YamlNode *node, Affine *affine)
 {
+    static const Items row_numbers = {4, "rows of four numbers", read_number, sizeof(double)},
+                       matrix_rows = {3, "three rows of four numbers", read_items, 4 * sizeof(double),
+                                      &row_numbers};
     static const Field fields[] = {
-        {"translate", read_vector, offsetof(Steps, translate), FORM_STEPS, OPTIONAL, NULL},
-        {"rotate", read_rotation, offsetof(Steps, rotation), FORM_STEPS, OPTIONAL, NULL},
-        {"scale", read_scale, offsetof(Steps, scale), FORM_STEPS, OPTIONAL, NULL},
-        {"matrix", read_matrix, offsetof(Steps, matrix), FORM_MATRIX, REQUIRED, NULL},
+        {"translate", read_vector, offsetof(Steps, translate), FORM_STEPS, OPTIONAL},
+        {"rotate", read_rotation, offsetof(Steps, rotation), FORM_STEPS, OPTIONAL},
+        {"scale", read_scale, offsetof(Steps, scale), FORM_STEPS, OPTIONAL},
+        {"matrix", read_items, offsetof(Steps, matrix), FORM_MATRIX, REQUIRED, NULL, &matrix_rows},
     };
     Steps steps = {.scale = {1, 1, 1}};
-    Form form;
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &steps, &form)) return false;
+    const Form form = fields_read(reader, node, field->name, fields, COUNT_OF(fields), &steps);
+    if (!form) return false;
     *affine = steps.matrix;
     if (form == FORM_MATRIX) return true;
     const Rotation *rotation = &steps.rotation;

@@ -16,11 +16,6 @@ typedef struct {
     double fov_degrees, focal_length, frame[2], height, aperture, turn;
 } CameraFields;
 
-static bool read_pair(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    return items_read(reader, field, node, 2, "two numbers", read_number, sizeof(double), target);
-}
-
 static bool read_projection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     *(bool *)target = true;
@@ -43,24 +38,25 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 {
     enum { FORM_FLAT = FORM_FIRST | FORM_SECOND | FORM_THIRD }; // the image is part of a plane
     static const Field fields[] = {
-        {"position", read_vector, offsetof(CameraFields, camera.position), FORM_ANY, REQUIRED, NULL},
-        {"look_at", read_vector, offsetof(CameraFields, camera.look_at), FORM_ANY, REQUIRED, NULL},
-        {"up", read_direction, offsetof(CameraFields, camera.up), FORM_ANY, OPTIONAL, NULL},
+        {"position", read_vector, offsetof(CameraFields, camera.position), FORM_ANY, REQUIRED},
+        {"look_at", read_vector, offsetof(CameraFields, camera.look_at), FORM_ANY, REQUIRED},
+        {"up", read_direction, offsetof(CameraFields, camera.up), FORM_ANY, OPTIONAL},
         {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FIRST, OPTIONAL, &range_field_of_view},
         {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_SECOND, REQUIRED,
          &range_positive},
-        {"frame", read_pair, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive},
+        {"frame", read_items, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive,
+         &two_numbers},
         {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
-        {"projection", read_projection, offsetof(CameraFields, camera.equirectangular), FORM_FOURTH, REQUIRED,
-         NULL},
-        {"shift", read_pair, offsetof(CameraFields, camera.shift), FORM_FLAT, OPTIONAL, NULL},
-        {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL, NULL},
+        {"projection", read_projection, offsetof(CameraFields, camera.equirectangular), FORM_FOURTH,
+         REQUIRED},
+        {"shift", read_items, offsetof(CameraFields, camera.shift), FORM_FLAT, OPTIONAL, NULL, &two_numbers},
+        {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL},
         {"aperture", read_number, offsetof(CameraFields, aperture), FORM_FLAT, OPTIONAL, &range_not_negative},
-        {"focus", read_focus, 0, FORM_FLAT, OPTIONAL, NULL},
+        {"focus", read_focus, 0, FORM_FLAT, OPTIONAL},
     };
     CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
-    Form form;
-    if (!fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read, &form)) return;
+    const Form form = fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read);
+    if (!form) return;
     Camera *camera = &reader->scene->camera;
     *camera = read.camera;
     if (vector_is_zero(vector_subtract(camera->look_at, camera->position))) {
@@ -127,21 +123,21 @@ static void document_read(YamlReader *reader)
     static const Range range_frames = {1, FRAMES_MAX, false, "from 1 to 1000000"};
     static const Range range_frame_rate = {0, 1000, true, "above 0 and at most 1000"};
     static const Field fields[] = {
-        {"include", read_include, 0, FORM_ANY, OPTIONAL, NULL},
-        {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL, NULL},
+        {"include", read_include, 0, FORM_ANY, OPTIONAL},
+        {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL},
         {"frames", read_frames, offsetof(Document, frame_count), FORM_ANY, OPTIONAL, &range_frames},
         {"fps", read_number, offsetof(Document, frame_rate), FORM_ANY, OPTIONAL, &range_frame_rate},
         {"shutter", read_number, offsetof(Document, shutter), FORM_ANY, OPTIONAL, &range_shutter},
-        {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL, NULL},
-        {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL, NULL},
-        {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL, NULL},
-        {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL, NULL},
-        {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL, NULL},
-        {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL, NULL},
+        {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL},
+        {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL},
+        {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL},
+        {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL},
+        {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL},
+        {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL},
     };
     Document document = {.ambient = vector_all(NAN), .shutter = NAN};
     const YamlNode *root = reader->tree.nodes.items;
-    fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document, NULL);
+    fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document);
     reader->scene->frame_count = document.frame_count;
     reader->scene->frame_rate = document.frame_rate;
     reader->scene->has_shutter = !isnan(document.shutter);
