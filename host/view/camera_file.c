@@ -23,7 +23,7 @@ static void camera_file_free(CameraFile *file)
 static bool is_zero(const YamlReader *reader, const YamlNode *node)
 {
     double number = 1;
-    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = yaml_text(&reader->tree, node);
     return number_read(text, strlen(text), &number) == NUMBER_READ && number == 0;
 }
 

@@ -25,7 +25,6 @@ static const YamlNode *node_at(const YamlReader *reader, uint32_t index)
 
 static bool node_number(const YamlReader *reader, const YamlNode *node, double *value)
 {
-    if (node->type != YAML_SCALAR) return false;
     const char *text = yaml_text(&reader->tree, node);
     return number_read(text, strlen(text), value) == NUMBER_READ;
 }
@@ -36,7 +35,7 @@ bool yaml_has_keys(const YamlReader *reader, const YamlNode *node)
     const YamlTree *tree = &reader->tree;
     if (node->type != YAML_MAPPING) return false;
     for (const YamlNode *key = yaml_first(tree, node); key; key = yaml_next(tree, yaml_next(tree, key))) {
-        if (key->type != YAML_SCALAR || strcmp(yaml_text(tree, key), "keys") != 0) continue;
+        if (!yaml_is(tree, key, "keys")) continue;
         const YamlNode *frames = yaml_next(tree, key);
         const YamlNode *first = frames->type == YAML_MAPPING ? yaml_first(tree, frames) : NULL;
         double frame;
@@ -96,8 +95,7 @@ typedef struct {
 static bool read_ease(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     size_t i = 0;
-    while (i < EASE_COUNT &&
-           (node->type != YAML_SCALAR || strcmp(yaml_text(&reader->tree, node), ease_names[i]) != 0))
+    while (i < EASE_COUNT && !yaml_is(&reader->tree, node, ease_names[i]))
         i++;
     if (i == EASE_COUNT) return expected_report(reader, field->name, "linear, smooth or step", node);
     *(Ease *)target = (Ease)i;

@@ -18,7 +18,7 @@ static bool read_date(YamlReader *reader, const Field *field, const YamlNode *no
 {
     static const int lengths[] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
     static const char form[] = "0000-00-00";
-    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = yaml_text(&reader->tree, node);
     int parts[3] = {0}, *part = parts; // year, month and day
     bool fits = strlen(text) == strlen(form);
     for (size_t i = 0; fits && form[i]; i++) {

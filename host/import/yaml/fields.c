@@ -101,7 +101,7 @@ static size_t field_find(const YamlReader *reader, const YamlNode *key, const Fi
                          size_t field_count)
 {
     size_t index = 0;
-    while (index < field_count && strcmp(yaml_text(&reader->tree, key), fields[index].name) != 0)
+    while (index < field_count && !yaml_is(&reader->tree, key, fields[index].name))
         index++;
     return index;
 }
@@ -162,7 +162,7 @@ const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, co
     for (const YamlNode *key = yaml_first(&reader->tree, mapping); key;
          key = yaml_next(&reader->tree, value)) {
         value = yaml_next(&reader->tree, key);
-        if (key->type == YAML_SCALAR && !strcmp(yaml_text(&reader->tree, key), name)) return value;
+        if (yaml_is(&reader->tree, key, name)) return value;
     }
     return mapping;
 }
@@ -231,9 +231,8 @@ bool read_direction(YamlReader *reader, const Field *field, const YamlNode *node
 
 bool read_boolean(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
-    bool is_true = !strcmp(text, "true");
-    if (!is_true && strcmp(text, "false") != 0)
+    const bool is_true = yaml_is(&reader->tree, node, "true");
+    if (!is_true && !yaml_is(&reader->tree, node, "false"))
         return expected_report(reader, field->name, "true or false", node);
     *(bool *)target = is_true;
     return true;

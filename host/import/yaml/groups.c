@@ -36,9 +36,11 @@ static bool pattern_ignores_transform(const Scene *scene, const Object *object, 
     return object->type != SHAPE_SPHERE || turns;
 }
 
-void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine, const YamlNode *transform)
+void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine, const YamlNode *mapping)
 {
     Scene *scene = reader->scene;
+    const YamlNode *transform = field_node(reader, mapping, "transform");
+    if (transform == mapping) return;
     for (size_t i = first; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
         const ShapeType type = object_shape(object);
@@ -71,8 +73,7 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
         return;
     const size_t first = reader->scene->objects.count;
     yaml_read_object_list(reader, group.objects, false);
-    const YamlNode *transform = field_node(reader, mapping, "transform");
-    if (transform != mapping) yaml_transform_objects(reader, first, &group.transform, transform);
+    yaml_transform_objects(reader, first, &group.transform, mapping);
 }
 
 // Moves the scene's objects from `first_object` on to a definition of the key's name, except their meshes.
@@ -204,9 +205,8 @@ void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)
         Object object = definition->objects[i];
         if (own_material) object.material = instance.material;
         if (object.type == SHAPE_MESH) object.as.mesh.has_own_material |= own_material;
-        if (!yaml_material_fits(reader, &object, field_node(reader, mapping, "material"))) return;
+        if (!yaml_material_fits(reader, &object, mapping)) return;
         array_push(scene->objects, object);
     }
-    const YamlNode *transform = field_node(reader, mapping, "transform");
-    if (transform != mapping) yaml_transform_objects(reader, first, &instance.transform, transform);
+    yaml_transform_objects(reader, first, &instance.transform, mapping);
 }

@@ -59,9 +59,7 @@ static YamlNode *node_at(const Includes *includes, uint32_t index)
 static size_t section_of(const Includes *includes, uint32_t key)
 {
     size_t i = 0;
-    if (node_at(includes, key)->type != YAML_SCALAR) return SECTION_COUNT;
-    const char *name = yaml_text(&includes->reader->tree, node_at(includes, key));
-    while (i < SECTION_COUNT && strcmp(sections[i].name, name) != 0)
+    while (i < SECTION_COUNT && !yaml_is(&includes->reader->tree, node_at(includes, key), sections[i].name))
         i++;
     return i;
 }
@@ -212,8 +210,7 @@ static bool file_read(Includes *includes, Joined *joined, const char *path, cons
 static bool file_include(Includes *includes, Joined *joined, const YamlNode *node)
 {
     YamlReader *reader = includes->reader;
-    const char *name = "";
-    if (node->type == YAML_SCALAR) name = yaml_text(&reader->tree, node);
+    const char *name = yaml_text(&reader->tree, node);
     if (!scene_is_yaml(name) || strcmp(name, "-") == 0)
         return expected_report(reader, "include", "a YAML file (.yaml, .yml or .json)", node);
     char *path = yaml_read_path(reader, "include", node);
@@ -250,7 +247,7 @@ static uint32_t include_remove(const Includes *includes, uint32_t root)
     while (*link > 0) {
         const YamlNode *key = node_at(includes, *link);
         YamlNode *value = node_at(includes, key->next);
-        if (key->type != YAML_SCALAR || strcmp(yaml_text(&reader->tree, key), "include") != 0) {
+        if (!yaml_is(&reader->tree, key, "include")) {
             link = &value->next;
             continue;
         }

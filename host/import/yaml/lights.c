@@ -23,7 +23,7 @@ static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode 
         {"quadratic", read_number, 2 * sizeof(double), FORM_ANY, OPTIONAL, &range_not_negative},
     };
     double *fading = target;
-    if (node->type == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "inverse_square") == 0) {
+    if (yaml_is(&reader->tree, node, "inverse_square")) {
         fading[2] = 1;
         return true;
     }
@@ -184,7 +184,7 @@ static void light_read(YamlReader *reader, const YamlNode *item)
     size_t row = COUNT_OF(light_types);
     for (size_t i = 0; i < COUNT_OF(light_types); i++) {
         names[i] = light_types[i].name;
-        if (strcmp(yaml_text(&reader->tree, key), names[i]) == 0) row = i;
+        if (yaml_is(&reader->tree, key, names[i])) row = i;
     }
     if (row == COUNT_OF(light_types)) {
         unknown_report(reader, key, "light", names, COUNT_OF(light_types));

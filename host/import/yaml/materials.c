@@ -92,10 +92,10 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
     Material *material = target;
     Conductor index = {0};
     if (node->type == YAML_SCALAR) {
-        const char *names[COUNT_OF(conductors)], *text = yaml_text(&reader->tree, node);
+        const char *names[COUNT_OF(conductors)];
         for (size_t i = 0; i < COUNT_OF(conductors); i++) {
             names[i] = conductors[i].name;
-            if (!strcmp(text, names[i])) index = conductors[i].index;
+            if (yaml_is(&reader->tree, node, names[i])) index = conductors[i].index;
         }
         if (index.n.x == 0) {
             unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
@@ -124,7 +124,7 @@ static const char *node_file(const YamlReader *reader, const YamlNode *node)
 
 char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 {
-    if (node->type != YAML_SCALAR || !yaml_text(&reader->tree, node)[0]) {
+    if (!yaml_text(&reader->tree, node)[0]) {
         expected_report(reader, name, "the name of a file", node);
         return NULL;
     }
@@ -152,7 +152,7 @@ static bool content_read(YamlReader *reader, const Field *field, const YamlNode 
     if (node->type == YAML_MAPPING &&
         !fields_read(reader, node, field->name, fields, COUNT_OF(fields), &names))
         return false;
-    if (names.layer && (names.layer->type != YAML_SCALAR || !yaml_text(&reader->tree, names.layer)[0]))
+    if (names.layer && !yaml_text(&reader->tree, names.layer)[0])
         return expected_report(reader, "layer", "the name of a layer", names.layer);
     char *path = yaml_read_path(reader, field->name, names.file);
     if (!path) return false;
@@ -181,7 +181,7 @@ static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *
                         Color *tint)
 {
     Color channels = {0, 0, 0};
-    const char *text = node->type == YAML_SCALAR ? yaml_text(&reader->tree, node) : "";
+    const char *text = yaml_text(&reader->tree, node);
     *tint = vector_all(0);
     if (text[0] != '\0' && strchr("+-.0123456789", text[0])) return read_number(reader, field, node, largest);
     if (!read_strength(reader, field, node, &channels)) return false;
@@ -347,7 +347,7 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
         material_append(reader, node, "");
         return true;
     }
-    if (node->type == YAML_SEQUENCE || !yaml_text(&reader->tree, node)[0])
+    if (!yaml_text(&reader->tree, node)[0])
         return expected_report(reader, field->name, "the name of a material or a mapping", node);
     const MaterialName *name = reader->names.count
                                    ? bsearch(yaml_text(&reader->tree, node), reader->names.items,

@@ -41,8 +41,7 @@ void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
         reader->scene->meshes.items[object.as.mesh.index].path = path;
         path = NULL;
         if (object.material == UINT32_MAX) object.material = material_default_index(reader);
-        if (yaml_material_fits(reader, &object, field_node(reader, mapping, "material")))
-            array_push(reader->scene->objects, object);
+        if (yaml_material_fits(reader, &object, mapping)) array_push(reader->scene->objects, object);
     }
     free(path);
 }

@@ -195,9 +195,10 @@ static const Shape shapes[SHAPE_OVAL] = {
      false},
 };
 
-bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *node)
+bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *mapping)
 {
     if (material_any_texture(&reader->scene->materials.items[object->material]) == 0) return true;
+    const YamlNode *node = field_node(reader, mapping, "material");
     if (object->type == SHAPE_MESH)
         return reader->scene->meshes.items[object->as.mesh.index].uvs ||
                report_error(&reader->report, node->offset, "the mesh has no uv for the material's images");
@@ -218,11 +219,9 @@ static void shape_read(YamlReader *reader, ShapeType type, const YamlNode *mappi
     if (!form) return;
     if (shape->finish && !shape->finish(reader, mapping, form, object)) return;
     if (object->material == UINT32_MAX) object->material = material_default_index(reader);
-    if (!yaml_material_fits(reader, object, field_node(reader, mapping, "material"))) return;
+    if (!yaml_material_fits(reader, object, mapping)) return;
     array_push(reader->scene->objects, *object);
-    const YamlNode *transform = field_node(reader, mapping, "transform");
-    if (transform != mapping)
-        yaml_transform_objects(reader, reader->scene->objects.count - 1, &placed.transform, transform);
+    yaml_transform_objects(reader, reader->scene->objects.count - 1, &placed.transform, mapping);
 }
 
 #define SHAPE_WORD(NAME, name) name,
@@ -235,7 +234,7 @@ static void object_read(YamlReader *reader, const YamlNode *item)
     const YamlNode *key, *mapping;
     if (!single_pair(reader, item, "one shape, such as `sphere: {...}`", &key, &mapping)) return;
     size_t type = 0;
-    while (type < COUNT_OF(names) && strcmp(yaml_text(&reader->tree, key), names[type]) != 0)
+    while (type < COUNT_OF(names) && !yaml_is(&reader->tree, key, names[type]))
         type++;
     if (type == COUNT_OF(names))
         unknown_report(reader, key, "shape", names, COUNT_OF(names));

@@ -115,9 +115,8 @@ static bool key_follow(Path *path, const char *name, size_t start)
     yaml_children_unshare(path->tree, path->node);
     uint32_t last = 0, key = node_at(path, path->node)->first;
     for (; key; key = node_at(path, last)->next) {
-        const YamlNode *node = node_at(path, key);
-        if (node->type == YAML_SCALAR && strcmp(yaml_text(path->tree, node), name) == 0) break;
-        last = node->next;
+        if (yaml_is(path->tree, node_at(path, key), name)) break;
+        last = node_at(path, key)->next;
     }
     if (!key) {
         if (!can_add(path)) return missing_report(path, name, start);

@@ -318,7 +318,12 @@ const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node)
     return node->next ? &tree->nodes.items[node->next] : NULL;
 }
 
-const char *yaml_text(const YamlTree *tree, const YamlNode *scalar)
+const char *yaml_text(const YamlTree *tree, const YamlNode *node)
 {
-    return tree->texts.items + scalar->text;
+    return node->type == YAML_SCALAR ? tree->texts.items + node->text : "";
+}
+
+bool yaml_is(const YamlTree *tree, const YamlNode *node, const char *text)
+{
+    return strcmp(yaml_text(tree, node), text) == 0;
 }

@@ -43,4 +43,7 @@ void yaml_children_unshare(YamlTree *tree, uint32_t node);
 const YamlNode *yaml_first(const YamlTree *tree, const YamlNode *node);
 const YamlNode *yaml_next(const YamlTree *tree, const YamlNode *node);
 
-const char *yaml_text(const YamlTree *tree, const YamlNode *scalar);
+// Returns the text of a scalar, or "" for a list or a mapping.
+const char *yaml_text(const YamlTree *tree, const YamlNode *node);
+// Returns whether the node is a scalar with the text, which is not empty.
+bool yaml_is(const YamlTree *tree, const YamlNode *node, const char *text);

@@ -19,7 +19,7 @@ typedef struct {
 static bool read_projection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     *(bool *)target = true;
-    return (node->type == YAML_SCALAR && strcmp(yaml_text(&reader->tree, node), "equirectangular") == 0) ||
+    return yaml_is(&reader->tree, node, "equirectangular") ||
            expected_report(reader, field->name, "equirectangular", node);
 }
 

@@ -68,10 +68,9 @@ void yaml_definitions_free(YamlReader *reader);
 void yaml_read_group(YamlReader *reader, const YamlNode *mapping);    // the value of `group:`
 void yaml_read_instance(YamlReader *reader, const YamlNode *mapping); // the value of `instance:`
 
-// Transforms the scene's objects from the index `first` on. Reports an error at the node `transform` if an
-// object does not support it.
-void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine,
-                            const YamlNode *transform);
+// Transforms the scene's objects from the index `first` on if the mapping has a `transform`, which is
+// `affine`. Reports an error there if an object does not support it.
+void yaml_transform_objects(YamlReader *reader, size_t first, const Affine *affine, const YamlNode *mapping);
 
-// Reports an error at the node and returns false if the object cannot have the image of its material.
-bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *node);
+// Reports an error at the mapping's `material` and returns false if the object cannot have its image.
+bool yaml_material_fits(YamlReader *reader, const Object *object, const YamlNode *mapping);
