@@ -5,7 +5,6 @@
 #include "host/base/array.h"
 #include "host/import/place.h"
 
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -37,10 +36,7 @@ bool dat_skip(DatReader *reader, const char *keyword)
 void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 {
     char text[256];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
+    FORMAT_TEXT(text, format);
     if (!report_repeats(&reader->report, NULL, 0, 0, text))
         report_warning(&reader->report, offset, "%s", text);
 }

@@ -3,17 +3,16 @@
 #include "host/image/image.h"
 
 #include <ctype.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
 const char *const draft_part_names[DRAFT_PART_COUNT] = {
     [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
 
-static void draft_report(const MeshDraft *draft, bool is_error, const char *format, va_list arguments)
+enum { TEXT_BYTES = 512 };
+
+static void draft_report(const MeshDraft *draft, bool is_error, const char *text)
 {
-    char text[512];
-    vsnprintf(text, sizeof text, format, arguments);
     const MeshImport *import = draft->import;
     if (report_repeats(import->report, import->path, is_error, 0, text)) return;
     if (import->offset == MESSAGE_WHOLE_FILE) // of a file that is the scene, which the message names
@@ -27,28 +26,23 @@ static void draft_report(const MeshDraft *draft, bool is_error, const char *form
 
 bool draft_refuse(MeshDraft *draft, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    draft_report(draft, true, format, arguments);
-    va_end(arguments);
+    char text[TEXT_BYTES];
+    FORMAT_TEXT(text, format);
+    draft_report(draft, true, text);
     return false;
 }
 
 void draft_warn(MeshDraft *draft, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    draft_report(draft, false, format, arguments);
-    va_end(arguments);
+    char text[TEXT_BYTES];
+    FORMAT_TEXT(text, format);
+    draft_report(draft, false, text);
 }
 
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
 {
-    char text[512];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
+    char text[TEXT_BYTES];
+    FORMAT_TEXT(text, format);
     if (draft->places == DRAFT_NO_PLACES) return draft_refuse(draft, "%s", text);
     if (draft->places == DRAFT_BYTES) return draft_refuse(draft, "byte %zu: %s", offset, text);
     return report_error(&draft->report, offset, "%s", text);

@@ -4,7 +4,6 @@
 #include "host/base/memory.h"
 #include "host/import/number.h"
 
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -43,10 +42,7 @@ static const char *const extensions_read[] = {
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
     char text[256];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
+    FORMAT_TEXT(text, format);
     if (!gltf->is_optional) return draft_refuse(gltf->draft, "%s: %s", item->path, text);
     draft_warn(gltf->draft, "%s: %s: not used", item->path, text);
     return false;
@@ -55,10 +51,7 @@ bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
     char text[256];
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(text, sizeof text, format, arguments);
-    va_end(arguments);
+    FORMAT_TEXT(text, format);
     draft_warn(gltf->draft, "%s: %s", item->path, text);
 }
 
