@@ -36,8 +36,9 @@ enum {
 typedef struct {
     MeshDraft *draft;
     const struct aiScene *file;
-    ImportedMaterial *materials; // one for each of the file's; NULL: not used
-    unsigned losses;             // bits
+    ImportedMaterial *materials;       // one for each of the file's; NULL: not used
+    const struct aiMaterial *material; // of the file, which is being converted
+    unsigned losses;                   // bits
 } Importer;
 
 static void lose(Importer *importer, unsigned loss, const char *text)
@@ -69,33 +70,34 @@ static bool color_is_sound(const struct aiColor4D *color)
            color->b >= 0 && color->b <= NUMBER_MAX;
 }
 
-static void warn_default(const Importer *importer, const struct aiMaterial *material, const char *what)
+static void warn_default(const Importer *importer, const char *what)
 {
     struct aiString name = {0};
-    aiGetMaterialString(material, AI_MATKEY_NAME, &name);
+    aiGetMaterialString(importer->material, AI_MATKEY_NAME, &name);
     draft_warn(importer->draft, "a %s of material '%.40s' is out of range: the default is used", what,
                name.data);
 }
 
-// Returns a material's color, or `otherwise`. assimp's AI_MATKEY_… macros expand to key, type and index.
-static Color color_of(const Importer *importer, const struct aiMaterial *material, const char *key,
-                      unsigned type, unsigned index, Color otherwise)
+// Returns the material's color, or `otherwise`. assimp's AI_MATKEY_… macros expand to key, type and index.
+static Color color_of(const Importer *importer, const char *key, unsigned type, unsigned index,
+                      Color otherwise)
 {
     struct aiColor4D color;
-    if (aiGetMaterialColor(material, key, type, index, &color) != aiReturn_SUCCESS) return otherwise;
+    if (aiGetMaterialColor(importer->material, key, type, index, &color) != aiReturn_SUCCESS)
+        return otherwise;
     if (color_is_sound(&color)) return (Color){color.r, color.g, color.b};
-    warn_default(importer, material, "color");
+    warn_default(importer, "color");
     return otherwise;
 }
 
-static double number_of(const Importer *importer, const struct aiMaterial *material, const char *key,
-                        unsigned type, unsigned index, double largest, double otherwise)
+static double number_of(const Importer *importer, const char *key, unsigned type, unsigned index,
+                        double largest, double otherwise)
 {
     ai_real number;
-    if (aiGetMaterialFloatArray(material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
+    if (aiGetMaterialFloatArray(importer->material, key, type, index, &number, NULL) != aiReturn_SUCCESS)
         return otherwise;
     if (number >= 0 && number <= largest) return number;
-    warn_default(importer, material, "number");
+    warn_default(importer, "number");
     return otherwise;
 }
 
@@ -164,20 +166,20 @@ static void textures_read(Importer *importer, const struct aiMaterial *from, con
 }
 
 // Converts a material. Keeps only its specular strength, because glint's highlights have the light's color.
-static Material material_of(Importer *importer, const struct aiMaterial *from)
+static Material material_of(const Importer *importer)
 {
     Material material = material_default();
-    const Color specular = color_of(importer, from, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
-    material.emission = color_of(importer, from, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
-    material.color = color_of(importer, from, AI_MATKEY_COLOR_DIFFUSE, material.color);
+    const Color specular = color_of(importer, AI_MATKEY_COLOR_SPECULAR, (Color){0, 0, 0});
+    material.emission = color_of(importer, AI_MATKEY_COLOR_EMISSIVE, (Color){0, 0, 0});
+    material.color = color_of(importer, AI_MATKEY_COLOR_DIFFUSE, material.color);
     // assimp sets a specular color even for Lambertian materials, which have none
     int shading = aiShadingMode_Phong;
-    aiGetMaterialIntegerArray(from, AI_MATKEY_SHADING_MODEL, &shading, NULL);
+    aiGetMaterialIntegerArray(importer->material, AI_MATKEY_SHADING_MODEL, &shading, NULL);
     if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
-    material.shininess = number_of(importer, from, AI_MATKEY_SHININESS, NUMBER_MAX, material.shininess);
+    material.shininess = number_of(importer, AI_MATKEY_SHININESS, NUMBER_MAX, material.shininess);
     if (importer->draft->import->view) material.ambient = 0;
-    const double opacity = number_of(importer, from, AI_MATKEY_OPACITY, 1, 1),
-                 ior = number_of(importer, from, AI_MATKEY_REFRACTI, NUMBER_MAX, 0);
+    const double opacity = number_of(importer, AI_MATKEY_OPACITY, 1, 1),
+                 ior = number_of(importer, AI_MATKEY_REFRACTI, NUMBER_MAX, 0);
     if (opacity < 1) material_set_opacity(&material, opacity);
     if (opacity < 1 && ior > 0) material.ior = ior;
     return material;
@@ -188,11 +190,12 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
 {
     struct aiString name = {0};
     aiGetMaterialString(from, AI_MATKEY_NAME, &name);
+    importer->material = from;
     Material material = material_default();
     TextureWrap wraps[2] = {TEXTURE_REPEATED, TEXTURE_REPEATED};
     // assimp's default where the file has none
     if (strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) != 0) {
-        material = material_of(importer, from);
+        material = material_of(importer);
         textures_read(importer, from, name.data, to, wraps);
     } else if (importer->draft->import->view) {
         material.ambient = 0;
@@ -200,10 +203,10 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
     Scene *scene = importer->draft->scene;
     to->scene_index[0] = to->scene_index[1] = scene_add_material(scene, &material, name.data);
     if (to->texture == 0) return;
-    const Color color = material.color, diffuse = material.diffuse;
+    const Color color = material.color;
     material.texture = to->texture;
     memcpy(material.texture_wrap, wraps, sizeof wraps);
-    material.diffuse = (Color){diffuse.x * color.x, diffuse.y * color.y, diffuse.z * color.z};
+    material.diffuse = vector_multiply(material.diffuse, color);
     material.ambient *= importer->draft->import->view ? 0 : (color.x + color.y + color.z) / 3;
     to->scene_index[1] = scene_add_material(scene, &material, name.data);
 }

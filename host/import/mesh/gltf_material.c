@@ -377,8 +377,7 @@ uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_texture
         look.ambient = material->textured_ambient;
         if (material->texture_emits) look.emission = vector_all(0);
         memcpy(look.texture_wrap, material->texture.wraps, sizeof look.texture_wrap);
-        look.diffuse = (Color){look.diffuse.x * look.color.x, look.diffuse.y * look.color.y,
-                               look.diffuse.z * look.color.z};
+        look.diffuse = vector_multiply(look.diffuse, look.color);
     }
     const GltfItem item = gltf_entry(gltf, "materials", (size_t)(material - gltf->materials));
     const char *name = json_string_value(json_object_get(item.json, "name"));
