@@ -7,7 +7,6 @@
 
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
 Word dat_peek(DatReader *reader)
 {
@@ -21,14 +20,9 @@ Word dat_word(DatReader *reader)
     return line_word(&reader->line);
 }
 
-bool dat_is(Word word, const char *keyword)
-{
-    return word.length == strlen(keyword) && strncasecmp(word.text, keyword, word.length) == 0;
-}
-
 bool dat_skip(DatReader *reader, const char *keyword)
 {
-    const bool is_next = dat_is(dat_peek(reader), keyword);
+    const bool is_next = word_is_in_any_case(dat_peek(reader), keyword);
     if (is_next) dat_word(reader);
     return is_next;
 }
@@ -109,7 +103,7 @@ static bool shader_mode_read(DatReader *reader)
 {
     double unused;
     const Word quality = dat_word(reader);
-    if (!dat_is(quality, "full"))
+    if (!word_is_in_any_case(quality, "full"))
         dat_warn(reader, quality.offset,
                  "shader mode '%.*s' leaves something out, such as shadows: shown in full",
                  WORD_TEXT(quality));
@@ -117,21 +111,21 @@ static bool shader_mode_read(DatReader *reader)
         const Line before = reader->line;
         const Word word = dat_word(reader);
         bool read = true;
-        if (dat_is(word, "trans_vmd"))
+        if (word_is_in_any_case(word, "trans_vmd"))
             reader->dims_clear = true;
-        else if (dat_is(word, "trans_orig"))
+        else if (word_is_in_any_case(word, "trans_orig"))
             reader->dims_clear = false;
-        else if (dat_is(word, "trans_raster3d"))
+        else if (word_is_in_any_case(word, "trans_raster3d"))
             dat_warn(reader, word.offset,
                      "'trans_raster3d' is not used: opacity does not depend on the angle");
-        else if (dat_is(word, "shadow_filter_off"))
+        else if (word_is_in_any_case(word, "shadow_filter_off"))
             dat_warn(reader, word.offset,
                      "'shadow_filter_off' is not used: transparent objects cast shadows");
-        else if (dat_is(word, "trans_max_surfaces"))
+        else if (word_is_in_any_case(word, "trans_max_surfaces"))
             read = dat_value(reader, "trans_max_surfaces", &unused);
-        else if (dat_is(word, "ambient_occlusion"))
+        else if (word_is_in_any_case(word, "ambient_occlusion"))
             read = occlusion_read(reader);
-        else if (!dat_is(word, "fog_vmd") && !dat_is(word, "shadow_filter_on")) {
+        else if (!word_is_in_any_case(word, "fog_vmd") && !word_is_in_any_case(word, "shadow_filter_on")) {
             reader->line = before;
             read = dat_expect(reader, "end_shader_mode");
         }
@@ -199,7 +193,7 @@ enum { STATEMENT_COUNT = COUNT_OF(statements) };
 static size_t statement_find(Word word)
 {
     size_t index = 0;
-    while (index < STATEMENT_COUNT && !dat_is(word, statements[index].keyword))
+    while (index < STATEMENT_COUNT && !word_is_in_any_case(word, statements[index].keyword))
         index++;
     return index;
 }
@@ -235,7 +229,7 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report, '#')) {
         Places places = places_open(source, NULL);
-        if (!dat_is(dat_peek(&reader), "begin_scene"))
+        if (!word_is_in_any_case(dat_peek(&reader), "begin_scene"))
             report_error(&reader.report, dat_peek(&reader).offset, "a scene starts with 'begin_scene'");
         while (!report_is_full(&reader.report) && !reader.is_at_end && dat_peek(&reader).length) {
             const size_t offset = dat_peek(&reader).offset;

@@ -26,8 +26,6 @@ typedef struct {
 // word is empty at the end of the source.
 Word dat_peek(DatReader *reader);
 Word dat_word(DatReader *reader);
-// Returns whether the word is the keyword, ignoring case.
-bool dat_is(Word word, const char *keyword);
 // Skips the next word if it is the keyword, and returns whether it is.
 bool dat_skip(DatReader *reader, const char *keyword);
 // Adds a warning once, however often the source repeats its cause.

@@ -64,7 +64,7 @@ static bool phong_read(DatReader *reader, Texture *texture)
 static bool transmode_read(DatReader *reader)
 {
     const Word mode = dat_word(reader);
-    if (dat_is(mode, "r3d"))
+    if (word_is_in_any_case(mode, "r3d"))
         dat_warn(reader, mode.offset, "'transmode r3d' is not used: opacity does not depend on the angle");
     return true;
 }
@@ -126,13 +126,13 @@ static bool key_read(DatReader *reader, Word word, Texture *texture)
                    {"opacity", &range_unit, &texture->opacity},
                    {"phong_size", &range_not_negative, &texture->phong_size}};
     for (size_t i = 0; i < COUNT_OF(factors); i++)
-        if (dat_is(word, factors[i].name))
+        if (word_is_in_any_case(word, factors[i].name))
             return factor_read(reader, factors[i].name, factors[i].range, factors[i].value);
-    if (dat_is(word, "phong")) return phong_read(reader, texture);
-    if (dat_is(word, "color")) return color_read(reader, &texture->color);
-    if (dat_is(word, "transmode")) return transmode_read(reader);
-    if (dat_is(word, "outline")) return outline_read(reader, "outline");
-    if (dat_is(word, "outline_width")) return outline_read(reader, "outline_width");
+    if (word_is_in_any_case(word, "phong")) return phong_read(reader, texture);
+    if (word_is_in_any_case(word, "color")) return color_read(reader, &texture->color);
+    if (word_is_in_any_case(word, "transmode")) return transmode_read(reader);
+    if (word_is_in_any_case(word, "outline")) return outline_read(reader, "outline");
+    if (word_is_in_any_case(word, "outline_width")) return outline_read(reader, "outline_width");
     if (!word.length) return report_error(&reader->report, word.offset, "the texture lacks its 'texfunc'");
     return report_error(&reader->report, word.offset, "unknown key '%.*s' of a texture", WORD_TEXT(word));
 }
@@ -141,12 +141,12 @@ bool dat_texture_body(DatReader *reader, Material *material)
 {
     Texture texture = {.ambient = 0.1, .diffuse = 0.9, .opacity = 1, .phong_size = 100, .color = {1, 1, 1}};
     Word word = dat_word(reader);
-    while (!dat_is(word, "texfunc") && !dat_is(word, "vcst")) {
+    while (!word_is_in_any_case(word, "texfunc") && !word_is_in_any_case(word, "vcst")) {
         if (!key_read(reader, word, &texture)) return false;
         word = dat_word(reader);
     }
     *material = material_of(reader, &texture);
-    return dat_is(word, "vcst") || function_read(reader);
+    return word_is_in_any_case(word, "vcst") || function_read(reader);
 }
 
 static size_t slot_of(const DatReader *reader, Word name, uint64_t hash)
@@ -196,7 +196,7 @@ bool dat_texture(DatReader *reader, uint32_t *material)
 {
     const Word word = dat_word(reader);
     if (!word.length) return report_error(&reader->report, word.offset, "the object's texture is missing");
-    if (!dat_is(word, "texture")) {
+    if (!word_is_in_any_case(word, "texture")) {
         *material = texture_find(reader, word);
         return true;
     }

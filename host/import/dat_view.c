@@ -21,14 +21,14 @@ static bool projection_read(DatReader *reader)
     double unused;
     if (!dat_skip(reader, "projection")) return true;
     const Word name = dat_word(reader);
-    if (dat_is(name, "orthographic")) {
+    if (word_is_in_any_case(name, "orthographic")) {
         reader->scene->camera.orthographic = true;
-    } else if (dat_is(name, "perspective_dof")) {
+    } else if (word_is_in_any_case(name, "perspective_dof")) {
         report_warning(&reader->report, name.offset, "depth of field is not shown: all is in focus");
         return dat_number(reader, "focallength", &unused) && dat_number(reader, "aperture", &unused);
-    } else if (dat_is(name, "fisheye")) {
+    } else if (word_is_in_any_case(name, "fisheye")) {
         report_warning(&reader->report, name.offset, "the fisheye projection becomes one in perspective");
-    } else if (!dat_is(name, "perspective")) {
+    } else if (!word_is_in_any_case(name, "perspective")) {
         return report_error(&reader->report, name.offset, "unknown projection '%.*s'", WORD_TEXT(name));
     }
     return true;

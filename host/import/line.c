@@ -2,6 +2,7 @@
 #include "host/base/text.h"
 
 #include <string.h>
+#include <strings.h>
 
 bool line_open(Line *line, Report *report, char comment)
 {
@@ -71,6 +72,11 @@ bool words_equal(Word a, Word b)
 bool word_is(Word word, const char *text)
 {
     return words_equal(word, (Word){.text = text, .length = strlen(text)});
+}
+
+bool word_is_in_any_case(Word word, const char *text)
+{
+    return word.length == strlen(text) && strncasecmp(word.text, text, word.length) == 0;
 }
 
 bool word_is_number(Word word)

@@ -28,6 +28,7 @@ Word line_peek(const Line *line);
 Word line_peek_vector(const Line *line); // as line_comma_vector reads it
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
+bool word_is_in_any_case(Word word, const char *text);
 bool words_equal(Word a, Word b);
 bool word_is_number(Word word); // accepts numbers that are out of range
 

@@ -161,21 +161,22 @@ static bool library_read(ObjReader *reader)
     return true;
 }
 
-static bool nothing_read(ObjReader *reader)
-{
-    (void)reader;
-    return true;
-}
-
-// Each `read` reads the words after its keyword. glint ignores the names of groups and objects, and the
-// scene controls smoothing.
+// Each `read` reads the words after its keyword. NULL ignores them: the names of groups and objects, and
+// smoothing, which the scene controls.
 static const struct {
     const char *word;
     bool (*read)(ObjReader *reader);
 } statements[] = {
-    {"v", position_read}, {"vt", uv_read},           {"vn", normal_read},      {"f", face_read},
-    {"fo", face_read},    {"usemtl", material_read}, {"mtllib", library_read}, {"g", nothing_read},
-    {"o", nothing_read},  {"s", nothing_read},
+    {"v", position_read},
+    {"vt", uv_read},
+    {"vn", normal_read},
+    {"f", face_read},
+    {"fo", face_read},
+    {"usemtl", material_read},
+    {"mtllib", library_read},
+    {"g", NULL},
+    {"o", NULL},
+    {"s", NULL},
 };
 
 static bool line_read(ObjReader *reader)
@@ -183,7 +184,7 @@ static bool line_read(ObjReader *reader)
     const Word word = scan_word(&reader->scan);
     if (word.length == 0) return true;
     for (size_t i = 0; i < COUNT_OF(statements); i++)
-        if (word_is(word, statements[i].word)) return statements[i].read(reader);
+        if (word_is(word, statements[i].word)) return !statements[i].read || statements[i].read(reader);
     unused_record(&reader->unused, &reader->draft->report, word, "is not used");
     return true;
 }

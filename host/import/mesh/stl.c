@@ -8,11 +8,6 @@
 
 enum { HEADER_SIZE = 84, FACET_SIZE = 50, FACET_VERTICES = 12, FACET_ATTRIBUTE = 48 };
 
-static bool word_is_in_any_case(Word word, const char *text)
-{
-    return word.length == strlen(text) && strncasecmp(word.text, text, word.length) == 0;
-}
-
 typedef struct {
     MeshDraft *draft;
     Scan scan;
