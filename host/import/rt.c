@@ -6,6 +6,8 @@
 #include "host/import/place.h"
 #include "host/scene/portable.h"
 
+#include <string.h>
+
 typedef struct {
     Report report;
     Line line;
@@ -184,14 +186,6 @@ static bool read_plane(RtReader *reader)
     return true;
 }
 
-static bool word_has_comma(Word word)
-{
-    for (size_t i = 0; i < word.length; i++) {
-        if (word.text[i] == ',') return true;
-    }
-    return false;
-}
-
 static bool read_cylinder(RtReader *reader)
 {
     Line *line = &reader->line;
@@ -201,7 +195,7 @@ static bool read_cylinder(RtReader *reader)
     double diameter, height;
     if (!line_comma_vector(line, "center", NULL, &center) || !read_axis(line, "axis", &axis)) return false;
     const Word third = line_peek_vector(line);
-    bool color_first = word_has_comma(third);
+    const bool color_first = memchr(third.text, ',', third.length) != NULL;
     if (color_first) {
         report_warning(&reader->report, third.offset, "the color stands before the sizes");
         if (!read_color(line, &material.color)) return false;

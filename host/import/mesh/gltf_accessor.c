@@ -172,31 +172,28 @@ static size_t component_size(size_t type)
 // Reads a component. A normalized integer becomes a value from -1 or 0 to 1.
 static double component_read(const char *bytes, size_t type, bool is_normalized)
 {
-    int8_t int8;
-    uint8_t uint8;
-    int16_t int16;
-    uint16_t uint16;
-    uint32_t uint32;
-    float real;
+    union {
+        int8_t int8;
+        uint8_t uint8;
+        int16_t int16;
+        uint16_t uint16;
+        uint32_t uint32;
+        float real;
+    } value;
+    memcpy(&value, bytes, component_size(type));
     switch (type) {
     case GLTF_INT8:
-        memcpy(&int8, bytes, sizeof int8);
-        return is_normalized ? fmax(int8 / 127.0, -1) : int8;
+        return is_normalized ? fmax(value.int8 / 127.0, -1) : value.int8;
     case GLTF_UINT8:
-        memcpy(&uint8, bytes, sizeof uint8);
-        return is_normalized ? uint8 / 255.0 : uint8;
+        return is_normalized ? value.uint8 / 255.0 : value.uint8;
     case GLTF_INT16:
-        memcpy(&int16, bytes, sizeof int16);
-        return is_normalized ? fmax(int16 / 32767.0, -1) : int16;
+        return is_normalized ? fmax(value.int16 / 32767.0, -1) : value.int16;
     case GLTF_UINT16:
-        memcpy(&uint16, bytes, sizeof uint16);
-        return is_normalized ? uint16 / 65535.0 : uint16;
+        return is_normalized ? value.uint16 / 65535.0 : value.uint16;
     case GLTF_UINT32:
-        memcpy(&uint32, bytes, sizeof uint32);
-        return uint32;
+        return value.uint32;
     default:
-        memcpy(&real, bytes, sizeof real);
-        return (double)real;
+        return (double)value.real;
     }
 }
 
