@@ -27,25 +27,24 @@ ROOT = Path(__file__).resolve().parent.parent
 PROGRAM = Path(os.environ.get("GLINT", ROOT / "build/glint")).resolve()
 IS_SANITIZED = Path(os.environ.get("BUILD", PROGRAM.parent)).name.endswith("-sanitize")
 IS_LONG = os.environ.get("GLINT_LONG_TESTS") == "1"
+# SPHERE, PLANET and BALLS have the same features, so that the same kernels serve the tests of each.
 SPHERE = """\
 camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 60}
 background: [0.1, 0.2, 0.4]
 lights:
   - point: {position: [3, 4, -5]}
-  - directional: {direction: [0, -1, 0.3], color: [0.2, 0.2, 0.2]}
+  - point: {position: [0, 9, -3], color: [0.2, 0.2, 0.2]}
 objects:
-  - sphere: {center: [0, 0, 0], radius: 1}
+  - sphere: {material: {reflection: 0.1}, center: [0, 0, 0], radius: 1}
 """
-# With errors a thousand times a device's, shadow rays start meters off the ground, so that a small sphere has no shadow.
+# With errors a thousand times a device's, shadow rays start above the small sphere on the large one, so that it has no shadow.
 PLANET = """\
-camera: {position: [0, 6371001.7, 0], look_at: [0, 6371000, 1], fov: 60}
-lights: [{point: {position: [2, 6371001, -1]}}]
+camera: {position: [0, 150, 0], look_at: [0, 100, 0], up: [0, 0, 1], fov: 0.02}
+lights: [{point: {position: [2, 101, -1]}}]
 objects:
-  - sphere: {center: [0, 0, 0], radius: 6371000, material: {reflection: 0.1}}
-  - sphere: {center: [0, 6371000.1, 0.8], radius: 0.1}
+  - sphere: {center: [0, 0, 0], radius: 100, material: {reflection: 0.1}}
+  - sphere: {center: [0, 100.001, 0], radius: 0.001}
 """
-
-
 BALLS = f"{ROOT}/tests/scenes/mirror-balls.yaml"
 
 

@@ -10,12 +10,10 @@ import re
 import statistics
 import unittest
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, main, need_device, read, run, shim_build, write
+from glint import IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, find_icd, main, need_device, read, run, shim_build, write
 
-LANES = "" if IS_LONG else "--lanes 1"  # kernels of few lanes build faster, and each process builds some without a cache
-QUICK = f"--size 32x24 --seconds 0.1 {LANES}"
-TINY = "--size 32x24 --lanes 1 --no-build-times"
-TRIANGLES = f"{ROOT}/scenes/triangles.yaml"
+QUICK = "--size 32x24 --seconds 0.1"
+TINY = "--size 32x24 --no-build-times"
 # Launches fail from the one of number FAILING on.
 FAILING = """
 #define _GNU_SOURCE
@@ -86,7 +84,8 @@ class Bench(TestCase):
             self.assertGreater(launch["host_ms"], 0)
 
     def test_report(self):
-        process = self.glint(f"bench sphere.yaml {TRIANGLES} {QUICK} --precision single,double --launches --json")
+        write("two.yaml", SPHERE + SPHERE.splitlines()[-1].replace("[0, 0, 0]", "[1, 0.5, -1]"))
+        process = self.glint(f"bench sphere.yaml two.yaml {QUICK} --precision single,double --launches --json")
         self.assertEqual(process.stderr, "")
         report = json.loads(process.stdout)
         self.assertEqual(report["schema"], 6)
@@ -96,26 +95,26 @@ class Bench(TestCase):
         device = report["device"]
         self.assertTrue(device["name"] and device["driver"] and device["type"] and device["units"] > 0, device)
         self.assertEqual([(run["scene"], run["precision"]) for run in report["runs"]], [
-            (scene, precision) for scene in ("sphere.yaml", TRIANGLES) for precision in ("single", "double")])
+            (scene, precision) for scene in ("sphere.yaml", "two.yaml") for precision in ("single", "double")])
         runs = [run for run in report["runs"] if "status" not in run]
         for run in report["runs"]:
-            self.assertEqual((run["bvh"], run["size"]), ("auto", [32, 24]))
+            self.assertEqual((run["bvh"], run["size"], run.get("traverses_bvh", False)), ("auto", [32, 24], False))
             self.assertIn(run["lanes"], (1, 4, 8, 16))
             if run in runs:
                 self.check_run(run)
             else:
                 self.assertEqual(run["precision"], "double")
                 self.assertIn("64-bit", run["reason"])
-        self.assertEqual([run["traverses_bvh"] for run in runs if run["precision"] == "single"], [False, True])
-        self.assertEqual(len({run["kernel_hash"] for run in runs}), len(runs), "each kernel has a hash of its own")
-        for scene in "sphere.yaml", TRIANGLES:
+        self.assertEqual(len({run["kernel_hash"] for run in runs}), len({run["precision"] for run in runs}), "both scenes have a kernel")
+        for scene in "sphere.yaml", "two.yaml":
             counts = [run["rays"]["camera_hits"] for run in runs if run["scene"] == scene]
             self.assertLessEqual(max(counts) - min(counts), 2)
 
     def test_no_build_times(self):
-        process = self.glint(f"bench sphere.yaml {TINY} --seconds 0.1 --output report.json")
+        process = self.glint(f"bench sphere.yaml {TINY} --bvh on --seconds 0.1 --output report.json")
         untimed = {"status": "unavailable", "reason": "builds were not timed"}
-        self.assertEqual(json.loads(read("report.json"))["runs"][0]["build_ms"], {"cold": untimed, "cached": untimed})
+        (row,) = json.loads(read("report.json"))["runs"]
+        self.assertEqual((row["build_ms"], row["traverses_bvh"]), ({"cold": untimed, "cached": untimed}, True))
         self.assertEqual(process.stdout.count("builds were not timed"), 1)
 
     def decided(self, command, status=0):
@@ -195,7 +194,7 @@ for line in worker.stdout:
         """The hash of a scene from a pipe is that of its bytes, which are gone once they are read."""
         os.symlink("/dev/stdin", "pipe.yaml")
         write("other.yaml", SPHERE + "# other\n")
-        tiny = f"--size 8x8 --seconds 0.01 {LANES} --no-build-times --json"
+        tiny = "--size 8x8 --seconds 0.01 --no-build-times --json"
         rows = self.json(f"bench sphere.yaml pipe.yaml other.yaml {tiny}", input=SPHERE)["runs"]
         self.assertEqual(rows[0]["scene_hash"], rows[1]["scene_hash"])
         self.assertNotEqual(rows[0]["scene_hash"], rows[2]["scene_hash"])
@@ -225,8 +224,8 @@ for line in worker.stdout:
             self.assertTrue(min(ratios) <= run["to_first"]["ratio"] <= max(ratios), run["to_first"])
         self.assertRegex(out, r"(?m)^    \(no options\)$")
         self.assertRegex(out, r"(?m)^    --work-group 4x2: [0-9.]+( \([0-9.]+ to [0-9.]+\))? times the first variant's frame time$")
-        self.assertEqual(re.findall(r"(?m)^ +rays: ([0-9]+) camera", out), ["768", "1536"], "where they differ")
-        command = f"bench sphere.yaml {TINY} --seconds 0.1 --variant '' --variant '--bounces 0'"
+        self.assertEqual(re.findall(r"(?m)^ +rays: ([0-9]+) camera", out), ["768", "768", "1536"], "where they differ")
+        command = f"bench sphere.yaml {TINY} --lanes 1 --seconds 0.1 --variant '' --variant '--bounces 0'"
         names = {entry["name"] for entry in self.json(f"{command} --format benchmark")["benchmarks"]}
         self.assertEqual(names, {f"sphere.yaml/32x24/single/1/auto/1/{end}" for end in ("5", "0/--bounces 0")})
 

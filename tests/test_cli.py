@@ -299,8 +299,7 @@ class Failures(CliTestCase):
     def test_scene_files_are_not_overwritten(self):
         write("globe.png", "P3 1 1 255 9 9 9\n")
         write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-        objects = "radius: 1, material: {image: globe.png}}\n  - mesh: {file: mesh.obj}"
-        write("globe.yaml", SPHERE.replace("radius: 1}", objects))
+        write("globe.yaml", SPHERE.replace("reflection: 0.1", "image: globe.png") + "  - mesh: {file: mesh.obj}\n")
         files = {name: read(name) for name in ("globe.png", "mesh.obj", "globe.yaml")}
         os.symlink("globe.yaml", "link.png")
         os.link("globe.png", "hard.t.npy")
@@ -314,7 +313,7 @@ class Failures(CliTestCase):
             self.refuses(f"render globe.yaml {SMALL} {arguments}", f"would overwrite '{path}")
         self.refuses("trace globe.yaml --rays rays -o mesh.obj", "would overwrite 'mesh.obj'")
         write("a.yaml", SPHERE)
-        write("b.yaml", SPHERE.replace("radius: 1}", "radius: 1, material: {image: a.png}}"))
+        write("b.yaml", SPHERE.replace("reflection: 0.1", "image: a.png"))
         os.link("globe.png", "a.png")
         for scenes in "a.yaml b.yaml", "b.yaml a.yaml":
             self.refuses(f"render {scenes} {SMALL}", "would overwrite 'a.png', which 'b.yaml' is read from")
@@ -331,8 +330,8 @@ class Failures(CliTestCase):
 class Images(CliTestCase):
     def test_a_scene_alone_is_rendered(self):
         camera, lights, objects = ('{"position": [0, 0, -4], "look_at": [0, 0, 0]}',
-                                   '[{"point": {"position": [3, 4, -5]}}, {"directional": {"direction": [0, -1, 0.3]}}]',
-                                   '[{"sphere": {"center": [0, 0, 0], "radius": 1}}]')
+                                   '[{"point": {"position": [3, 4, -5]}}]',
+                                   '[{"sphere": {"center": [0, 0, 0], "radius": 1, "material": {"reflection": 0.1}}}]')
         write("s.json", f'{{"camera": {camera}, "lights": {lights},\n\t"objects": {objects}}}')
         write("s.yaml", f"camera: {camera}\nlights: {lights}\nobjects: {objects}\n")
         self.glint(f"render s.yaml {SMALL} -o command.ppm")
@@ -342,9 +341,9 @@ class Images(CliTestCase):
 
     def test_values_are_set(self):
         """The image is that of a scene with these values, and the file names them."""
-        write("small.yaml", SPHERE.replace("fov: 60", "fov: 40").replace("radius: 1", "radius: 0.5, material: {color: [1, 0, 0]}"))
+        write("small.yaml", SPHERE.replace("fov: 60", "fov: 40").replace("radius: 1", "radius: 0.5").replace("{reflection", "{color: [1, 0, 0], reflection"))
         self.glint(f"render small.yaml {SMALL} -o small.png")
-        values = "camera.fov=40", "objects[0].sphere.radius=0.5", "objects[0].sphere.material={color: red}"
+        values = "camera.fov=40", "objects[0].sphere.radius=0.5", "objects[0].sphere.material={color: red, reflection: 0.1}"
         options = " ".join(f"--set '{value}'" for value in values)
         self.glint(f"render sphere.yaml {SMALL} {options} -o set.png")
         _, rows, texts, _ = png_read("set.png")
@@ -473,14 +472,14 @@ class Images(CliTestCase):
     def test_precisions_and_lanes(self):
         images = {}
         for precision in "single", "strict", "double":
-            for lanes in (1, 4, 8, 16) if precision == "single" and IS_LONG else (1,):
-                self.glint(f"render sphere.yaml {SMALL} --precision {precision} --lanes {lanes} -o {precision}.npy")
+            for lanes in ("", *(f"--lanes {lanes}" for lanes in (1, 4, 8, 16) if precision == "single" and IS_LONG)):
+                self.glint(f"render sphere.yaml {SMALL} --precision {precision} {lanes} -o {precision}.npy")
             shape, kind, images[precision] = npy_read(f"{precision}.npy")
             self.assertEqual((shape, kind), ((6, 8, 3), "<f8" if precision == "double" else "<f4"))
         self.assertAlmostEqual(images["single"][0][0], 0.1, delta=1e-7)
         self.assertGreater(max(map(max, images["single"])), 0.9)
         self.assertLess(max(map(math.dist, images["single"], images["double"])), 1e-5)
-        self.glint(f"render sphere.yaml {SMALL} --no-cache --lanes 1 --device 0 -o uncached.npy")
+        self.glint(f"render sphere.yaml {SMALL} --no-cache --device 0 -o uncached.npy")
         self.assertSameBytes("uncached.npy", "single.npy")
 
     def test_rt_and_cfg(self):
@@ -535,8 +534,8 @@ class Aovs(CliTestCase):
         layouts = {"t": ((6, 8), "<f4"), "normal": ((6, 8, 3), "<f4"), "position": ((6, 8, 3), "<f8"),
                    "object": ((6, 8), "<u4"), "shadow": ((6, 8, 2), "<u4"), "ray": ((6, 8, 3), "<f4"),
                    "path": ((6, 8), "<u4"), "color": ((6, 8, 3), "<f4"), "flag": ((6, 8), "<u4")}
-        self.glint(f"render sphere.yaml {SMALL} --aov {','.join(layouts)} -o v.png")
-        self.glint(f"render sphere.yaml {SMALL} -o v.npy")
+        self.glint(f"render sphere.yaml {SMALL} --bounces 0 --aov {','.join(layouts)} -o v.png")
+        self.glint(f"render sphere.yaml {SMALL} --bounces 0 -o v.npy")
         self.assertSameBytes("v.color.npy", "v.npy")
         pixels = {}
         for name, layout in layouts.items():
@@ -577,7 +576,8 @@ class Aovs(CliTestCase):
             self.assertTrue({0, 1} < set(parts) and all(16 * part == int(16 * part) for part in parts))
             self.glint(f"{render} --alpha --bits 16 --transfer none -o alpha.png")
             os.makedirs("folder", exist_ok=True)  # whose images are PNG
-            self.glint(f"{render.replace('disc.yaml', 'disc.yaml sphere.yaml')} --alpha -o folder")
+            write("other.yaml", read("disc.yaml"))
+            self.glint(f"{render.replace('disc.yaml', 'disc.yaml other.yaml')} --alpha -o folder")
             self.assertEqual(png_read("folder/disc.png")[0][3], 6)
             (*size, bits, kind), rows, *_ = png_read("alpha.png")
             self.assertEqual((size, bits, kind), ([width, height], 16, 6))
@@ -594,7 +594,7 @@ class Aovs(CliTestCase):
                         self.assertAlmostEqual(colors[i][channel] - backdrops[i][channel], parts[i] * emission, delta=1e-6)
                         self.assertAlmostEqual(pixel[channel] / 65535, emission if parts[i] > 0 else 0, delta=2e-5)
             for options in "-o black.npy", "--alpha -o black.exr":
-                self.glint(f"{render} --set background=0 --aov coverage {options}")
+                self.glint(f"{render} --set background='{{horizon: 0, zenith: 0}}' --aov coverage {options}")
             self.assertIn("equal, bit for bit", self.glint("diff black.npy black.exr").stdout)
             self.assertIn("equal, bit for bit", self.glint("diff black.coverage.npy black.exr --layer coverage").stdout)
         for name in "a.ppm", "a.npy":
@@ -627,7 +627,7 @@ class Trace(CliTestCase):
         rays += "0 0 -4 0 0 1 0 2\n"
         expected = ["object", "t", "nx", "ny", "nz"], [[0, 3, 0, 0, -1], [None] * 5, [0, 1.5, 0, 0, -1], [None] * 5]
         self.assertEqual(csv_rows(self.glint(f"trace sphere.yaml --rays {write('rays', rays)}").stdout), expected)
-        process = self.glint("trace sphere.yaml --rays - -o hits.csv --precision double --lanes 4", input=rays)
+        process = self.glint("trace sphere.yaml --rays - -o hits.csv --precision double", input=rays)
         self.assertEqual(process.stdout, "")
         self.assertEqual(csv_rows(read("hits.csv")), expected)
 
@@ -640,7 +640,8 @@ class Trace(CliTestCase):
             (f"{{{ink}, transmission: 1}}", "absorption"), (f"{{{ink}, reflection: 0.5}}", None),
         ):
             write("glass.yaml", "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nlights: [{point: {position: [5, 5, 5]}}]\n"
-                  f"objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {material}}}}}]\n")
+                  f"objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {material}}}}},\n"
+                  "  {sphere: {center: [2, 0, 0], radius: 1, material: {reflection: 0.1}}}]\n")  # with SPHERE's features
             command = f"render glass.yaml {SMALL} --precision certified -o glass.ppm"
             self.refuses(command, f"'{refused}', which has no error bound") if refused else self.glint(command)
 

@@ -8,18 +8,19 @@ from pathlib import Path
 import glint
 from glint import SPHERE, TestCase, main, need_device, npy_read, png_read, read, write
 
+# with the features of SPHERE
 SCENE = """
 camera: {{position: [0, 1, 6], look_at: [0, 0, 0], fov: {fov}}}
 ambient: 0.3
 lights: [{{point: {{position: {light}, intensity: {intensity}}}}}]
 objects:
-  - sphere: {{center: [0, 0, 0], radius: {radius}, material: {{color: red}}}}
-  - box: {{min: [1, 0, 0], max: [2, 1, 1], transform: {{rotate: {turn}}}}}
+  - sphere: {{center: [0, 0, 0], radius: {radius}, material: {{color: red, reflection: 0.1}}}}
+  - sphere: {{center: [1.5, 0.5, 0.5], radius: 0.5, transform: {{rotate: {turn}}}}}
 """
 KEYS = {"fov": "{keys: {2: 40, 6: 50}}", "light": "{keys: {0: [4, 4, 4], 4: [-4, 4, 4], 8: [4, 4, 4]}}",
         "intensity": "{keys: {0: 1, 8: 0}, ease: smooth}", "radius": "{keys: {0: 1, 3: 0.5, 6: 0.75}, ease: step}",
         "turn": "{keys: {0: [0, 0, 0], 8: [0, 90, 0]}}"}
-RENDER = "--size 32x18 --quiet --lanes 1"
+RENDER = "--size 32x18 --quiet"
 
 
 class Frames(TestCase):
@@ -45,7 +46,8 @@ class Frames(TestCase):
     def test_turn(self):
         """The camera goes round the point that it looks at, about `up`, in equal steps and back to where it was."""
         scene = ("camera: {{position: {position}, look_at: [1, 2, 3], up: [0, 0, 2]{turn}}}\n"
-                 "ambient: 1\nobjects: [{{box: {{min: [0, 1, 2], max: [2, 2.5, 4], material: {{checker: {{colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}}}}}]\n")
+                 "lights: [{{point: {{position: [9, 8, 7]}}}}]\n"
+                 "objects: [{{sphere: {{center: [1, 2, 3], radius: 1, material: {{reflection: 0.1}}}}}}, {{sphere: {{center: [2, 1, 3.5], radius: 0.5}}}}]\n")
         write("moving.yaml", scene.format(position="[1, -4, 5]", turn=", turn: {keys: {0: 0, 12: 360}}"))
         self.glint(f"render moving.yaml --frames 0-12 {RENDER} --precision double --aov t -o f%02d.npy")
         for frame in range(13):
@@ -109,15 +111,15 @@ class Frames(TestCase):
         """Images of frames and of scenes that exist are left as they are."""
         write("moving.yaml", SCENE.format(**KEYS))
         write("s1.png", "kept")
-        process = self.glint("render moving.yaml --frames 0-2 --size 32x18 --lanes 1 --skip-existing -o s%d.png")
+        process = self.glint("render moving.yaml --frames 0-2 --size 32x18 --skip-existing -o s%d.png")
         self.assertEqual(process.stderr, "glint: wrote s0.png\nglint: kept s1.png\nglint: wrote s2.png\n")
         self.assertEqual(read("s1.png"), "kept")
         write("still.yaml", SPHERE)
         write("still.png", "kept")
-        process = self.glint("render moving.yaml still.yaml --size 32x18 --lanes 1 --skip-existing")
+        process = self.glint("render moving.yaml still.yaml --size 32x18 --skip-existing")
         self.assertEqual((process.stderr, read("still.png")), ("glint: wrote moving.png\nglint: kept still.png\n", "kept"))
         # its AOV does not exist
-        process = self.glint("render moving.yaml --size 32x18 --lanes 1 --skip-existing --aov t")
+        process = self.glint("render moving.yaml --size 32x18 --skip-existing --aov t")
         self.assertEqual(process.stderr, "glint: wrote moving.png, moving.t.npy\n")
         self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
 

@@ -190,7 +190,8 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
 {
     Scene scene = scene_of_text("two.yaml", "camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 50}\n"
                                             "lights: [{point: {position: [0, 9, -9]}}]\n"
-                                            "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125}}]\n");
+                                            "objects: [{sphere: {center: [0, 0, 1.5], radius: 1.125,\n"
+                                            "  material: {reflection: 0.1}}}]\n"); // as glint.py's SPHERE
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.extra_features = 0;
     settings.moves = true;

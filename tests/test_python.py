@@ -38,8 +38,15 @@ import glint.trimesh  # noqa: E402
 CUBE_VERTICES = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 CUBE_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
                        [1, 5, 7], [1, 7, 3]])
+
+
+def sphere(radius):
+    return {"sphere": {"center": [0, 0, 0], "radius": radius, "material": {"reflection": 0.1}}}
+
+
+# with the features of glint.py's SPHERE, so that the same kernels serve both
 SPHERE = {"camera": {"position": [0, 0, -4], "look_at": [0, 0, 0], "fov": 60}, "background": [0.1, 0.2, 0.4],
-          "lights": [{"point": {"position": [3, 4, -5]}}], "objects": [{"sphere": {"center": [0, 0, 0], "radius": 1}}]}
+          "lights": [{"point": {"position": [3, 4, -5]}}], "objects": [sphere(1)]}
 
 
 class Mesh:
@@ -65,11 +72,11 @@ class Images(unittest.TestCase):
         np.testing.assert_allclose(np.linalg.norm(position - [0, 0, -4], axis=1), layers["t"][hit], atol=1e-5)
 
     def test_equals_the_program(self):
-        """The example of the documents has the program's bits."""
-        scene = glint.load(ROOT / "scenes/article.yaml")
+        path = ROOT / "tests/scenes/mirror-balls.yaml"
+        scene = glint.load(path)
         image = scene.render(64, 36, samples=2, bounces=3, precision="strict")
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([BUILD / "glint", "render", ROOT / "scenes/article.yaml", "--size", "64x36", "--samples", "2", "--bounces", "3",
+            subprocess.run([BUILD / "glint", "render", path, "--size", "64x36", "--samples", "2", "--bounces", "3",
                             "--precision", "strict", "-o", f"{folder}/image.npy", "--quiet"], check=True)
             np.testing.assert_array_equal(image, np.load(f"{folder}/image.npy"))
 
@@ -77,13 +84,13 @@ class Images(unittest.TestCase):
         """A replaced value and a frame's value are as if the scene had them."""
         def image(scene):
             return scene.render(32, 18, precision="strict")
-        moving = {**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": {"keys": {0: 1, 4: 2}}}}]}
-        small, large = (image(glint.Scene({**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": radius}}]})) for radius in (1, 1.5))
+        moving = {**SPHERE, "objects": [sphere({"keys": {0: 1, 4: 2}})]}
+        small, large = (image(glint.Scene({**SPHERE, "objects": [sphere(radius)]})) for radius in (1, 1.5))
         self.assertFalse(np.array_equal(small, large))
         np.testing.assert_array_equal(image(glint.Scene(moving)), small)
         np.testing.assert_array_equal(image(glint.Scene(moving, frame=2)), large)
         np.testing.assert_array_equal(image(glint.Scene(moving, frame=2, overrides={"objects[0].sphere.radius": 1})), small)
-        np.testing.assert_array_equal(image(glint.Scene(SPHERE, overrides={"objects[0].sphere": {"center": [0, 0, 0], "radius": np.float64(1.5)}})), large)
+        np.testing.assert_array_equal(image(glint.Scene(SPHERE, overrides={"objects[0]": sphere(np.float64(1.5))})), large)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder, "scene.json")
             path.write_text(json.dumps(moving))
@@ -100,8 +107,8 @@ class Images(unittest.TestCase):
             glint.Scene(SPHERE, frame=float("nan"))
         with self.assertRaisesRegex(glint.SceneError, "min_contribution is not between 0 and 1"):
             glint.Scene(SPHERE).render(8, 6, min_contribution=2)
-        mirrors = glint.Scene({**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": 1, "material": {"reflection": 0.01}}}]})
-        self.assertFalse(np.array_equal(mirrors.render(32, 18), mirrors.render(32, 18, min_contribution=0.1)))
+        mirror = glint.Scene(SPHERE)
+        self.assertFalse(np.array_equal(mirror.render(32, 18), mirror.render(32, 18, min_contribution=0.5)))
 
     def test_sizes_and_meshes(self):
         self.assertEqual(glint.load_mesh(CUBE_VERTICES, CUBE_FACES).render(16, 9).shape, (9, 16, 3))
@@ -324,8 +331,7 @@ class Compare(unittest.TestCase):
 
 class AllHits(unittest.TestCase):
     def setUp(self):
-        spheres = [{"sphere": {"center": [0, 0, 0], "radius": radius}} for radius in range(1, 6)]
-        self.scene = glint.Scene({**SPHERE, "objects": spheres})
+        self.scene = glint.Scene({**SPHERE, "objects": [sphere(radius) for radius in range(1, 6)]})
 
     def test_order(self):
         """Through concentric spheres, next to them, and from inside, in more rays than a batch has."""
@@ -349,12 +355,14 @@ class AllHits(unittest.TestCase):
         np.testing.assert_array_equal(found.t[firsts], nearest.t[nearest.hit])
 
     def test_far_transformed_shapes(self):
-        """Each ray through the middle has an entry and an exit, however far away it starts."""
-        stretched = {"transform": {"scale": [1, 2, 1.5]}}
-        for shape, hits in (({"sphere": {"center": [0, 0, 0], "radius": 1, **stretched}}, 2),
-                            ({"cylinder": {"from": [0, -1, 0], "to": [0, 1, 0], "radius": 1, **stretched}}, 2),
-                            ({"torus": {"center": [0, 0, 0], "axis": [0, 1, 0], "major": 1, "minor": 0.25, **stretched}}, 4)):
-            scene = glint.Scene({**SPHERE, "objects": [shape]})
+        """Each ray through the middle has an entry and an exit, however far away it starts. The other shapes are above the rays, so
+        that the same kernels serve each."""
+        shapes = (("sphere", {"center": [0, 0, 0], "radius": 1}, 2), ("cylinder", {"from": [0, -1, 0], "to": [0, 1, 0], "radius": 1}, 2),
+                  ("torus", {"center": [0, 0, 0], "axis": [0, 1, 0], "major": 1, "minor": 0.25}, 4))
+        for shape, _, hits in shapes:
+            scene = glint.Scene({**SPHERE, "objects": [
+                {name: {**keys, "transform": {"scale": [1, 2, 1.5], "translate": [0, 0 if name == shape else 100, 0]}}}
+                for name, keys, _ in shapes]})
             for distance in 10, 1e3, 1e4:
                 angle, slope = np.random.default_rng(4).uniform(-np.pi, np.pi, (2, 1000))
                 away = np.stack([np.cos(angle), 0.05 * slope, np.sin(angle)], 1)
