@@ -13,7 +13,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, png_read, read, shim_build, skip_all, write
+from glint import IS_LONG, IS_SANITIZED, PROGRAM, ROOT, SPHERE, TestCase, checkpoint_rows, find_icd, has_device, main, plain, png_read, read, shim_build, skip_all, write
 
 POCL = {"OCL_ICD_VENDORS": find_icd("pocl")}
 MPI = POCL | {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "HWLOC_COMPONENTS": "-gl",  # else an X server that ends takes mpirun with it
@@ -142,9 +142,8 @@ class Mpi(TestCase):
 
     def test_mixed_lanes(self):
         """Each rank gets the BVH for its lanes."""
-        scene = ROOT / "scenes/spheres16.yaml"
-        for lanes in 1, 4:
-            command = f"render {scene} --size 64x48 --bvh on --lanes {lanes} --precision strict --quiet"
+        for lanes in 1, 16:
+            command = f"render {plain('spheres16.yaml')} --size 64x48 --bvh on --lanes {lanes} --precision strict --quiet"
             self.glint(f"{command} -o one.npy", env=POCL)
             self.mpirun(f"-n 2 {RANKS} {command} -o ranks.npy")
             self.assertSameBytes("one.npy", "ranks.npy")
@@ -210,7 +209,7 @@ class Mpi(TestCase):
     def test_frames(self):
         """Each rank renders whole frames, and all together the rest, or all frames if one sees other files or has other options. A
         mistake ends one frame."""
-        command = self.write_frames({"bad": "camera: 5", "boxes": (ROOT / "scenes/boxes.yaml").read_text()}.items(), 1)
+        command = self.write_frames({"bad": "camera: 5", "many": read(plain("spheres16.yaml"))}.items(), 1)
         os.mkdir("frames")
         self.assertRegex(self.mpirun(f"-n 3 {RANKS} {command} -o frames", 1).stderr, "(?m)^bad.yaml:1")
         self.check_frames(["sphere4.png", "sphere5.png"])
