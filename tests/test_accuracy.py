@@ -7,13 +7,15 @@ import json
 import math
 import tempfile
 from collections import namedtuple
+from pathlib import Path
 
 from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, run, skip_all, terminal_run, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
 MISS = 0xFFFFFFFF
 SMALL = "--size 96x64 --seconds 0.2 --bounces 16"
-GLASS = f"{ROOT}/scenes/mirror-glass.yaml"
+# Rays of this scene change direction. The kernels of glass, whose figures are made in the same way, are for long tests.
+BENT = f"{ROOT}/scenes/mirror-glass.yaml" if IS_LONG else BALLS
 Approx = namedtuple("Approx", "value relative absolute", defaults=(0, 0))
 
 
@@ -155,10 +157,10 @@ class Accuracy(TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.saved = f"{folder.name}/saved"
         cls.spheres, far = (plain(scene, folder.name) for scene in ("spheres16.yaml", "far.yaml"))
-        cls.process = run(f"accuracy {GLASS} {cls.spheres} {far} {BALLS} {SMALL} --precision single,double --json "
+        cls.process = run(f"accuracy {BENT} {cls.spheres} {far} {BALLS} {SMALL} --precision single,double --json "
                           f"--save {cls.saved}")
         cls.report = json.loads(cls.process.stdout or "null")
-        cls.reference = f"{cls.saved}/0-mirror-glass-reference"
+        cls.reference = f"{cls.saved}/0-{Path(BENT).stem}-reference"
 
     def check(self, where, reported, expected):
         """Checks every member of what is expected. JSON has null for what is not finite."""
@@ -206,12 +208,12 @@ class Accuracy(TestCase):
                 self.check(where, worst["error"], Approx(error, 1e-12))
 
     def test_judgement(self):
-        glass, spheres, far, balls = (scene["variants"] for scene in self.report["scenes"])
-        self.assertEqual([variant["status"] for variant in glass], ["measured", "reference"])
-        self.assertNotIn("errors", glass[1])
-        self.assertGreater(glass[1]["frame_ms"]["runs"], 0)
+        bent, spheres, far, balls = (scene["variants"] for scene in self.report["scenes"])
+        self.assertEqual([variant["status"] for variant in bent], ["measured", "reference"])
+        self.assertNotIn("errors", bent[1])
+        self.assertGreater(bent[1]["frame_ms"]["runs"], 0)
         edges = self.report["scenes"][0]["edges"]
-        self.assertGreater(edges["path"], edges["silhouette"], "glass bends paths")
+        self.assertGreater(edges["path"], edges["silhouette"])
         self.assertGreater(balls[0]["errors"]["path"]["edge"], 0)
         for single, _ in spheres, far:
             self.assertFalse(single["crossed_out"])
@@ -221,7 +223,7 @@ class Accuracy(TestCase):
     def test_reference_from_a_file(self):
         """Only colors are compared, with the same result, and nothing else gets a figure."""
         options = f"{SMALL} --precision single,double --json --reference {self.reference}.color.npy"
-        scene = self.json(f"accuracy {GLASS} {options}")["scenes"][0]
+        scene = self.json(f"accuracy {BENT} {options}")["scenes"][0]
         single, double = (variant["errors"] for variant in scene["variants"])
         for kind in "object", "shadow", "path", "shading", "t", "normal":
             self.assertEqual(single[kind]["status"], "unavailable")
@@ -236,7 +238,7 @@ class Accuracy(TestCase):
         parts = random.uniform(-1, 1, (64, 3, 96, 3, 3))
         parts -= parts.mean(axis=(1, 3), keepdims=True)
         np.save("large.npy", (small[:, None, :, None] + parts).reshape(192, 288, 3))
-        scene = self.json(f"accuracy {GLASS} {SMALL} --precision single,double --json --reference large.npy")["scenes"][0]
+        scene = self.json(f"accuracy {BENT} {SMALL} --precision single,double --json --reference large.npy")["scenes"][0]
         single, double = (variant["errors"]["image"] for variant in scene["variants"])
         expected = self.report["scenes"][0]["variants"][0]["errors"]["image"]
         self.assertTrue(math.isclose(single["rmse"], expected["rmse"], rel_tol=1e-9))
@@ -343,14 +345,14 @@ class Accuracy(TestCase):
         for arguments, pattern in (
             ("", "scene"),
             ("none.yaml", "none.yaml"),
-            (f"{GLASS} --samples 1,0", "--samples"),
-            (f"{GLASS} --reference none.npy", "none.npy"),
-            (f"{GLASS} --size 64x48 --reference {self.reference}.color.npy", "96x64"),
-            (f"{GLASS} --size 96x32 --reference {self.reference}.color.npy", "not a multiple"),
-            (f"{GLASS} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
-            (f"{GLASS} --reference {ROOT}/docs/still-life.png", r"still-life\.png"),
-            (f"{GLASS} {self.spheres} --reference {self.reference}.color.npy", "one scene"),
-            (f"{GLASS} --size 8x8 --save file/folder", "file/folder"),
+            (f"{BENT} --samples 1,0", "--samples"),
+            (f"{BENT} --reference none.npy", "none.npy"),
+            (f"{BENT} --size 64x48 --reference {self.reference}.color.npy", "96x64"),
+            (f"{BENT} --size 96x32 --reference {self.reference}.color.npy", "not a multiple"),
+            (f"{BENT} --size 96x64 --reference {self.reference}.t.npy", r"\.t\.npy"),
+            (f"{BENT} --reference {ROOT}/docs/still-life.png", r"still-life\.png"),
+            (f"{BENT} {self.spheres} --reference {self.reference}.color.npy", "one scene"),
+            (f"{BENT} --size 8x8 --save file/folder", "file/folder"),
         ):
             with self.subTest(arguments):
                 self.refuses(f"accuracy {arguments}", pattern)
@@ -358,6 +360,6 @@ class Accuracy(TestCase):
 
 if __name__ == "__main__":
     if not need_device()["fp64"]:
-        assert run(f"accuracy {GLASS}").returncode == 1
+        assert run(f"accuracy {BENT}").returncode == 1
         skip_all("the device has no 64-bit floating point for a reference")
     main()

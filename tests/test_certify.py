@@ -48,14 +48,15 @@ objects:
   - sphere: {center: [-1, 1, 0], radius: 1, material: {diffuse: 0.1, transmission: 0.9, ior: 1.5, fresnel: true}}
   - box: {min: [0.4, 0, -0.5], max: [1.6, 1, 0.5], material: {diffuse: 0.1, reflection: [0.9, 0.7, 0.3]}}
 """
-# What FRESNEL, METALS and ABSORPTION need together, far behind the eye, so that the same kernels serve all three.
+# What FRESNEL, METALS, ABSORPTION and FILTERS need together, far behind the eye, so that the same kernels serve all.
 UNSEEN = """\
   - box: {min: [-900, -901, -901], max: [-899, -900, -900], material: {conductor: gold}}
   - box: {min: [-900, -901, -901], max: [-899, -900, -900], material: {transmission: 0.5, fresnel: true, emission: 0.1}}
-  - sphere: {center: [-900, -900, -900], radius: 0.1, material: {transmission: 0.5, absorption: {color: 0.5}}}
+  - sphere: {center: [-900, -900, -900], radius: 0.1, material: {transmission: [0.5, 0.4, 0.3], absorption: {color: 0.5}}}
 """
-# A light that fades to nothing before it reaches what is seen.
-FADED = "lights: [{point: {position: [-900, -900, -900], intensity: 1e-9, falloff: inverse_square}}, "
+# Lights of which one fades to nothing before it reaches what is seen and one is dark.
+FADED = ("lights: [{point: {position: [-900, -900, -900], intensity: 1e-9, falloff: inverse_square}}, "
+         "{directional: {direction: [0, -1, 0], intensity: 0}}, ")
 # Bodies that absorb: with a bubble and an opaque ball within, one below the horizon without end, and one around the eye.
 ABSORPTION = """\
 camera: {position: [0, 2, -6], look_at: [0, 0.7, 0], fov: 40}
@@ -136,17 +137,26 @@ class Certify(TestCase):
     def test_materials_without_bounds(self):
         """Neither a path nor a color differs from the exact ones, at all precisions that take these materials."""
         for scene in FRESNEL, METALS, ABSORPTION:
-            write("scene.yaml", scene if IS_LONG else scene.replace("lights: [", FADED) + UNSEEN)
+            self.write_unbounded(scene)
             precisions = "single,strict" + ",double" * HAS_DOUBLE if IS_LONG else "strict"
             for name, row in self.certify("scene.yaml", f"--precision {precisions}").items():
                 self.assertEqual((row["wrong"]["path"], row["wrong"]["color"]), (0, 0), name)
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 
+    @staticmethod
+    def write_unbounded(scene):
+        write("scene.yaml", scene if IS_LONG else scene.replace("lights: [", FADED) + UNSEEN)
+
+    def certify_filters(self, options):
+        """Returns the rows by their precisions. Only certified has the scene without UNSEEN, which it refuses."""
+        self.write_unbounded(FILTERS)
+        rows = self.certify("scene.yaml", f"--precision strict{',single' * IS_LONG}{',double' * (IS_LONG and HAS_DOUBLE)} {options}")
+        write("filters.yaml", FILTERS)
+        return rows | (self.certify("filters.yaml", f"--precision certified {options}") if HAS_DOUBLE else {})
+
     def test_filters(self):
         """Colored transmission has bounds, so that what is decided is right at every precision."""
-        write("scene.yaml", FILTERS)
-        precisions = "strict" + ",certified" * HAS_DOUBLE + ",single" * IS_LONG + ",double" * (IS_LONG and HAS_DOUBLE)
-        for name, row in self.certify("scene.yaml", f"--precision {precisions}").items():
+        for name, row in self.certify_filters("").items():
             if name == "certified":
                 self.assertEqual((row["wrong_decided"], row["uncertified"]["pixels"]), (0, 0))
             else:
@@ -155,7 +165,7 @@ class Certify(TestCase):
 
     def test_min_contribution(self):
         """Rays below it end the same paths in the reference. Above all weights only camera rays are left."""
-        write("scene.yaml", FILTERS)
+        self.write_unbounded(FILTERS)
         images = []
         for options in "", "--min-contribution 0", "--bounces 0", "--min-contribution 0.95", "--min-contribution 0.4":
             # at a precision whose kernel is built anyway
@@ -164,9 +174,7 @@ class Certify(TestCase):
         self.assertEqual(images[0], images[1])
         self.assertEqual(images[2], images[3])
         self.assertNotIn(images[4], (images[0], images[2]))
-        precisions = "strict" + ",certified" * HAS_DOUBLE + ",single" * IS_LONG + ",double" * (IS_LONG and HAS_DOUBLE)
-        options = f"--min-contribution 0.4 --bounces 8 --precision {precisions}"
-        for name, row in self.certify("scene.yaml", options).items():
+        for name, row in self.certify_filters("--min-contribution 0.4 --bounces 8").items():
             wrong = row["wrong_decided"] if name == "certified" else row["wrong"]["path"] + row["wrong"]["color"]
             self.assertEqual(wrong, 0, name)
         for wrong in "2", "-1", "some", "nan":

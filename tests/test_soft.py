@@ -38,14 +38,18 @@ class Soft(TestCase):
         middle = size[1] // 2
         return [values[middle * size[0] + column][0] for column in range(size[0])]
 
+    @staticmethod
+    def lights(light):
+        """Returns a scene's list of lights. Dark ones, unless tests are long, let the same kernel serve every type of light."""
+        others = () if IS_LONG else (f"{dark}, intensity: 0}}" for dark in DARK)
+        return "lights:\n" + "".join(f"  - {text}\n" for text in (light, *others))
+
     def penumbra(self, light, options):
         """Returns the part of the light that arrives at x from -0.2 to 0.2 on a floor behind the edge of a wall that ends at x = 0,
         a tenth of the way up to the light, which is far above."""
-        camera = "camera: {position: [0, 50, 0], look_at: [0, 0, 0], up: [0, 0, 1], height: 0.025}\nlights:\n"
-        if not IS_LONG:  # dark ones, so that the same kernel serves every type of light
-            light = "\n  - ".join([light, *(f"{dark}, intensity: 0}}" for dark in DARK)])
+        camera = "camera: {position: [0, 50, 0], look_at: [0, 0, 0], up: [0, 0, 1], height: 0.025}\n"
         # seen from above, x grows to the left; the second wall casts no shadow there
-        scene = f"{camera}  - {light}\nobjects:\n  - plane: {{point: [0, 0, 0], normal: [0, 1, 0]}}\n"
+        scene = f"{camera}{self.lights(light)}objects:\n  - plane: {{point: [0, 0, 0], normal: [0, 1, 0]}}\n"
         walls = (f"  - box: {{min: [{left - 1000}, 100, -1000], max: [{left}, 101, 1000]}}\n" for left in (0, -9000))
         return [self.row(scene + wall, (80, 5), options)[::-1] for wall in walls]
 
@@ -142,14 +146,15 @@ class Soft(TestCase):
     def test_no_lens(self):
         """Without an aperture `focus` changes nothing."""
         text = "camera: {{position: [1, 2, 6], look_at: [0, 0, 0]{}}}\nlights: [{{point: {{position: [3, 4, 5]}}}}]\n" + \
-               "objects: [{{sphere: {{center: [0, 0, 0], radius: 1}}}}]\n"
+               "objects: [{{sphere: {{center: [0, 0, 0], radius: 1, material: {{reflection: 0.1}}}}}}]\n"
         plain = self.row(text.format(""), (32, 32))
         self.assertEqual(self.row(text.format(", focus: 3, aperture: 0"), (32, 32)), plain)
 
     def test_parallel_rays(self):
         """Pixels lie evenly on the scene, at every distance. The window's height is that of the image."""
-        write("soft.yaml", "camera: {position: [1, 2, 6], look_at: [1, 2, 0], height: 3}\n"
-              "objects: [{plane: {point: [0, 0, 1], normal: [0.3, 0.2, 1]}}]\n")
+        # with the features of penumbra's scenes
+        write("soft.yaml", "camera: {position: [1, 2, 6], look_at: [1, 2, 0], height: 3}\n" + self.lights(f"{DARK[0]}}}") +
+              "objects:\n  - plane: {point: [0, 0, 1], normal: [0.3, 0.2, 1]}\n  - box: {min: [0, 0, 900], max: [1, 1, 901]}\n")
         for precision in PRECISIONS:
             with self.subTest(precision=precision):
                 self.glint(f"render soft.yaml --quiet --lanes 1 --size 40x30 --aov position,ray --precision {precision} -o soft.npy")
@@ -165,8 +170,11 @@ class Soft(TestCase):
         """The sky has the colors of the poles, blended by the cosine. Its mean is the ambient light."""
         colors = {"horizon": (0.5, 0.25, 1), "zenith": (0, 0.5, 2), "nadir": (1, 0.75, 0)}
         given = ", ".join(f"{name}: {list(color)}" for name, color in colors.items())
+        png_write("white.png", 1, 1, lambda column, row: (255, 255, 255))
         write("soft.yaml", "camera: {position: [0, 0, 5], look_at: [3, 2, 0], fov: 150}\n"
-              f"background: {{{given}, up: [0, 0.6, 0.8]}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1}}}}]\n")
+              f"background: {{{given}, up: [0, 0.6, 0.8]}}\n"
+              "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: {image: white.png}}\n"
+              "  - box: {min: [0, 0, 900], max: [1, 1, 901]}\n")  # for the features of test_sky_image
         for precision in (*PRECISIONS, "certified"):
             with self.subTest(precision=precision):
                 self.glint(f"render soft.yaml --quiet --lanes 1 --size 24x16 --aov ray,object --precision {precision} -o soft.npy")
@@ -196,7 +204,8 @@ class Soft(TestCase):
         png_write("sky.png", columns, rows, texel)
         scene = ("camera: {{position: [0, 0, 0], look_at: {}, up: [0.1, 0.9, 0.2], fov: 120}}\n"
                  "background: {{image: sky.png, intensity: 0.5{}}}\n"
-                 "objects: [{{box: {{min: [3, -1, -1], max: [4, 1, 1]}}}}]\n")
+                 # no ray hits the sphere
+                 "objects: [{{box: {{min: [3, -1, -1], max: [4, 1, 1]}}}}, {{sphere: {{center: [0, 9, 0], radius: 1e-6}}}}]\n")
         # the ways to the image's middle, right quarter and top
         turns = {"": ((0, 0, -1), (1, 0, 0), (0, 1, 0)), ", turn: 90": ((-1, 0, 0), (0, 0, -1), (0, 1, 0)),
                  ", up: [0, 0, 1]": ((-1, 0, 0), (0, 1, 0), (0, 0, 1))}
@@ -261,7 +270,8 @@ class Soft(TestCase):
         self.refuses(command, "the sky is a light, which has no error bound")
         write("soft.yaml", camera.format(", shift: [0, 5]", f"{{{point}}}"))
         self.refuses(command, "'shift' moves the middle of the frame to [0-9.]+ focal lengths from the eye, where certified has error bounds up to 4.33")
-        ghost = "materials: {{ghost: {{shadow: false}}}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1{}}}}}]\n"
+        ghost = "materials: {{ghost: {{shadow: false}}}}\nobjects: [{{sphere: {{center: [0, 0, 0], radius: 1{}}}}}" + \
+                ", {{sphere: {{center: [3, 0, 0], radius: 1, material: {{reflection: 0.1}}}}}}]\n"
         for material, refused in (", material: ghost", True), ("", False):
             write("soft.yaml", camera.replace("objects: []\n", "").format("", f"{{{point}}}") + ghost.format(material))
             self.refuses(command, "a material has 'shadow: false', which") if refused else self.glint(command)
