@@ -3,6 +3,7 @@
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/compile/features.h"
 #include "host/opencl/compose.h"
 #include "host/render/arithmetic.h"
 #include "host/render/renderer.h"
@@ -89,16 +90,27 @@ static inline Renderer *probe_renderer(const Scene *scene, const RenderSettings 
     return renderer;
 }
 
-// Builds a program of the test's kernels, which may include the shipped ones.
-static inline cl_program probe_program(const char *text, const char *prelude, const char *options)
+// Builds a program of the test's kernels, which may include the shipped ones, with every feature. Unless the
+// seed is 0, errors are injected, which `strict` repairs.
+static inline cl_program probe_program(const char *text, uint32_t lanes, Precision precision, bool has_fma,
+                                       uint32_t perturb_seed, const char *options)
 {
+    Text prelude = {0};
+    text_appendf(&prelude,
+                 "#define LANES %u\n#define IS_STRICT %d\n#define IS_DOUBLE %d\n#define HAS_FMA %d\n"
+                 "#define PERTURB %d\n#define REPAIRS_DIVIDE %d\n#define PERTURB_SEED %uu\n"
+                 "#define PERTURB_SCALE 1\n#define IS_CERTIFIED 0\n#define IS_PIXEL_LIST 0\n"
+                 "#define IS_COUNTING 0\n#define PENDING_MAX 1\n#define STACK_CAPACITY 40\n",
+                 lanes, precision == PRECISION_STRICT, precision == PRECISION_DOUBLE, has_fma,
+                 perturb_seed != 0, perturb_seed != 0 && precision == PRECISION_STRICT, perturb_seed);
+    features_write_prelude(&prelude, FEATURE_ALL);
     size_t file_count = 0;
     while (kernel_files[file_count].name)
         file_count++;
     EmbeddedFile *files = memory_allocate_zeroed(file_count + 2, sizeof *files);
     memcpy(files, kernel_files, file_count * sizeof *files);
     files[file_count] = (EmbeddedFile){"probe.cl", text};
-    char *composed = kernel_compose(files, "probe.cl", prelude);
+    char *composed = kernel_compose(files, "probe.cl", text_c(&prelude));
     if (composed == NULL) fault("a test's kernel cannot be composed");
     const char *source = composed;
     cl_int status;
@@ -107,6 +119,7 @@ static inline cl_program probe_program(const char *text, const char *prelude, co
     compute_try(&probe_compute, clBuildProgram(program, 1, &probe_compute.device->id, options, NULL, NULL));
     free(composed);
     free(files);
+    text_free(&prelude);
     return program;
 }
 

@@ -197,22 +197,6 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
     }
 }
 
-static cl_program culling_program(bool is_double)
-{
-    Text prelude = {0};
-    text_appendf(&prelude,
-                 "#define LANES 1\n#define IS_STRICT 0\n#define IS_CERTIFIED 0\n#define "
-                 "IS_DOUBLE %d\n"
-                 "#define REPAIRS_DIVIDE 0\n#define HAS_FMA 1\n#define IS_COUNTING 0\n#define PERTURB "
-                 "0\n#define PERTURB_SEED "
-                 "0u\n#define PERTURB_SCALE 1\n",
-                 is_double);
-    features_write_prelude(&prelude, FEATURE_ALL);
-    cl_program program = probe_program(kernel_text, text_c(&prelude), "-cl-std=CL1.2");
-    text_free(&prelude);
-    return program;
-}
-
 typedef struct {
     bool is_double, from_eye;
 } Variant;
@@ -222,7 +206,8 @@ static void culling_check(void **state)
     const Variant *variant = *state;
     const bool is_double = variant->is_double, from_eye = variant->from_eye;
     if (is_double && !probe_has(PRECISION_DOUBLE)) skip();
-    cl_program program = culling_program(is_double);
+    cl_program program = probe_program(kernel_text, 1, is_double ? PRECISION_DOUBLE : PRECISION_SINGLE, true,
+                                       0, "-cl-std=CL1.2");
     Trial trial = {.is_double = is_double,
                    .unit_roundoff = is_double ? DBL_EPSILON / 2 : FLT_EPSILON / 2,
                    .random = {7}};

@@ -65,19 +65,7 @@ static Arguments arguments_of(cl_kernel kernel, const char *name)
 
 static cl_program program_with_arguments(const char *text)
 {
-    Text prelude = {0};
-    static const char *const zeros[] = {"IS_STRICT",      "IS_DOUBLE",   "IS_CERTIFIED", "IS_PIXEL_LIST",
-                                        "REPAIRS_DIVIDE", "IS_COUNTING", "PERTURB",      "PERTURB_SEED"};
-    static const char *const ones[] = {"LANES", "HAS_FMA", "PENDING_MAX", "PERTURB_SCALE"};
-    for (size_t i = 0; i < COUNT_OF(zeros); i++)
-        text_appendf(&prelude, "#define %s 0\n", zeros[i]);
-    for (size_t i = 0; i < COUNT_OF(ones); i++)
-        text_appendf(&prelude, "#define %s 1\n", ones[i]);
-    text_appendf(&prelude, "#define STACK_CAPACITY 40\n");
-    features_write_prelude(&prelude, FEATURE_ALL);
-    cl_program program = probe_program(text, text_c(&prelude), "-cl-std=CL1.2 -cl-kernel-arg-info");
-    text_free(&prelude);
-    return program;
+    return probe_program(text, 1, PRECISION_SINGLE, true, 0, "-cl-std=CL1.2 -cl-kernel-arg-info");
 }
 
 // The kernel of this test has arguments of known sizes.

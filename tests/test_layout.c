@@ -209,9 +209,8 @@ static cl_program program_make(bool is_double)
 {
     Text text = {0};
     kernels_write(&text);
-    const char *prelude =
-        is_double ? "#define LANES 1\n#define IS_DOUBLE 1\n" : "#define LANES 1\n#define IS_DOUBLE 0\n";
-    cl_program program = probe_program(text_c(&text), prelude, "-cl-std=CL1.2");
+    cl_program program = probe_program(text_c(&text), 1, is_double ? PRECISION_DOUBLE : PRECISION_SINGLE,
+                                       true, 0, "-cl-std=CL1.2");
     text_free(&text);
     return program;
 }

@@ -48,14 +48,7 @@ static const char fma_text[] =
 static void repair(uint32_t seed, const float *a, const float *b, float *quotients, float *roots)
 {
     const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT;
-    char prelude[256];
-    snprintf(prelude, sizeof prelude,
-             "#define LANES 1\n#define IS_STRICT 1\n#define IS_CERTIFIED 0\n#define "
-             "IS_DOUBLE 0\n#define HAS_FMA 1\n"
-             "#define REPAIRS_DIVIDE 1\n#define PERTURB 1\n#define PERTURB_SCALE 1\n"
-             "#define PERTURB_SEED %uu\n",
-             seed);
-    cl_program program = probe_program(repair_text, prelude, "-cl-std=CL1.2");
+    cl_program program = probe_program(repair_text, 1, PRECISION_STRICT, true, seed, "-cl-std=CL1.2");
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "repair");
     cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),
@@ -130,14 +123,7 @@ static void multiply_add(unsigned lanes, const float *a, const float *b, const f
                          float *errors)
 {
     const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT / lanes;
-    char prelude[256];
-    snprintf(
-        prelude, sizeof prelude,
-        "#define LANES %u\n#define IS_STRICT 1\n#define IS_CERTIFIED 0\n#define "
-        "IS_DOUBLE 0\n#define HAS_FMA 0\n"
-        "#define REPAIRS_DIVIDE 0\n#define PERTURB 0\n#define PERTURB_SCALE 1\n#define PERTURB_SEED 0u\n",
-        lanes);
-    cl_program program = probe_program(fma_text, prelude, "-cl-std=CL1.2");
+    cl_program program = probe_program(fma_text, lanes, PRECISION_STRICT, false, 0, "-cl-std=CL1.2");
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "multiply_add");
     cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
                         buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),

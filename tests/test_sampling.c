@@ -32,13 +32,8 @@ static const char text[] =
 // Returns the first points of a pixel's area, freed by the caller.
 static Points *points_make(bool is_double, int32_t column, int32_t row, uint32_t area)
 {
-    char prelude[256];
-    snprintf(prelude, sizeof prelude,
-             "#define LANES 1\n#define IS_DOUBLE %d\n#define IS_STRICT %d\n#define HAS_FMA 1\n"
-             "#define REPAIRS_DIVIDE 0\n#define PERTURB 0\n#define PERTURB_SCALE 1\n#define PERTURB_SEED "
-             "0u\n#define IS_CERTIFIED 0\n",
-             is_double, !is_double);
-    cl_program program = probe_program(text, prelude, "-cl-std=CL1.2");
+    cl_program program =
+        probe_program(text, 1, is_double ? PRECISION_DOUBLE : PRECISION_STRICT, true, 0, "-cl-std=CL1.2");
     cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "points");
     Points *points = memory_allocate(1, sizeof *points);
     cl_mem square = buffer_create(&probe_compute, sizeof points->square, NULL, CL_MEM_READ_WRITE),
