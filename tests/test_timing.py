@@ -85,7 +85,9 @@ class Timing(TestCase):
     def test_trace(self):
         """Stages follow each other, commands lie within bands, and each is called, queued, submitted and run in turn."""
         write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-        write("mesh.yaml", PLANE.replace("objects: [", "objects: [{mesh: {file: mesh.obj}}, "))
+        # with the features of test_view.py's scene
+        write("mesh.yaml", "camera: {position: [0, 1, -4], look_at: [0, 0, 0], fov: 60}\nlights: [{point: {position: [3, 4, -5]}}]\n"
+              "objects: [{mesh: {file: mesh.obj}}]\n")
         for _ in range(2):
             trace = self.json("render mesh.yaml --size 320x180 --quiet --timing=trace -o trace.png --aov t")
         self.assertEqual((trace["otherData"]["schema"], trace["otherData"]["kernels_from_cache"]), (1, True))
