@@ -100,6 +100,10 @@ TEST(lanes_agree_on_aovs)
     "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0], fov: 40}\n"                                    \
     "background: [0.1, 0.2, 0.4]\nambient: [0.5, 0.5, 0.5]\n"
 #define SPHERE "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1}}]\n"
+#define BALL(material, others)                                                                               \
+    "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {" material "}}}" others "]\n"
+#define BEFORE ", {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}"
+#define BEHIND ", {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}"
 
 enum { LONG_SCENES = 5 }; // the last ones
 
@@ -132,20 +136,13 @@ static const struct {
     {FEATURE_TORI | FEATURE_OVALS, SCENE_HEAD
      "objects: [{torus: {center: [0, 0.5, 0], axis: [0.3, 1, 0.2], major: 1, minor: 0.4, transform: {scale: "
      "[0.6, 1.2, 1]}}}]\n"},
-    {FEATURE_SPHERES | FEATURE_REFLECTION,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {reflection: 0.5}}},\n"
-                "  {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}]\n"},
-    {FEATURE_SPHERES | FEATURE_TRANSMISSION,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9}}},\n"
-                "  {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
-    {FEATURE_SPHERES | FEATURE_REFLECTION | FEATURE_TINTS, SCENE_HEAD
-     "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {reflection: [0.9, 0.5, 0]}}},\n"
-     "  {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}]\n"},
-    {FEATURE_SPHERES | FEATURE_EMISSION, SCENE_HEAD
-     "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {emission: [0.9, 3, 0]}}}]\n"},
-    {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_FRESNEL, SCENE_HEAD
-     "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-     "  material: {transmission: 0.9, fresnel: true}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
+    {FEATURE_SPHERES | FEATURE_REFLECTION, SCENE_HEAD BALL("reflection: 0.5", BEFORE)},
+    {FEATURE_SPHERES | FEATURE_TRANSMISSION, SCENE_HEAD BALL("transmission: 0.9", BEHIND)},
+    {FEATURE_SPHERES | FEATURE_REFLECTION | FEATURE_TINTS,
+     SCENE_HEAD BALL("reflection: [0.9, 0.5, 0]", BEFORE)},
+    {FEATURE_SPHERES | FEATURE_EMISSION, SCENE_HEAD BALL("emission: [0.9, 3, 0]", "")},
+    {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_FRESNEL,
+     SCENE_HEAD BALL("transmission: 0.9, fresnel: true", BEHIND)},
     {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_TINTS | FEATURE_FILTERS | FEATURE_DIRECTIONAL_LIGHTS,
      SCENE_HEAD
      "lights: [{directional: {direction: [0, -1, 1]}}]\n"
@@ -153,11 +150,9 @@ static const struct {
      "  {sphere: {center: [-0.4, 1.8, -1], radius: 0.3, material: {transmission: [0.8, 0, 0.4]}}},\n"
      "  {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
     {FEATURE_SPHERES | FEATURE_REFLECTION | FEATURE_TINTS | FEATURE_CONDUCTORS,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {conductor: gold}}},\n"
-                "  {sphere: {center: [-0.9, 0.2, -2], radius: 0.5}}]\n"},
+     SCENE_HEAD BALL("conductor: gold", BEFORE)},
     {FEATURE_SPHERES | FEATURE_TRANSMISSION | FEATURE_TINTS | FEATURE_ABSORPTION,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1, material: {transmission: 0.9,\n"
-                "  absorption: {color: [0.1, 0.9, 0]}}}}, {sphere: {center: [0.9, 0.2, 2], radius: 0.5}}]\n"},
+     SCENE_HEAD BALL("transmission: 0.9, absorption: {color: [0.1, 0.9, 0]}", BEHIND)},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n" SPHERE},
     {FEATURE_SPHERES | FEATURE_POINT_LIGHTS | FEATURE_FADING_LIGHTS,
      SCENE_HEAD "lights: [{point: {position: [2, 3, -4], intensity: 20, falloff: inverse_square}}]\n" SPHERE},
@@ -183,10 +178,8 @@ static const struct {
     {FEATURE_SKY | FEATURE_IMAGES, "camera: {position: [0.3, 1.4, -5], look_at: [0, 0.4, 0]}\n"
                                    "background: {image: scenes/images/globe.png}\n"},
     {FEATURE_SPHERES | FEATURE_CHECKERS,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-                "  material: {checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}}}}]\n"},
-    {FEATURE_SPHERES | FEATURE_IMAGES, SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-                                                  "  material: {image: scenes/images/globe.png}}}]\n"},
+     SCENE_HEAD BALL("checker: {colors: [[1, 1, 1], [0, 0, 0]], size: 0.3}", "")},
+    {FEATURE_SPHERES | FEATURE_IMAGES, SCENE_HEAD BALL("image: scenes/images/globe.png", "")},
     {FEATURE_TRIANGLES | FEATURE_IMAGES, SCENE_HEAD "objects: [{mesh: {file: tests/textures/quad.obj,\n"
                                                     "  material: {image: scenes/images/globe.png}}}]\n"},
     {FEATURE_TRIANGLES | FEATURE_IMAGES | FEATURE_CUTOUTS | FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD
@@ -195,12 +188,10 @@ static const struct {
      "objects: [{mesh: {file: tests/textures/quad.obj, material: leaf}},\n"
      "  {mesh: {file: tests/textures/quad.obj, material: leaf, transform: {translate: [0.5, 0, 1]}}}]\n"},
     {FEATURE_SPHERES | FEATURE_IMAGES | FEATURE_CUTOUTS,
-     SCENE_HEAD "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-                "  material: {image: tests/textures/leaf.png, cutout: 0.5}}}]\n"},
+     SCENE_HEAD BALL("image: tests/textures/leaf.png, cutout: 0.5", "")},
     {FEATURE_SPHERES | FEATURE_IMAGES | FEATURE_NORMAL_MAPS | FEATURE_REFLECTION | FEATURE_DIRECTIONAL_LIGHTS,
-     SCENE_HEAD "lights: [{directional: {direction: [2, -1, 0.6]}}]\n"
-                "objects: [{sphere: {center: [0.2, 0.5, 0], radius: 1,\n"
-                "  material: {normal_map: scenes/images/globe.png, reflection: 0.5}}}]\n"},
+     SCENE_HEAD "lights: [{directional: {direction: [2, -1, 0.6]}}]\n" BALL(
+         "normal_map: scenes/images/globe.png, reflection: 0.5", "")},
     // where tests are long
     {FEATURE_POINT_LIGHTS, SCENE_HEAD "lights: [{point: {position: [2, 3, -4]}}]\n"},
     {FEATURE_DIRECTIONAL_LIGHTS, SCENE_HEAD "lights: [{directional: {direction: [1, -1, 2]}}]\n"},
@@ -262,25 +253,6 @@ TEST(features_alone_and_all_together_agree)
     same_and_freed(&checkers, &general, "checkers alone");
     film_free(&general);
     scene_free(&empty);
-}
-
-TEST(bands_agree)
-{
-    static const uint32_t band_rows[] = {1, 7, 32};
-    RenderSettings settings = film_settings(WIDTH, HEIGHT, probe_same_bits_from());
-    Film expected = render(&every_shape, &settings);
-    for (size_t i = 0; i < 3; i++) {
-        settings.band_rows = band_rows[i];
-        char what[32];
-        snprintf(what, sizeof what, "bands of %u rows", band_rows[i]);
-        Film film = render(&every_shape, &settings);
-        same_and_freed(&film, &expected, what);
-    }
-    settings.band_rows = 0;
-    settings.band_seconds = 1e-9;
-    Film shortest = render(&every_shape, &settings);
-    same_and_freed(&shortest, &expected, "the shortest bands by time");
-    film_free(&expected);
 }
 
 // With bands as short as they can be, each sample of a pixel has a separate launch.
@@ -465,7 +437,6 @@ int main(void)
         cmocka_unit_test(lanes_agree),
         cmocka_unit_test(lanes_agree_on_aovs),
         cmocka_unit_test(features_alone_and_all_together_agree),
-        cmocka_unit_test(bands_agree),
         cmocka_unit_test(launches_of_samples_agree),
         cmocka_unit_test(regions_are_cuts_of_the_whole),
         cmocka_unit_test(shifted_frames_are_cuts_of_a_larger_one),
