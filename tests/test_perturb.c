@@ -9,7 +9,7 @@
 #include <float.h>
 #include <math.h>
 
-enum { OPERAND_COUNT = 1 << 20 };
+enum { OPERAND_COUNT = 1 << 20, ARRAYS_MAX = 5 };
 
 // The device's quotients overflow and underflow too early, as an NVIDIA H100's do.
 static const char repair_text[] = "#include \"numerics/perturb.h\"\n"
@@ -44,23 +44,24 @@ static const char fma_text[] =
     "    }\n"
     "}\n";
 
-// Runs the kernel on a and b. The results belong to the caller.
-static void repair(uint32_t seed, const float *a, const float *b, float *quotients, float *roots)
+// Runs a kernel, whose program it releases, on arrays of OPERAND_COUNT floats, of which the first are inputs.
+static void kernel_run(cl_program program, const char *name, size_t work_items, float *const *numbers,
+                       size_t input_count, size_t count)
 {
-    const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT;
-    cl_program program = probe_program(repair_text, 1, PRECISION_STRICT, true, seed, "-cl-std=CL1.2");
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "repair");
-    cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
-                        buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),
-                        buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY),
-                        buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY)};
-    for (cl_uint i = 0; i < 4; i++)
-        kernel_argument(&probe_compute, kernel, i, sizeof(cl_mem), &buffers[i]);
-    kernel_launch(&probe_compute, kernel, 1, &count, NULL);
-    buffer_read(&probe_compute, buffers[2], size, quotients);
-    buffer_read(&probe_compute, buffers[3], size, roots);
-    for (size_t i = 0; i < 4; i++)
+    const size_t size = OPERAND_COUNT * sizeof **numbers;
+    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, name);
+    cl_mem buffers[ARRAYS_MAX];
+    for (size_t i = 0; i < count; i++) {
+        const bool is_input = i < input_count;
+        buffers[i] = buffer_create(&probe_compute, size, is_input ? numbers[i] : NULL,
+                                   is_input ? CL_MEM_READ_ONLY : CL_MEM_WRITE_ONLY);
+        kernel_argument(&probe_compute, kernel, (cl_uint)i, sizeof(cl_mem), &buffers[i]);
+    }
+    kernel_launch(&probe_compute, kernel, 1, &work_items, NULL);
+    for (size_t i = 0; i < count; i++) {
+        if (i >= input_count) buffer_read(&probe_compute, buffers[i], size, numbers[i]);
         buffer_release(buffers[i]);
+    }
     clReleaseKernel(kernel);
     clReleaseProgram(program);
 }
@@ -102,7 +103,8 @@ TEST(wrong_quotients_and_roots_are_repaired)
     float *a = numbers[0], *b = numbers[1], *quotients = numbers[2], *roots = numbers[3];
     operands_make(a, b);
     for (uint32_t seed = 1; seed <= 4; seed++) {
-        repair(seed, a, b, quotients, roots);
+        kernel_run(probe_program(repair_text, 1, PRECISION_STRICT, true, seed, "-cl-std=CL1.2"), "repair",
+                   OPERAND_COUNT, numbers, 2, 4);
         for (size_t i = 0; i < OPERAND_COUNT; i++) {
             float quotient = a[i] / b[i], root = sqrtf(fabsf(a[i]));
             bool normal = fabsf(b[i]) >= FLT_MIN && fabsf(quotient) >= FLT_MIN && isfinite(quotient);
@@ -116,29 +118,6 @@ TEST(wrong_quotients_and_roots_are_repaired)
     }
     for (size_t i = 0; i < 4; i++)
         free(numbers[i]);
-}
-
-// Runs the kernel on a, b and c. The results belong to the caller.
-static void multiply_add(unsigned lanes, const float *a, const float *b, const float *c, float *sums,
-                         float *errors)
-{
-    const size_t size = OPERAND_COUNT * sizeof *a, count = OPERAND_COUNT / lanes;
-    cl_program program = probe_program(fma_text, lanes, PRECISION_STRICT, false, 0, "-cl-std=CL1.2");
-    cl_kernel kernel = program_kernel(&probe_compute, &(Program){.program = program}, "multiply_add");
-    cl_mem buffers[] = {buffer_create(&probe_compute, size, a, CL_MEM_READ_ONLY),
-                        buffer_create(&probe_compute, size, b, CL_MEM_READ_ONLY),
-                        buffer_create(&probe_compute, size, c, CL_MEM_READ_ONLY),
-                        buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY),
-                        buffer_create(&probe_compute, size, NULL, CL_MEM_WRITE_ONLY)};
-    for (cl_uint i = 0; i < 5; i++)
-        kernel_argument(&probe_compute, kernel, i, sizeof(cl_mem), &buffers[i]);
-    kernel_launch(&probe_compute, kernel, 1, &count, NULL);
-    buffer_read(&probe_compute, buffers[3], size, sums);
-    buffer_read(&probe_compute, buffers[4], size, errors);
-    for (size_t i = 0; i < 5; i++)
-        buffer_release(buffers[i]);
-    clReleaseKernel(kernel);
-    clReleaseProgram(program);
 }
 
 // Makes a, b and c. In a quarter c is any, in a quarter it is within a few ulp of the product, in a quarter
@@ -190,7 +169,8 @@ TEST(fma_in_software_is_exact)
     float *a = numbers[0], *b = numbers[1], *c = numbers[2], *sums = numbers[3], *errors = numbers[4];
     terms_make(a, b, c);
     for (unsigned lanes = 1; lanes <= 16; lanes *= 4) {
-        multiply_add(lanes, a, b, c, sums, errors);
+        kernel_run(probe_program(fma_text, lanes, PRECISION_STRICT, false, 0, "-cl-std=CL1.2"),
+                   "multiply_add", OPERAND_COUNT / lanes, numbers, 3, 5);
         for (size_t i = 0; i < OPERAND_COUNT; i++) {
             float product = a[i] * b[i], sum = fmaf(a[i], b[i], c[i]);
             if (isinf(product) && isinf(c[i])) continue; // may be NaN
