@@ -523,6 +523,10 @@ class Aovs(CliTestCase):
                 hashed = (hashed ^ byte) * 0x100000001B3 % 2**64
             self.assertEqual(name.partition(".")[0], f"{hashed:016x}")
         self.refuses("render sphere.yaml --capture none/launches", "--capture: cannot create the folder 'none/launches'")
+        # a folder is made only once the whole command line was accepted
+        for mistake in "--lanes 3", "--alpha -o image.npy", "--skip-existing --timing=json":
+            self.refuses(f"render sphere.yaml --capture unmade {mistake}", "glint( render)?: ")
+            self.assertFalse(Path("unmade").exists())
         # locate would repeat what is left of other renders
         self.refuses("render sphere.yaml --capture launches", "--capture: the folder 'launches' is not empty")
         limit = (4096, resource.RLIM_INFINITY)  # below the size of a kernel's text

@@ -16,6 +16,7 @@
 
 typedef struct {
     VariantOptions variants;
+    Operands scenes;
     const char *reference_path, *folder, *page_path;
     AccuracyBudgets budgets;
     ReportOptions report;
@@ -36,19 +37,32 @@ static const Option options_own[] = {
     {"budget", "LIST",
      "errors to allow: report the fastest configuration within each (default: 1e-2,1e-4,1e-6)", budgets_read,
      0, NUMBERS_ABOVE(0, INFINITY)},
-    {"save", "FOLDER", "write all compared arrays there, as .npy", option_folder,
-     offsetof(AccuracyOptions, folder)},
+    {"save", "FOLDER", "write all compared arrays there, as .npy", option_text,
+     offsetof(AccuracyOptions, folder), .effect = folder_create},
     {"html", "FILE", "self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
     {"precision", "LIST", "any of single, strict, double, certified (default: the first three)", option_set,
      offsetof(AccuracyOptions, variants.precisions), NAMES(precision_names)}};
 
+static bool options_check(void *accuracy_options)
+{
+    AccuracyOptions *options = accuracy_options;
+    if (options->page_path && strcmp(options->page_path, "-") == 0)
+        return option_usage_fault("accuracy", "--html needs the name of a file");
+    if (options->reference_path && options->scenes.count > 1)
+        return option_usage_fault("accuracy", "--reference takes one scene, but several are given");
+    return report_options_check(&options->report, &accuracy_table);
+}
+
 static const CommandLine command_line = {
+    .command = "accuracy",
     .usage = "usage: glint accuracy SCENE... [OPTIONS]\n\n"
              "Measures speed and error of scenes in every requested configuration. The reference takes the "
              "largest of --samples.\n",
     .groups = {OPTIONS(options_own), VARIANT_GROUPS(AccuracyOptions, variants),
                OPTIONS_WITHIN(perturb_option, AccuracyOptions, variants.common),
-               OPTIONS_WITHIN(report_options, AccuracyOptions, report)}};
+               OPTIONS_WITHIN(report_options, AccuracyOptions, report)},
+    OPERANDS(SCENES, AccuracyOptions, scenes),
+    .check = options_check};
 
 typedef struct {
     AccuracyOptions options;
@@ -59,22 +73,6 @@ typedef struct {
     OutputFile page; // opened before measuring, so that a failure shows early
     MessageList messages;
 } Accuracy;
-
-static int options_read(AccuracyOptions *options, int argument_count, char **arguments)
-{
-    *options = (AccuracyOptions){.variants = variant_options_default,
-                                 .budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3}};
-    options->variants.precisions = (1u << ARITHMETIC_COUNT) - 1;
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    if (optind == argument_count) return option_usage_fault("accuracy", "no scene given");
-    if (options->page_path && strcmp(options->page_path, "-") == 0)
-        return option_usage_fault("accuracy", "--html needs the name of a file");
-    if (options->reference_path && optind + 1 != argument_count)
-        return option_usage_fault("accuracy", "--reference takes one scene, but several are given");
-    if (!report_options_check(&options->report, &accuracy_table)) return EXIT_USER;
-    return OPTIONS_READ;
-}
 
 // Returns the image's colors, with each square of factor x factor pixels averaged into one pixel.
 static double *colors_shrunk(const Image *image, uint32_t factor)
@@ -338,13 +336,15 @@ static void accuracy_close(Accuracy *accuracy)
 
 int command_accuracy(int argument_count, char **arguments)
 {
-    Accuracy accuracy = {0};
-    int status = options_read(&accuracy.options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
+    Accuracy accuracy = {.options = {.variants = variant_options_default,
+                                     .budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3}}};
     const AccuracyOptions *options = &accuracy.options;
-    const size_t scene_count = (size_t)(argument_count - optind);
+    accuracy.options.variants.precisions = (1u << ARITHMETIC_COUNT) - 1;
+    int status = command_line_read(&command_line, &accuracy.options, argument_count, arguments);
+    if (status != OPTIONS_READ) return status;
     status = EXIT_USER;
-    bool opened = variant_set_open(&accuracy.set, &options->variants, 1, arguments + optind, scene_count) &&
+    bool opened = variant_set_open(&accuracy.set, &options->variants, 1, options->scenes.items,
+                                   options->scenes.count) &&
                   (!options->reference_path || reference_read(&accuracy)) &&
                   device_open(&accuracy.open, &options->variants.common);
     if (opened) status = accuracy_run(&accuracy);

@@ -16,6 +16,7 @@ enum { VARIANTS_MAX = 32 };
 
 typedef struct {
     VariantOptions variants;
+    Operands scenes;
     double tolerance; // 0 if not given
     const char *baseline, *against;
     ReportOptions report;
@@ -60,27 +61,10 @@ static const Option precisions_option[] = {
     {"precision", "LIST", "any of single, strict, double, certified (default: single)", option_set,
      offsetof(VariantOptions, precisions), NAMES(precision_names)}};
 
-static const CommandLine command_line = {
-    .usage =
-        "usage: glint bench SCENE... [OPTIONS]\n\n"
-        "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 "
-        "same or faster,\n3 slower, 4 too noisy to decide.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precisions_option, BenchOptions, variants),
-               VARIANT_GROUPS(BenchOptions, variants),
-               OPTIONS_WITHIN(driver_options, BenchOptions, variants.common),
-               OPTIONS_WITHIN(keep_kernels_option, BenchOptions, variants.common),
-               OPTIONS_WITHIN(report_options, BenchOptions, report)}};
-
 // The options that --variant accepts.
 static const CommandLine variant_line = {.groups = {OPTIONS(precisions_option),
                                                     OPTIONS(variant_choice_options),
                                                     OPTIONS_WITHIN(driver_options, VariantOptions, common)}};
-
-typedef struct {
-    BenchOptions options;
-    OpenDevice open;
-    VariantSet set;
-} Bench;
 
 // Splits a text in place at blanks outside of quotes and removes the quotes, ' or ". Adds each word to
 // `words`. Returns false if a quote is not closed.
@@ -132,10 +116,9 @@ static bool variant_read(BenchOptions *options, size_t index)
     return is_valid;
 }
 
-// Reads the variants, which start from the options of all rows. Restores `optind`.
+// Reads the variants, which start from the options of all rows.
 static bool variants_read(BenchOptions *options)
 {
-    const int first_scene = optind;
     for (size_t i = 0; i < options->variant_count; i++) {
         for (size_t k = 0; k < i; k++)
             if (strcmp(options->variant_texts[i], options->variant_texts[k]) == 0) {
@@ -144,9 +127,40 @@ static bool variants_read(BenchOptions *options)
             }
         if (!variant_read(options, i)) return false;
     }
-    optind = first_scene;
     return true;
 }
+
+static bool options_check(void *bench_options)
+{
+    BenchOptions *options = bench_options;
+    if (options->against && options->baseline)
+        return option_usage_fault("bench", "--against cannot be combined with --compare");
+    for (size_t i = 0; options->against && i < options->scenes.count; i++)
+        if (strcmp(options->scenes.items[i], "-") == 0)
+            return option_usage_fault("bench",
+                                      "--against reads each scene several times, so it cannot be '-'");
+    return variants_read(options) && report_options_check(&options->report, &bench_table);
+}
+
+static const CommandLine command_line = {
+    .command = "bench",
+    .usage =
+        "usage: glint bench SCENE... [OPTIONS]\n\n"
+        "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 "
+        "same or faster,\n3 slower, 4 too noisy to decide.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precisions_option, BenchOptions, variants),
+               VARIANT_GROUPS(BenchOptions, variants),
+               OPTIONS_WITHIN(driver_options, BenchOptions, variants.common),
+               OPTIONS_WITHIN(keep_kernels_option, BenchOptions, variants.common),
+               OPTIONS_WITHIN(report_options, BenchOptions, report)},
+    OPERANDS(SCENES, BenchOptions, scenes),
+    .check = options_check};
+
+typedef struct {
+    BenchOptions options;
+    OpenDevice open;
+    VariantSet set;
+} Bench;
 
 // Returns whether the device allows the work-groups of all variants, and prints an error if not.
 static bool work_groups_are_allowed(const Bench *bench)
@@ -288,22 +302,11 @@ int command_bench(int argument_count, char **arguments)
     const BenchOptions *options = &bench.options;
     int status = command_line_read(&command_line, &bench.options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    if (optind == argument_count) return option_usage_fault("bench", "no scene given");
-    if (options->against && options->baseline)
-        return option_usage_fault("bench", "--against cannot be combined with --compare");
-    for (int i = optind; options->against && i < argument_count; i++)
-        if (strcmp(arguments[i], "-") == 0)
-            return option_usage_fault("bench",
-                                      "--against reads each scene several times, so it cannot be '-'");
-    if (!report_options_check(&bench.options.report, &bench_table)) return EXIT_USER;
-
     status = EXIT_USER;
     const VariantOptions *choices =
         options->variant_count > 0 ? options->variant_options : &options->variants;
     const size_t choice_count = options->variant_count > 0 ? options->variant_count : 1;
-    if (variants_read(&bench.options) &&
-        variant_set_open(&bench.set, choices, choice_count, arguments + optind,
-                         (size_t)(argument_count - optind)))
+    if (variant_set_open(&bench.set, choices, choice_count, options->scenes.items, options->scenes.count))
         status = scenes_bench(&bench, argument_count, arguments);
     variant_set_close(&bench.set);
     for (size_t i = 0; i < bench.options.variant_count; i++)

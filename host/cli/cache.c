@@ -15,10 +15,12 @@ static const Option options_own[] = {
     {"clear", NULL, "remove them all", option_flag, offsetof(CacheOptions, clears)}};
 
 static const CommandLine command_line = {
+    .command = "cache",
     .usage = "usage: glint cache [OPTIONS]\n\n"
              "Lists and checks the programs of the kernel cache, the least recently used first.\nExit status "
              "3: one is damaged or not private.\n",
-    .groups = {OPTIONS(options_own)}};
+    .groups = {OPTIONS(options_own)},
+    .operands = OPERANDS_NONE};
 
 // Returns whether all entries can be trusted.
 static bool entries_print(const CacheEntries *entries)
@@ -57,7 +59,6 @@ int command_cache(int argument_count, char **arguments)
     CacheOptions options = {0};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    if (optind != argument_count) return option_usage_fault("cache", "takes no arguments");
     char *folder = cache_folder_path();
     if (!folder) {
         fputs("glint: there is no kernel cache: neither XDG_CACHE_HOME nor HOME is an absolute path\n",

@@ -58,7 +58,13 @@ static const Option options_own[] = {
     BOUNCES_OPTION(CertifyOptions, bounce_count),
     MIN_CONTRIBUTION_OPTION(CertifyOptions, min_contribution)};
 
+static bool options_check(void *certify_options)
+{
+    return report_options_check(&((CertifyOptions *)certify_options)->report, &certify_table);
+}
+
 static const CommandLine command_line = {
+    .command = "certify",
     .usage =
         "usage: glint certify SCENE [OPTIONS]\n\n"
         "Compares the image at each precision with a reference in quadruple precision, on a sample of its "
@@ -70,18 +76,9 @@ static const CommandLine command_line = {
                OPTIONS_WITHIN(reference_option, CertifyOptions, common),
                OPTIONS_WITHIN(common_options, CertifyOptions, common),
                OPTIONS_WITHIN(perturb_option, CertifyOptions, common),
-               OPTIONS_WITHIN(report_options, CertifyOptions, report)}};
-
-static int options_read(CertifyOptions *options, int argument_count, char **arguments)
-{
-    *options = (CertifyOptions){.pixels = PIXELS_DEFAULT, .bounce_count = BOUNCES_DEFAULT};
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    if (!option_only_scene("certify", argument_count, arguments)) return EXIT_USER;
-    options->scene = arguments[optind];
-    if (!report_options_check(&options->report, &certify_table)) return EXIT_USER;
-    return OPTIONS_READ;
-}
+               OPTIONS_WITHIN(report_options, CertifyOptions, report)},
+    OPERANDS(SCENE, CertifyOptions, scene),
+    .check = options_check};
 
 typedef struct {
     const CertifyOptions *options;
@@ -329,8 +326,8 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
 
 int command_certify(int argument_count, char **arguments)
 {
-    CertifyOptions options;
-    int status = options_read(&options, argument_count, arguments);
+    CertifyOptions options = {.pixels = PIXELS_DEFAULT, .bounce_count = BOUNCES_DEFAULT};
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Scene scene = {0};
     OpenDevice open;

@@ -18,7 +18,8 @@
 
 typedef struct {
     CommonOptions common;
-    bool as_json, is_one_of_several;
+    Operands scenes;
+    bool as_json;
     uint32_t object; // UINT32_MAX if not given
 } CheckOptions;
 
@@ -27,12 +28,25 @@ static const Option options_own[] = {
      offsetof(CheckOptions, object), NUMBERS(0, UINT32_MAX - 1)},
     {"json", NULL, "print JSON", option_flag, offsetof(CheckOptions, as_json)}};
 
+static bool options_check(void *check_options)
+{
+    const CheckOptions *options = check_options;
+    if (options->as_json && options->object != UINT32_MAX)
+        return option_usage_fault("check", "--object cannot be combined with --json");
+    if (options->scenes.count > 1 && (options->as_json || options->object != UINT32_MAX))
+        return option_usage_fault("check", "--json and --object take one scene, but several are given");
+    return true;
+}
+
 static const CommandLine command_line = {
+    .command = "check",
     .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
              "ignored. Of several scenes it prints one line each.\n",
     .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CheckOptions, common),
-               COMMON_OPTION(COMMON_LENIENT, CheckOptions, common)}};
+               COMMON_OPTION(COMMON_LENIENT, CheckOptions, common)},
+    OPERANDS(SCENES, CheckOptions, scenes),
+    .check = options_check};
 
 typedef struct {
     size_t shapes[SHAPE_COUNT], mesh_triangle_count, unbounded_count;
@@ -214,11 +228,11 @@ static bool scene_check(const CheckOptions *options, const char *path)
         json_report(path, &scene, loaded, &messages);
         message_list_free(&messages);
     } else {
-        if (options->is_one_of_several) line_print(path, &scene, loaded, &messages);
+        if (options->scenes.count > 1) line_print(path, &scene, loaded, &messages);
         messages_print(&messages, path);
         if (loaded && options->object != UINT32_MAX) {
             loaded = object_print(&scene, path, options->object);
-        } else if (loaded && !options->is_one_of_several) {
+        } else if (loaded && options->scenes.count == 1) {
             SceneFacts facts = facts_of(&scene);
             text_print(path, &scene, &facts);
         }
@@ -232,14 +246,8 @@ int command_check(int argument_count, char **arguments)
     CheckOptions options = {.object = UINT32_MAX};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    if (optind == argument_count) return option_usage_fault("check", "no scene given");
-    if (options.as_json && options.object != UINT32_MAX)
-        return option_usage_fault("check", "--object cannot be combined with --json");
-    options.is_one_of_several = argument_count - optind > 1;
-    if (options.is_one_of_several && (options.as_json || options.object != UINT32_MAX))
-        return option_usage_fault("check", "--json and --object take one scene, but several are given");
     status = EXIT_DONE;
-    for (int i = optind; i < argument_count; i++)
-        if (!scene_check(&options, arguments[i])) status = EXIT_USER;
+    for (size_t i = 0; i < options.scenes.count; i++)
+        if (!scene_check(&options, options.scenes.items[i])) status = EXIT_USER;
     return status;
 }

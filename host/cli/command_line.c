@@ -182,21 +182,23 @@ bool option_set(const Option *option, const char *value, void *options)
     return true;
 }
 
-bool option_folder(const Option *option, const char *path, void *options)
+bool folder_create(const Option *option, void *options)
 {
+    const char *path = *(const char **)option_field(option, options);
     if (mkdir(path, 0777) != 0 && errno != EEXIST) {
         fprintf(stderr, "glint: --%s: cannot create the folder '%s': %s\n", option->name, path,
                 strerror(errno));
         return false;
     }
-    if (access(path, W_OK | X_OK) == 0) return option_text(option, path, options);
+    if (access(path, W_OK | X_OK) == 0) return true;
     fprintf(stderr, "glint: --%s: cannot write to '%s': %s\n", option->name, path, strerror(errno));
     return false;
 }
 
-bool option_new_folder(const Option *option, const char *path, void *options)
+bool folder_create_empty(const Option *option, void *options)
 {
-    if (!option_folder(option, path, options)) return false;
+    const char *path = *(const char **)option_field(option, options);
+    if (!folder_create(option, options)) return false;
     DIR *folder = opendir(path);
     if (!folder) {
         fprintf(stderr, "glint: --%s: cannot read the folder '%s': %s\n", option->name, path,
@@ -265,12 +267,33 @@ static int help_print(const CommandLine *line)
     return EXIT_DONE;
 }
 
+// Stores the operands. Returns false with a message if one is missing or superfluous.
+static bool operands_read(const CommandLine *line, void *options, Operands operands)
+{
+    void *field = (char *)options + line->operands_offset;
+    const bool takes_scenes = line->operands == OPERANDS_SCENE || line->operands == OPERANDS_SCENES;
+    if (takes_scenes && operands.count == 0) return option_usage_fault(line->command, "no scene given");
+    if (line->operands == OPERANDS_NONE && operands.count > 0)
+        return option_usage_fault(line->command, "takes no arguments");
+    if (line->operands == OPERANDS_SCENE && operands.count > 1) {
+        fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", line->command,
+                operands.items[1], line->command);
+        return false;
+    }
+    if (line->operands == OPERANDS_SCENE)
+        *(const char **)field = operands.items[0];
+    else if (line->operands > OPERANDS_SCENE)
+        *(Operands *)field = operands;
+    return true;
+}
+
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments)
 {
     struct {
         const Option *option;
         void *fields;
-    } listed[OPTIONS_MAX];
+        bool is_given;
+    } listed[OPTIONS_MAX] = {0};
     struct option long_options[OPTIONS_MAX + 2] = {0};
     char letters[2 * OPTIONS_MAX + 2] = "", *letter = letters;
     size_t count = 0;
@@ -299,23 +322,18 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
         while (long_options[i].val != code)
             i++;
         if (!listed[i].option->read(listed[i].option, optarg, listed[i].fields)) return EXIT_USER;
+        listed[i].is_given = true;
     }
-    return OPTIONS_READ;
+    const Operands operands = {arguments + optind, (size_t)(argument_count - optind)};
+    bool is_accepted = operands_read(line, options, operands) && (!line->check || line->check(options));
+    for (size_t i = 0; i < count && is_accepted; i++)
+        if (listed[i].is_given && listed[i].option->effect)
+            is_accepted = listed[i].option->effect(listed[i].option, listed[i].fields);
+    return is_accepted ? OPTIONS_READ : EXIT_USER;
 }
 
-int option_usage_fault(const char *command, const char *what)
+bool option_usage_fault(const char *command, const char *what)
 {
     fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
-    return EXIT_USER;
-}
-
-bool option_only_scene(const char *command, int argument_count, char **arguments)
-{
-    if (optind + 1 == argument_count) return true;
-    if (optind == argument_count)
-        option_usage_fault(command, "no scene given");
-    else
-        fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", command,
-                arguments[optind + 1], command);
     return false;
 }

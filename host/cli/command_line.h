@@ -9,16 +9,20 @@
 
 typedef struct Option Option;
 
-// Reads an option's value into the command's options. On a mistake prints what the option expects and returns
-// false.
+// Stores an option's value in the command's options, and has no other effect. On a mistake prints what the
+// option expects and returns false.
 typedef bool OptionReader(const Option *option, const char *value, void *options);
+// Carries out what a stored value asks for before the command starts, such as a new folder. Returns false
+// with a message if that fails.
+typedef bool OptionEffect(const Option *option, void *options);
 
 struct Option {
     const char *name;
     const char *argument; // as the help names it, [=STYLE] if it is optional; NULL for a flag
     const char *help;     // wrapped where it is printed; a line break starts an item of a list
     OptionReader *read;
-    size_t offset; // of the field, within the struct that the reader gets
+    size_t offset;        // of the field, within the struct that the reader and the effect get
+    OptionEffect *effect; // of an option that is given, once its command line was accepted; may be NULL
     // What the reader accepts, if it has a range or names. NUMBERS_ABOVE excludes `low`.
     double low, high;
     bool is_above;
@@ -47,31 +51,54 @@ typedef struct {
         (array), COUNT_OF(array), offsetof(Type, member), NULL                                               \
     }
 
+#define OPERANDS(rule, Type, member) .operands = OPERANDS_##rule, .operands_offset = offsetof(Type, member)
+
 enum { OPTION_GROUPS_MAX = 16 };
 
 typedef struct {
+    char **items;
+    size_t count;
+} Operands;
+
+// How many arguments may follow the options, and the type of the field that stores them.
+typedef enum {
+    OPERANDS_LEFT, // any, which are not stored; they start at getopt's `optind`
+    OPERANDS_NONE,
+    OPERANDS_SCENE,  // one, in a const char *
+    OPERANDS_SCENES, // at least one, in an Operands
+    OPERANDS_ANY     // in an Operands
+} OperandRule;
+
+typedef struct {
+    const char *command;
     const char *usage;                         // what the help prints before the options; NULL for no help
     void (*usage_print)(void);                 // prints more between the usage and the options; may be NULL
     OptionGroup groups[OPTION_GROUPS_MAX + 1]; // up to the first without items
+    OperandRule operands;
+    size_t operands_offset; // of their field in the command's struct
+    // Checks options and operands together. Returns false with a message if they do not fit. May be NULL.
+    bool (*check)(void *options);
 } CommandLine;
 
 // The result of reading a command line if the command must run. Any other result is the exit status.
 enum { OPTIONS_READ = -1 };
 
-// Reads the options into the struct. Other arguments start at getopt's `optind`. Returns OPTIONS_READ, or
-// the exit status after printing the help or a message.
+// Reads options and operands into the struct, checks the whole command line, and only then carries out the
+// effects of options. Returns OPTIONS_READ, or the exit status after printing the help or a message.
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments);
 
 // Readers. The types are those of their fields.
-OptionReader option_flag;       // bool: set
-OptionReader option_text;       // const char *
-OptionReader option_count;      // uint32_t: an integer from `low` to `high`
-OptionReader option_number;     // double, from `low` to `high`
-OptionReader option_size;       // uint32_t[2], of WxH
-OptionReader option_choice;     // an enum: the index of the name
-OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
-OptionReader option_folder;     // const char *: creates the folder, which must be writable
-OptionReader option_new_folder; // const char *: creates the folder, which must be writable and empty
+OptionReader option_flag;   // bool: set
+OptionReader option_text;   // const char *
+OptionReader option_count;  // uint32_t: an integer from `low` to `high`
+OptionReader option_number; // double, from `low` to `high`
+OptionReader option_size;   // uint32_t[2], of WxH
+OptionReader option_choice; // an enum: the index of the name
+OptionReader option_set;    // unsigned: one bit for each name of a comma-separated list
+
+// Effects of options whose value is the path of a folder, which must be writable.
+OptionEffect folder_create;
+OptionEffect folder_create_empty; // the folder must also be empty
 
 // What option_count and option_choice read, for readers that store it elsewhere.
 bool count_read(const Option *option, const char *value, uint32_t *count);
@@ -88,7 +115,5 @@ bool digits_read(const char *value, const char **end, uint64_t *result);
 bool option_fault(const Option *option, const char *value, const char *expected, ...)
     __attribute__((format(printf, 3, 4)));
 
-// Prints a usage error that points to --help and returns EXIT_USER.
-int option_usage_fault(const char *command, const char *what);
-// Returns whether exactly one argument is left. Otherwise prints what is missing or superfluous.
-bool option_only_scene(const char *command, int argument_count, char **arguments);
+// Prints a usage error that points to --help. Returns false.
+bool option_usage_fault(const char *command, const char *what);

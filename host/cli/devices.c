@@ -22,10 +22,12 @@ static const Option options_own[] = {
     {"json", NULL, "print JSON", option_flag, offsetof(DevicesOptions, as_json)}};
 
 static const CommandLine command_line = {
+    .command = "devices",
     .usage = "usage: glint devices [OPTIONS]\n\n"
              "Lists every OpenCL device of every platform; * marks the default. Then\n"
              "what the arithmetic of each really does, where that was measured.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)}};
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)},
+    .operands = OPERANDS_NONE};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
@@ -187,7 +189,6 @@ int command_devices(int argument_count, char **arguments)
     DevicesOptions options = {0};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    if (optind < argument_count) return option_usage_fault("devices", "takes no arguments");
 
     DeviceList list;
     device_list_open(&list);

@@ -25,6 +25,8 @@ static const struct {
 };
 
 typedef struct {
+    CommonOptions common;
+    Operands images;
     const char *reference_path, *test_path, *heatmap_path, *layer;
     ReportOptions report;
     double limits[LIMIT_COUNT]; // below 0 if not given
@@ -44,13 +46,46 @@ static const Option options_own[] = {
     {"layer", "NAME", "compare this layer of EXR files, not the default or only one", option_text,
      offsetof(DiffOptions, layer)}};
 
+static const ResultTable diff_table = {
+    .command = "diff",
+    .rows = "",
+    .columns = {{"reference", "reference"},
+                {"image", "image"},
+                {"equal", "equal"},
+                {"within limits", "met"},
+                {"differing values", "differing_values"},
+                {"largest error", "linear.max_abs"},
+                {"RMSE", "linear.rmse"},
+                {"PSNR dB", "linear.psnr"},
+                {"largest ulp", "max_ulp"},
+                {"8-bit off by 1", "srgb8.off_by_1"},
+                {"by more", "srgb8.off_by_2_or_more"},
+                {"FLIP mean", "flip.mean"}},
+    .name_count = 2,
+    .verdicts = {"met", "equal"},
+    .failed = "false",
+};
+
+static bool options_check(void *diff_options)
+{
+    DiffOptions *options = diff_options;
+    if (options->images.count != 2) return option_usage_fault("diff", "takes two images");
+    options->reference_path = options->images.items[0];
+    options->test_path = options->images.items[1];
+    if (options->heatmap_path && image_format_of(options->heatmap_path) == IMAGE_UNKNOWN)
+        return option_usage_fault("diff", "the heat map must end in .png, .ppm, .exr or .npy");
+    return report_options_check(&options->report, &diff_table);
+}
+
 static const CommandLine command_line = {
+    .command = "diff",
     .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
              "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
              "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
-    .groups = {OPTIONS(options_own),
-               {&common_options[COMMON_MAX_PIXELS], 1},
-               OPTIONS_WITHIN(report_options, DiffOptions, report)}};
+    .groups = {OPTIONS(options_own), COMMON_OPTION(COMMON_MAX_PIXELS, DiffOptions, common),
+               OPTIONS_WITHIN(report_options, DiffOptions, report)},
+    OPERANDS(ANY, DiffOptions, images),
+    .check = options_check};
 
 typedef struct {
     Image reference, test;
@@ -152,26 +187,6 @@ static const char *kind_word(const Image *image)
 {
     return image->data ? "data" : image->display ? "display" : "linear";
 }
-
-static const ResultTable diff_table = {
-    .command = "diff",
-    .rows = "",
-    .columns = {{"reference", "reference"},
-                {"image", "image"},
-                {"equal", "equal"},
-                {"within limits", "met"},
-                {"differing values", "differing_values"},
-                {"largest error", "linear.max_abs"},
-                {"RMSE", "linear.rmse"},
-                {"PSNR dB", "linear.psnr"},
-                {"largest ulp", "max_ulp"},
-                {"8-bit off by 1", "srgb8.off_by_1"},
-                {"by more", "srgb8.off_by_2_or_more"},
-                {"FLIP mean", "flip.mean"}},
-    .name_count = 2,
-    .verdicts = {"met", "equal"},
-    .failed = "false",
-};
 
 static Json *diff_json(const DiffOptions *options, const ComparedImages *comparison)
 {
@@ -320,12 +335,6 @@ int command_diff(int argument_count, char **arguments)
     DiffOptions options = {.limits = {-1, -1, -1, -1}};
     const int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    if (optind + 2 != argument_count) return option_usage_fault("diff", "takes two images");
-    if (!report_options_check(&options.report, &diff_table)) return EXIT_USER;
-    options.reference_path = arguments[optind];
-    options.test_path = arguments[optind + 1];
-    if (options.heatmap_path && image_format_of(options.heatmap_path) == IMAGE_UNKNOWN)
-        return option_usage_fault("diff", "the heat map must end in .png, .ppm, .exr or .npy");
 
     ComparedImages comparison = {0};
     MessageList messages = {0};

@@ -52,6 +52,7 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     const char *file;
+    Operands scenes;                    // at first with the verb before them
     uint32_t size[2], samples, bounces; // 0 if not given, except bounces, which are then UINT32_MAX
     bool writes;
 } GoldenOptions;
@@ -73,19 +74,6 @@ static const Option options_own[] = {
      offsetof(GoldenOptions, samples), NUMBERS(1, SAMPLES_MAX)},
     BOUNCES_OPTION(GoldenOptions, bounces)};
 
-static const CommandLine command_line = {
-    .usage = "usage: glint golden write SCENE... [OPTIONS]\n"
-             "       glint golden check [SCENE...] [OPTIONS]\n\n"
-             "Renders scenes at strict, whose bits are the same on every device, and writes a line of hashes "
-             "per scene, or compares\n"
-             "them with their lines: all of the file without a SCENE. Where an image differs it names the "
-             "layer that differs first\n"
-             "and the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(device_option, GoldenOptions, common),
-               OPTIONS_WITHIN(common_options, GoldenOptions, common),
-               OPTIONS_WITHIN(driver_options, GoldenOptions, common),
-               OPTIONS_WITHIN(report_options, GoldenOptions, report)}};
-
 static const ResultTable golden_table = {
     .command = "golden",
     .rows = "scenes",
@@ -102,6 +90,47 @@ static const ResultTable golden_table = {
     .verdicts = {"same"},
     .failed = "false",
 };
+
+static bool options_check(void *golden_options)
+{
+    GoldenOptions *options = golden_options;
+    const char *verb = options->scenes.count > 0 ? options->scenes.items[0] : "";
+    options->writes = strcmp(verb, "write") == 0;
+    if (!options->writes && strcmp(verb, "check") != 0)
+        return option_usage_fault("golden", "expected write or check");
+    options->scenes.items++;
+    options->scenes.count--;
+    if (options->writes && options->scenes.count == 0) return option_usage_fault("golden", "no scene given");
+    for (size_t i = 0; i < options->scenes.count; i++)
+        if (strpbrk(options->scenes.items[i], "\r\n"))
+            return option_usage_fault("golden", "a scene's name has a line break");
+    const bool has_any = options->size[0] > 0 || options->samples > 0 || options->bounces != UINT32_MAX;
+    if (!options->writes && has_any)
+        return option_usage_fault(
+            "golden", "--size, --samples and --bounces are for write; check takes those of the lines");
+    if (options->size[0] == 0) memcpy(options->size, (const uint32_t[2]){320, 180}, sizeof options->size);
+    if (options->samples == 0) options->samples = 1;
+    if (options->bounces == UINT32_MAX) options->bounces = BOUNCES_DEFAULT;
+    if (options->writes && options->report.format != FORMAT_TEXT)
+        return option_usage_fault("golden", "--format is for check");
+    return options->writes || report_options_check(&options->report, &golden_table);
+}
+
+static const CommandLine command_line = {
+    .command = "golden",
+    .usage = "usage: glint golden write SCENE... [OPTIONS]\n"
+             "       glint golden check [SCENE...] [OPTIONS]\n\n"
+             "Renders scenes at strict, whose bits are the same on every device, and writes a line of hashes "
+             "per scene, or compares\n"
+             "them with their lines: all of the file without a SCENE. Where an image differs it names the "
+             "layer that differs first\n"
+             "and the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(device_option, GoldenOptions, common),
+               OPTIONS_WITHIN(common_options, GoldenOptions, common),
+               OPTIONS_WITHIN(driver_options, GoldenOptions, common),
+               OPTIONS_WITHIN(report_options, GoldenOptions, report)},
+    OPERANDS(ANY, GoldenOptions, scenes),
+    .check = options_check};
 
 static void golden_list_free(GoldenList *list)
 {
@@ -402,13 +431,12 @@ static bool golden_list_write(const GoldenList *list, const char *path)
 }
 
 // Adds the scenes to the lines, or replaces the lines that exist. Returns the exit status.
-static int scenes_write(GoldenList *list, const GoldenOptions *options, char **scenes, size_t count,
-                        Compute *compute)
+static int scenes_write(GoldenList *list, const GoldenOptions *options, Compute *compute)
 {
-    for (size_t i = 0; i < count; i++) {
-        Golden *golden = golden_find(list, scenes[i]);
+    for (size_t i = 0; i < options->scenes.count; i++) {
+        Golden *golden = golden_find(list, options->scenes.items[i]);
         if (!golden) {
-            array_push(*list, (Golden){.scene = memory_copy_text(scenes[i])});
+            array_push(*list, (Golden){.scene = memory_copy_text(options->scenes.items[i])});
             golden = &list->items[list->count - 1];
         }
         golden->width = options->size[0];
@@ -437,10 +465,9 @@ static int scene_check(Finding *finding, const GoldenList *list, const GoldenOpt
     return status;
 }
 
-static int scenes_check(const GoldenList *list, GoldenOptions *options, char **scenes, size_t count,
-                        Compute *compute)
+static int scenes_check(const GoldenList *list, const GoldenOptions *options, Compute *compute)
 {
-    const size_t checked = count > 0 ? count : list->count;
+    const size_t checked = options->scenes.count > 0 ? options->scenes.count : list->count;
     if (checked == 0) {
         fprintf(stderr, "glint golden: '%s' has no lines\n", options->file);
         return EXIT_USER;
@@ -448,7 +475,7 @@ static int scenes_check(const GoldenList *list, GoldenOptions *options, char **s
     Finding *findings = memory_allocate_zeroed(checked + 1, sizeof *findings);
     int status = EXIT_DONE, differing = 0;
     for (size_t i = 0; i < checked && status == EXIT_DONE; i++) {
-        findings[i].scene = count > 0 ? scenes[i] : list->items[i].scene;
+        findings[i].scene = options->scenes.count > 0 ? options->scenes.items[i] : list->items[i].scene;
         status = scene_check(&findings[i], list, options, compute);
         differing += findings[i].is_new || findings[i].first < HASHED_COUNT;
         if (status == EXIT_DONE && report_has_text(&options->report)) finding_print(&findings[i]);
@@ -462,37 +489,11 @@ static int scenes_check(const GoldenList *list, GoldenOptions *options, char **s
     return status == EXIT_DONE && differing > 0 ? EXIT_CHECK : status;
 }
 
-static int options_read(GoldenOptions *options, int argument_count, char **arguments)
-{
-    *options =
-        (GoldenOptions){.common.precision = PRECISION_STRICT, .file = "golden.txt", .bounces = UINT32_MAX};
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    const char *verb = optind < argument_count ? arguments[optind++] : "";
-    options->writes = strcmp(verb, "write") == 0;
-    if (!options->writes && strcmp(verb, "check") != 0)
-        return option_usage_fault("golden", "expected write or check");
-    if (options->writes && optind == argument_count) return option_usage_fault("golden", "no scene given");
-    for (int i = optind; i < argument_count; i++)
-        if (strpbrk(arguments[i], "\r\n"))
-            return option_usage_fault("golden", "a scene's name has a line break");
-    const bool has_any = options->size[0] > 0 || options->samples > 0 || options->bounces != UINT32_MAX;
-    if (!options->writes && has_any)
-        return option_usage_fault(
-            "golden", "--size, --samples and --bounces are for write; check takes those of the lines");
-    if (options->size[0] == 0) memcpy(options->size, (const uint32_t[2]){320, 180}, sizeof options->size);
-    if (options->samples == 0) options->samples = 1;
-    if (options->bounces == UINT32_MAX) options->bounces = BOUNCES_DEFAULT;
-    if (options->writes && options->report.format != FORMAT_TEXT)
-        return option_usage_fault("golden", "--format is for check");
-    return options->writes || report_options_check(&options->report, &golden_table) ? OPTIONS_READ
-                                                                                    : EXIT_USER;
-}
-
 int command_golden(int argument_count, char **arguments)
 {
-    GoldenOptions options;
-    int status = options_read(&options, argument_count, arguments);
+    GoldenOptions options = {
+        .common.precision = PRECISION_STRICT, .file = "golden.txt", .bounces = UINT32_MAX};
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     GoldenList list = {0};
     MessageList messages = {0};
@@ -504,10 +505,8 @@ int command_golden(int argument_count, char **arguments)
     if (is_read && device_open(&open, &options.common)) {
         Progress progress;
         progress_open(&progress, true); // so that signals only set the flag
-        char **scenes = arguments + optind;
-        const size_t count = (size_t)(argument_count - optind);
-        status = options.writes ? scenes_write(&list, &options, scenes, count, &open.compute)
-                                : scenes_check(&list, &options, scenes, count, &open.compute);
+        status = options.writes ? scenes_write(&list, &options, &open.compute)
+                                : scenes_check(&list, &options, &open.compute);
         progress_close(&progress);
         status = device_close(&open, status);
     }

@@ -47,12 +47,9 @@ static bool lanes_read(const Option *option, const char *value, void *options)
     return true;
 }
 
-static bool max_pixels_read(const Option *option, const char *value, void *options)
+static bool input_pixels_limit(const Option *option, void *options)
 {
-    (void)options;
-    uint32_t largest;
-    if (!count_read(option, value, &largest)) return false;
-    image_limit_pixels(largest);
+    image_limit_pixels(*(const uint32_t *)option_field(option, options));
     return true;
 }
 
@@ -115,7 +112,8 @@ const Option common_options[] = {
     [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(no_cache)},
     [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)},
     [COMMON_MAX_PIXELS] = {"max-pixels", "N", "refuse input images with more pixels (default: 134217728)",
-                           max_pixels_read, 0, NUMBERS(1, UINT32_MAX)}};
+                           option_count, FIELD(input_pixels_max), NUMBERS(1, UINT32_MAX),
+                           .effect = input_pixels_limit}};
 const Option set_options[] = {
     {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable", override_add, 0},
     {"camera", "FILE", "a scene whose camera is used", camera_read, FIELD(camera)}};
@@ -129,7 +127,7 @@ const Option driver_options[] = {
      FIELD(build_options)}};
 const Option keep_kernels_option[] = {{"keep-kernels", "FOLDER",
                                        "write the text and the build log of each kernel that is built",
-                                       option_folder, FIELD(kernel_folder)}};
+                                       option_text, FIELD(kernel_folder), .effect = folder_create}};
 
 void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
 {

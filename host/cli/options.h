@@ -26,6 +26,7 @@ typedef struct {
     uint32_t work_group[2];               // 0 if not given
     const char *kernel_folder;            // NULL if not given
     const char *capture_folder;           // NULL if not given
+    uint32_t input_pixels_max;            // 0 if not given
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
     const char *camera; // the scene of --camera, NULL if not given

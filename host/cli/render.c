@@ -27,7 +27,7 @@ static char *frame_path_make(const RenderOptions *options, uint32_t frame)
     if (options->has_format) return memory_copy_text(output);
     if (output && (frame_place_of(output).start || !output_is_folder(output)))
         return frame_name_make(output, frame);
-    char *name = image_output_default_path(options->scenes[0]);
+    char *name = image_output_default_path(options->scenes.items[0]);
     char *path = text_format("%s%s%.*s-%04u.png", output ? output : "", output ? "/" : "",
                              (int)(strlen(name) - strlen(".png")), name, frame);
     free(name);
@@ -38,7 +38,7 @@ static char *frame_path_make(const RenderOptions *options, uint32_t frame)
 static char *path_make(const RenderOptions *options, const char *scene)
 {
     const char *output = options->output.path;
-    if (output && (options->scene_count == 1 || options->has_format)) return memory_copy_text(output);
+    if (output && (options->scenes.count == 1 || options->has_format)) return memory_copy_text(output);
     char *name = image_output_default_path(scene);
     if (!output) return name;
     char *path = text_format("%s/%s", output, name);
@@ -50,11 +50,11 @@ static char *path_make(const RenderOptions *options, const char *scene)
 static bool paths_differ(char *const *paths, const RenderOptions *options)
 {
     if (options->has_format) return true; // all go to standard output
-    for (size_t i = 0; i < options->scene_count; i++)
+    for (size_t i = 0; i < options->scenes.count; i++)
         for (size_t k = 0; k < i; k++) {
             if (strcmp(paths[i], paths[k]) != 0) continue;
             fprintf(stderr, "glint render: the images of '%s' and '%s' would both be '%s'\n",
-                    options->scenes[k], options->scenes[i], paths[i]);
+                    options->scenes.items[k], options->scenes.items[i], paths[i]);
             return false;
         }
     return true;
@@ -75,12 +75,12 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
     if (*status != OPTIONS_READ) return NULL;
     RenderCommand *command = memory_allocate_zeroed(1, sizeof *command);
     command->options = options;
-    command->count = options.frame_count > 0 ? options.frame_count : options.scene_count;
+    command->count = options.frame_count > 0 ? options.frame_count : options.scenes.count;
     command->paths = memory_allocate(command->count, sizeof *command->paths);
     for (size_t i = 0; i < command->count; i++)
         command->paths[i] = options.frame_count > 0
                                 ? frame_path_make(&options, options.first_frame + (uint32_t)i)
-                                : path_make(&options, options.scenes[i]);
+                                : path_make(&options, options.scenes.items[i]);
     if (paths_differ(command->paths, &options)) return command;
     render_command_close(command);
     *status = EXIT_USER;
@@ -95,7 +95,7 @@ static bool scene_is_overwritten(RenderOptions options, const char *path, char *
     bool is_overwritten = false;
     const SceneOptions scene_options = scene_options_of(&options.common);
     if (scene_load(&scene, path, &scene_options, &ignored))
-        for (size_t i = 0; i < options.scene_count && !is_overwritten; i++) {
+        for (size_t i = 0; i < options.scenes.count && !is_overwritten; i++) {
             options.output.path = images[i];
             is_overwritten = image_output_overwrites_scene(&options.output, &scene, path);
         }
@@ -108,11 +108,13 @@ bool render_command_spares_scenes(RenderCommand *command)
 {
     const RenderOptions *options = &command->options;
     bool image_exists = false;
-    for (size_t i = 0; i < options->scene_count && options->scene_count > 1 && !options->skips_existing; i++)
+    for (size_t i = 0; i < options->scenes.count && options->scenes.count > 1 && !options->skips_existing;
+         i++)
         image_exists = image_exists || access(command->paths[i], F_OK) == 0;
-    for (size_t i = 0; i < options->scene_count && image_exists; i++) {
-        const bool can_read_twice = strcmp(options->scenes[i], "-") != 0;
-        if (!can_read_twice || !scene_is_overwritten(*options, options->scenes[i], command->paths)) continue;
+    for (size_t i = 0; i < options->scenes.count && image_exists; i++) {
+        const bool can_read_twice = strcmp(options->scenes.items[i], "-") != 0;
+        if (!can_read_twice || !scene_is_overwritten(*options, options->scenes.items[i], command->paths))
+            continue;
         render_command_record(command, EXIT_USER);
         return false;
     }
@@ -132,7 +134,7 @@ size_t render_command_count(const RenderCommand *command)
 
 const char *render_command_scene(const RenderCommand *command, size_t index)
 {
-    return command->options.scenes[command->options.frame_count > 0 ? 0 : index];
+    return command->options.scenes.items[command->options.frame_count > 0 ? 0 : index];
 }
 
 const char *render_command_path(const RenderCommand *command, size_t index)

@@ -299,10 +299,11 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     double start = clock_seconds();
     int status = EXIT_USER;
     if (ranks &&
-        (options.common.work_group[0] > 0 || options.common.build_options || options.common.capture_folder))
-        return option_usage_fault("render",
-                                  "--work-group, --build-options and --capture need glint render, a "
-                                  "single process");
+        (options.common.work_group[0] > 0 || options.common.build_options || options.common.capture_folder)) {
+        option_usage_fault("render",
+                           "--work-group, --build-options and --capture need glint render, a single process");
+        return EXIT_USER;
+    }
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
     MessageList printed = {0};
     if (image_output_path_known(path) && scene_open_once(&scene, options.scene, &options.common, &printed) &&
@@ -325,7 +326,7 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
                               .printed = &printed};
         const bool is_open = render_devices_open(open, &options.common);
         if (is_open && options.common.capture_folder && open->devices.count > 1)
-            status = option_usage_fault("render", "--capture needs a single device");
+            option_usage_fault("render", "--capture needs a single device");
         else if (is_open)
             status = shutter_render(&render);
     }

@@ -145,7 +145,7 @@ bool output_is_folder(const char *path)
 static bool several_fit(const RenderOptions *options)
 {
     const char *const path = is_to_stdout(&options->output) ? NULL : options->output.path;
-    const bool has_scenes = options->scene_count > 1;
+    const bool has_scenes = options->scenes.count > 1;
     const FramePlace place = path ? frame_place_of(path) : (FramePlace){0};
     if (options->frame_count > 0 && has_scenes)
         option_usage_fault("render", "--frames takes one scene, but several are given");
@@ -161,7 +161,7 @@ static bool several_fit(const RenderOptions *options)
         option_usage_fault("render", "--timing=trace takes one image, but several are given");
     else if (has_scenes && path && !output_is_folder(path))
         option_usage_fault("render", "--output of several scenes must be a folder");
-    else if (!has_scenes && strcmp(options->scenes[0], "-") == 0)
+    else if (!has_scenes && strcmp(options->scenes.items[0], "-") == 0)
         option_usage_fault("render", "--frames reads its scene for each frame, but standard input only once");
     else if (!has_scenes && path && !place.start && !output_is_folder(path))
         option_usage_fault("render", "--output of several frames must be a folder, or have a place for the "
@@ -178,7 +178,7 @@ static bool frames_count(RenderOptions *options)
 {
     Scene scene;
     MessageList messages = {0};
-    const char *path = options->scenes[0];
+    const char *path = options->scenes.items[0];
     const SceneOptions scene_options = scene_options_of(&options->common);
     const bool is_read = scene_load(&scene, path, &scene_options, &messages);
     if (is_read) {
@@ -231,32 +231,16 @@ static const Option options_own[] = {
      "render these frames, or all; FILEs have %d or %04d for the number (default: NAME-%04d.png)",
      frames_read, 0},
     {"skip-existing", NULL, "leave out images that exist", option_flag, FIELD(skips_existing)},
-    {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_new_folder,
-     FIELD(common.capture_folder)},
+    {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
+     FIELD(common.capture_folder), .effect = folder_create_empty},
     {"format", "F", "format of --output -: png, ppm or npy", format_read, 0, NAMES(format_names)},
     {"quiet", NULL, "no progress", option_flag, FIELD(quiet)},
     BOUNCES_OPTION(RenderOptions, bounce_count),
     MIN_CONTRIBUTION_OPTION(RenderOptions, min_contribution)};
 
-static const CommandLine command_line = {
-    .usage = "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, RenderOptions, common),
-               OPTIONS_WITHIN(devices_option, RenderOptions, common),
-               OPTIONS_WITHIN(reference_option, RenderOptions, common),
-               OPTIONS_WITHIN(precision_option, RenderOptions, common),
-               OPTIONS_WITHIN(common_options, RenderOptions, common),
-               OPTIONS_WITHIN(driver_options, RenderOptions, common),
-               OPTIONS_WITHIN(perturb_option, RenderOptions, common)}};
-
-int render_options_read(RenderOptions *options, int argument_count, char **arguments)
+static bool options_check(void *render_options)
 {
-    *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
-                               .sample_count = 1,
-                               .bounce_count = BOUNCES_DEFAULT,
-                               .output.bits = 8};
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    if (optind == argument_count) return option_usage_fault("render", "no scene given");
+    RenderOptions *options = render_options;
     if (options->budget.limit > 0 && options->common.has_precision)
         return option_usage_fault(
             "render", "--max-error chooses the precision; it cannot be combined with --precision");
@@ -267,15 +251,37 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
     if (options->checkpoint && options->skips_existing && options->output.path &&
         strcmp(options->checkpoint, options->output.path) == 0)
         return option_usage_fault("render", "--skip-existing would keep a --checkpoint of the image's name");
-    if (!stdout_fits(options) || !display_fits(&options->output)) return EXIT_USER;
-    options->scenes = arguments + optind;
-    options->scene_count = (size_t)(argument_count - optind);
-    options->has_several = options->scene_count > 1 || options->frame_count > 1 || options->has_all_frames;
-    if (options->has_several && !several_fit(options)) return EXIT_USER;
+    if (!stdout_fits(options) || !display_fits(&options->output)) return false;
+    options->has_several = options->scenes.count > 1 || options->frame_count > 1 || options->has_all_frames;
+    if (options->has_several && !several_fit(options)) return false;
     if (!options->has_several && options->skips_existing && timing_uses_stdout(options->timing))
         return option_usage_fault("render",
                                   "--skip-existing may leave --timing=json or =trace nothing to report");
-    return !options->has_all_frames || frames_count(options) ? OPTIONS_READ : EXIT_USER;
+    return true;
+}
+
+static const CommandLine command_line = {
+    .command = "render",
+    .usage = "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n",
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, RenderOptions, common),
+               OPTIONS_WITHIN(devices_option, RenderOptions, common),
+               OPTIONS_WITHIN(reference_option, RenderOptions, common),
+               OPTIONS_WITHIN(precision_option, RenderOptions, common),
+               OPTIONS_WITHIN(common_options, RenderOptions, common),
+               OPTIONS_WITHIN(driver_options, RenderOptions, common),
+               OPTIONS_WITHIN(perturb_option, RenderOptions, common)},
+    OPERANDS(SCENES, RenderOptions, scenes),
+    .check = options_check};
+
+int render_options_read(RenderOptions *options, int argument_count, char **arguments)
+{
+    *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
+                               .sample_count = 1,
+                               .bounce_count = BOUNCES_DEFAULT,
+                               .output.bits = 8};
+    const int status = command_line_read(&command_line, options, argument_count, arguments);
+    if (status == OPTIONS_READ && options->has_all_frames && !frames_count(options)) return EXIT_USER;
+    return status;
 }
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)

@@ -41,8 +41,8 @@ typedef struct {
     const char *output, *page; // NULL if not given
     char *passed[PASSED_MAX];  // options for verify and bench
     size_t passed_count;
-    char *const *cases;
-    size_t case_count;
+    Operands operands; // cases, or reports to compare
+    bool compares;
     double seconds; // 0 if not given
 } ReportChoice;
 
@@ -57,7 +57,45 @@ static const Option precision_own[] = {
 static const Option page_option[] = {{"html", "FILE", "self-contained HTML page of this comparison",
                                       option_text, offsetof(ReportChoice, page)}};
 
+// Lists the options for verify and bench.
+static void passed_list(ReportChoice *choice)
+{
+    const CommonOptions *common = &choice->common;
+    char **next = choice->passed;
+    if (common->device) *next++ = text_format("--device=%s", common->device);
+    if (common->has_precision) *next++ = text_format("--precision=%s", precision_names[common->precision]);
+    if (common->lanes > 0) *next++ = text_format("--lanes=%u", common->lanes);
+    if (common->work_group[0] > 0)
+        *next++ = text_format("--work-group=%ux%u", common->work_group[0], common->work_group[1]);
+    if (common->build_options) *next++ = text_format("--build-options=%s", common->build_options);
+    choice->passed_count = (size_t)(next - choice->passed);
+}
+
+// Checks the operands, which are cases, or reports of glint bench to compare.
+static bool options_check(void *report_choice)
+{
+    ReportChoice *choice = report_choice;
+    const size_t operand_count = choice->operands.count;
+    passed_list(choice);
+    size_t count = 0;
+    for (size_t i = 0; i < operand_count; i++) {
+        const char *ending = strrchr(choice->operands.items[i], '.');
+        count += ending && strcmp(ending, ".json") == 0;
+    }
+    choice->compares = count > 0 || choice->page;
+    if (!choice->compares) return true;
+    const bool is_for_archive = choice->output || choice->seconds > 0 || choice->passed_count > 0;
+    const char *what = count == 0 ? "--html needs reports of glint bench, whose names end in .json"
+                       : count < operand_count    ? "reports (.json) and cases cannot be combined"
+                       : is_for_archive           ? "--html is the only option for reports (.json)"
+                       : count > SIDE_REPORTS_MAX ? "at most 26 reports can be compared"
+                       : choice->page && strcmp(choice->page, "-") == 0 ? "--html needs the name of a file"
+                                                                        : NULL;
+    return !what || option_usage_fault("report", what);
+}
+
 static const CommandLine command_line = {
+    .command = "report",
     .usage =
         "usage: glint report [CASE...] [OPTIONS]\n"
         "       glint report REPORT.json... [--html FILE]\n\n"
@@ -73,7 +111,9 @@ static const CommandLine command_line = {
                {page_option, 1, 0,
                 "With reports of glint bench --json instead, shows their rows side by side: of several "
                 "devices, versions or days. A\nrow is faster or slower than in the first report only where "
-                "both are of the same device and host.\n"}}};
+                "both are of the same device and host.\n"}},
+    OPERANDS(ANY, ReportChoice, operands),
+    .check = options_check};
 
 // A command that the report runs in its folder. It prints to the file `name`.`prints`.
 typedef struct {
@@ -122,20 +162,6 @@ static const struct {
     {".log", "options, status and log of each build of this kernel"},
 };
 
-// Lists the options for verify and bench.
-static void passed_list(ReportChoice *choice)
-{
-    const CommonOptions *common = &choice->common;
-    char **next = choice->passed;
-    if (common->device) *next++ = text_format("--device=%s", common->device);
-    if (common->has_precision) *next++ = text_format("--precision=%s", precision_names[common->precision]);
-    if (common->lanes > 0) *next++ = text_format("--lanes=%u", common->lanes);
-    if (common->work_group[0] > 0)
-        *next++ = text_format("--work-group=%ux%u", common->work_group[0], common->work_group[1]);
-    if (common->build_options) *next++ = text_format("--build-options=%s", common->build_options);
-    choice->passed_count = (size_t)(next - choice->passed);
-}
-
 static int folder_entry_remove(const char *path, const struct stat *status, int type, struct FTW *walk)
 {
     (void)status, (void)type, (void)walk;
@@ -161,7 +187,7 @@ static bool file_write(const char *folder, const char *name, const char *text)
 
 // Creates the folder in which the steps run. The caller removes and frees it. Returns NULL with a message on
 // failure.
-static char *folder_create(void)
+static char *folder_make(void)
 {
     const char *parent = getenv("TMPDIR");
     char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
@@ -220,8 +246,8 @@ static int step_start(const Step *step, const ReportChoice *choice, const char *
         arguments[count++] = (char *)step->arguments[i];
     for (size_t i = 0; step->has_options && i < choice->passed_count; i++)
         arguments[count++] = choice->passed[i];
-    for (size_t i = 0; step->has_cases && i < choice->case_count && count + 1 < ARGUMENTS_MAX; i++)
-        arguments[count++] = choice->cases[i];
+    for (size_t i = 0; step->has_cases && i < choice->operands.count && count + 1 < ARGUMENTS_MAX; i++)
+        arguments[count++] = choice->operands.items[i];
     posix_spawn_file_actions_t actions;
     int error = posix_spawn_file_actions_init(&actions);
     if (error) return error;
@@ -386,48 +412,31 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     return status;
 }
 
-// Compares reports of glint bench if the arguments name any. Returns the exit status, or OPTIONS_READ if
-// they ask for an archive.
-static int reports_compare(const ReportChoice *choice)
+// Opens the archive, runs the steps and writes it. Returns the exit status.
+static int archive_make(ReportChoice *choice)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < choice->case_count; i++) {
-        const char *ending = strrchr(choice->cases[i], '.');
-        count += ending && strcmp(ending, ".json") == 0;
-    }
-    if (count == 0 && !choice->page) return OPTIONS_READ;
-    const bool is_for_archive = choice->output || choice->seconds > 0 || choice->passed_count > 0;
-    const char *what = count == 0 ? "--html needs reports of glint bench, whose names end in .json"
-                       : count < choice->case_count ? "reports (.json) and cases cannot be combined"
-                       : is_for_archive             ? "--html is the only option for reports (.json)"
-                       : count > SIDE_REPORTS_MAX   ? "at most 26 reports can be compared"
-                       : choice->page && strcmp(choice->page, "-") == 0 ? "--html needs the name of a file"
-                                                                        : NULL;
-    return what ? option_usage_fault("report", what)
-                : side_by_side_run(choice->cases, choice->case_count, choice->page);
+    if (!choice->output) choice->output = "glint-report.tar.gz";
+    if (choice->seconds == 0) choice->seconds = 1800;
+    OutputFile output;
+    MessageList messages = {0};
+    const bool is_open = output_open(&output, choice->output, &messages);
+    messages_print(&messages, NULL);
+    if (!is_open) return EXIT_USER;
+    char *folder = folder_make();
+    const int status = folder ? report_make(choice, folder, &output) : EXIT_MACHINE;
+    if (folder) folder_remove(folder);
+    free(folder);
+    if (status != EXIT_DONE) output_abandon(&output);
+    return status;
 }
 
 int command_report(int argument_count, char **arguments)
 {
     ReportChoice choice = {0};
     int status = command_line_read(&command_line, &choice, argument_count, arguments);
-    passed_list(&choice);
-    choice.cases = arguments + optind;
-    choice.case_count = (size_t)(argument_count - optind);
-    if (status == OPTIONS_READ) status = reports_compare(&choice);
-    if (!choice.output) choice.output = "glint-report.tar.gz";
-    if (choice.seconds == 0) choice.seconds = 1800;
-    OutputFile output;
-    MessageList messages = {0};
-    if (status == OPTIONS_READ && !output_open(&output, choice.output, &messages)) status = EXIT_USER;
-    messages_print(&messages, NULL);
-    if (status == OPTIONS_READ) {
-        char *folder = folder_create();
-        status = folder ? report_make(&choice, folder, &output) : EXIT_MACHINE;
-        if (folder) folder_remove(folder);
-        free(folder);
-        if (status != EXIT_DONE) output_abandon(&output);
-    }
+    if (status == OPTIONS_READ)
+        status = choice.compares ? side_by_side_run(choice.operands.items, choice.operands.count, choice.page)
+                                 : archive_make(&choice);
     for (size_t i = 0; i < choice.passed_count; i++)
         free(choice.passed[i]);
     return status;

@@ -27,7 +27,17 @@ static const Option options_own[] = {
     {"output", "FILE", "CSV file (default: standard output)", option_text, offsetof(TraceOptions, output),
      .letter = 'o'}};
 
+static bool options_check(void *trace_options)
+{
+    const TraceOptions *options = trace_options;
+    if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
+    if (image_format_of(options->output) != IMAGE_UNKNOWN)
+        return option_usage_fault("trace", "writes CSV: the output's name must not be an image's or array's");
+    return true;
+}
+
 static const CommandLine command_line = {
+    .command = "trace",
     .usage = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
              "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays are not shifted to "
              "the eye;\n"
@@ -39,7 +49,9 @@ static const CommandLine command_line = {
                OPTIONS_WITHIN(precision_option, TraceOptions, common),
                OPTIONS_WITHIN(common_options, TraceOptions, common),
                OPTIONS_WITHIN(driver_options, TraceOptions, common),
-               OPTIONS_WITHIN(perturb_option, TraceOptions, common)}};
+               OPTIONS_WITHIN(perturb_option, TraceOptions, common)},
+    OPERANDS(SCENE, TraceOptions, scene),
+    .check = options_check};
 
 typedef struct {
     TraceRay *items;
@@ -188,23 +200,10 @@ static int rays_answer(const TraceOptions *options, const Scene *scene, const Ra
     return written ? EXIT_DONE : EXIT_USER;
 }
 
-static int options_read(TraceOptions *options, int argument_count, char **arguments)
-{
-    *options = (TraceOptions){.common.precision = PRECISION_SINGLE, .output = "-"};
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    if (!option_only_scene("trace", argument_count, arguments)) return EXIT_USER;
-    if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
-    if (image_format_of(options->output) != IMAGE_UNKNOWN)
-        return option_usage_fault("trace", "writes CSV: the output's name must not be an image's or array's");
-    options->scene = arguments[optind];
-    return OPTIONS_READ;
-}
-
 int command_trace(int argument_count, char **arguments)
 {
-    TraceOptions options;
-    int status = options_read(&options, argument_count, arguments);
+    TraceOptions options = {.common.precision = PRECISION_SINGLE, .output = "-"};
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Scene scene = {0};
     RayList rays = {0};

@@ -47,7 +47,8 @@ static const ResultTable verify_table = {
 typedef struct {
     CommonOptions common;
     ReportOptions report;
-    bool quick, lean;   // see VerifySettings
+    bool quick, lean; // see VerifySettings
+    Operands names;
     VerifyChoice cases; // all if none is named
 } VerifyOptions;
 
@@ -60,7 +61,34 @@ static const Option precision_own[] = {
     {"precision", "P", "single, strict or double (default: all that the device has)", option_precision, 0,
      .names = precision_names, .name_count = ARITHMETIC_COUNT}};
 
+static bool is_case(const char *name)
+{
+    size_t i = 0;
+    while (verify_case_name(i) && strcmp(verify_case_name(i), name) != 0)
+        i++;
+    return verify_case_name(i);
+}
+
+static bool case_fault(const char *name)
+{
+    fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
+    for (size_t i = 0; verify_case_name(i); i++)
+        fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
+    fprintf(stderr, " (docs/verify.md)\n");
+    return false;
+}
+
+static bool options_check(void *verify_options)
+{
+    VerifyOptions *options = verify_options;
+    options->cases = (VerifyChoice){options->names.items, options->names.count};
+    for (size_t i = 0; i < options->names.count; i++)
+        if (!is_case(options->names.items[i])) return case_fault(options->names.items[i]);
+    return report_options_check(&options->report, &verify_table);
+}
+
 static const CommandLine command_line = {
+    .command = "verify",
     .usage =
         "usage: glint verify [CASE...] [OPTIONS]\n\n"
         "Runs the hard cases, or those named, on a device and checks each against its bound; exit status "
@@ -72,7 +100,9 @@ static const CommandLine command_line = {
                OPTIONS_WITHIN(driver_options, VerifyOptions, common),
                OPTIONS_WITHIN(keep_kernels_option, VerifyOptions, common),
                OPTIONS_WITHIN(perturb_option, VerifyOptions, common),
-               OPTIONS_WITHIN(report_options, VerifyOptions, report)}};
+               OPTIONS_WITHIN(report_options, VerifyOptions, report)},
+    OPERANDS(ANY, VerifyOptions, names),
+    .check = options_check};
 
 typedef struct {
     const VerifyOptions *options;
@@ -417,39 +447,10 @@ static void builder_start(const VerifyOptions *options)
     _exit(EXIT_DONE);
 }
 
-static bool is_case(const char *name)
-{
-    size_t i = 0;
-    while (verify_case_name(i) && strcmp(verify_case_name(i), name) != 0)
-        i++;
-    return verify_case_name(i);
-}
-
-static int refuse_case(const char *name)
-{
-    fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
-    for (size_t i = 0; verify_case_name(i); i++)
-        fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
-    fprintf(stderr, " (docs/verify.md)\n");
-    return EXIT_USER;
-}
-
-static int options_read(VerifyOptions *options, int argument_count, char **arguments)
-{
-    *options = (VerifyOptions){0};
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    options->cases = (VerifyChoice){arguments + optind, (size_t)(argument_count - optind)};
-    for (size_t i = 0; i < options->cases.count; i++)
-        if (!is_case(options->cases.names[i])) return refuse_case(options->cases.names[i]);
-    if (!report_options_check(&options->report, &verify_table)) return EXIT_USER;
-    return OPTIONS_READ;
-}
-
 int command_verify(int argument_count, char **arguments)
 {
-    VerifyOptions options;
-    int status = options_read(&options, argument_count, arguments);
+    VerifyOptions options = {0};
+    int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Verification verification = {.options = &options, .journal = verify_journal_open()};
     for (size_t i = 0; verify_case_name(i); i++)

@@ -37,34 +37,31 @@ static void keys_print(void)
     putchar('\n');
 }
 
-static const CommandLine command_line = {.usage = "usage: glint view SCENE [OPTIONS]\n",
+static bool options_check(void *view_options)
+{
+    const ViewOptions *options = view_options;
+    const char *camera = options->common.camera ? options->common.camera : options->scene;
+    if (options->writes_camera && strcmp(camera, "-") == 0) {
+        fprintf(stderr, "glint: --write-camera: standard input cannot be written; name a YAML file\n");
+        return false;
+    }
+    if (options->writes_camera && !scene_is_yaml(camera)) {
+        fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", camera);
+        return false;
+    }
+    return true;
+}
+
+static const CommandLine command_line = {.command = "view",
+                                         .usage = "usage: glint view SCENE [OPTIONS]\n",
                                          .usage_print = keys_print,
                                          .groups = {OPTIONS(options_own),
                                                     OPTIONS_WITHIN(set_options, ViewOptions, common),
                                                     OPTIONS_WITHIN(device_option, ViewOptions, common),
                                                     OPTIONS_WITHIN(precision_option, ViewOptions, common),
-                                                    OPTIONS_WITHIN(common_options, ViewOptions, common)}};
-
-static int options_read(ViewOptions *options, int argument_count, char **arguments)
-{
-    *options = (ViewOptions){.common.precision = PRECISION_SINGLE,
-                             .sample_count = SAMPLES_DEFAULT,
-                             .bounce_count = BOUNCES_DEFAULT};
-    const int status = command_line_read(&command_line, options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    if (!option_only_scene("view", argument_count, arguments)) return EXIT_USER;
-    options->scene = arguments[optind];
-    const char *camera = options->common.camera ? options->common.camera : options->scene;
-    if (options->writes_camera && strcmp(camera, "-") == 0) {
-        fprintf(stderr, "glint: --write-camera: standard input cannot be written; name a YAML file\n");
-        return EXIT_USER;
-    }
-    if (options->writes_camera && !scene_is_yaml(camera)) {
-        fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", camera);
-        return EXIT_USER;
-    }
-    return OPTIONS_READ;
-}
+                                                    OPTIONS_WITHIN(common_options, ViewOptions, common)},
+                                         OPERANDS(SCENE, ViewOptions, scene),
+                                         .check = options_check};
 
 #if HAS_WINDOW
 
@@ -82,7 +79,7 @@ static bool image_save(void *context, const char *path, const Scene *scene, cons
     return false;
 }
 
-static int scene_view(ViewOptions *options, const Device *device)
+static int window_show(ViewOptions *options, const Device *device)
 {
     WindowOptions window = {
         .frames = {.device = device,
@@ -112,25 +109,20 @@ static int scene_view(ViewOptions *options, const Device *device)
     }
 }
 
-int command_view(int argument_count, char **arguments)
+static int scene_view(ViewOptions *options)
 {
-    ViewOptions options;
-    int status = options_read(&options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
     DeviceList devices;
-    const Device *device = device_find(&devices, options.common.device);
-    status = device ? scene_view(&options, device) : EXIT_USER;
+    const Device *device = device_find(&devices, options->common.device);
+    const int status = device ? window_show(options, device) : EXIT_USER;
     device_list_close(&devices);
     return status;
 }
 
 #else
 
-int command_view(int argument_count, char **arguments)
+static int scene_view(ViewOptions *options)
 {
-    ViewOptions options;
-    int status = options_read(&options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
+    (void)options;
     fputs(
         "glint: this program was built without a window: `tools/setup --view` installs what it needs (in "
         "Debian: libsdl2-dev, libsdl2-ttf-dev, libfontconfig-dev, fonts-dejavu-core); then run make again\n",
@@ -139,3 +131,12 @@ int command_view(int argument_count, char **arguments)
 }
 
 #endif
+
+int command_view(int argument_count, char **arguments)
+{
+    ViewOptions options = {.common.precision = PRECISION_SINGLE,
+                           .sample_count = SAMPLES_DEFAULT,
+                           .bounce_count = BOUNCES_DEFAULT};
+    const int status = command_line_read(&command_line, &options, argument_count, arguments);
+    return status == OPTIONS_READ ? scene_view(&options) : status;
+}
