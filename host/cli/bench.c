@@ -62,9 +62,10 @@ static const Option precisions_option[] = {
      offsetof(VariantOptions, precisions), NAMES(precision_names)}};
 
 // The options that --variant accepts.
-static const CommandLine variant_line = {.groups = {OPTIONS(precisions_option),
-                                                    OPTIONS(variant_choice_options),
-                                                    OPTIONS_WITHIN(driver_options, VariantOptions, common)}};
+static const CommandLine variant_line = {
+    .groups = {OPTIONS(precisions_option), OPTIONS(variant_choice_options),
+               OPTION_WITHIN(ray_options[RAY_BOUNCES], VariantOptions, common),
+               OPTIONS_WITHIN(driver_options, VariantOptions, common)}};
 
 // Splits a text in place at blanks outside of quotes and removes the quotes, ' or ". Adds each word to
 // `words`. Returns false if a quote is not closed.

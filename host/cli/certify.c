@@ -42,21 +42,18 @@ static const ResultTable certify_table = {
 typedef struct {
     CommonOptions common;
     const char *scene;
-    uint32_t size[2]; // 0 if not given
-    uint32_t pixels, bounce_count;
-    double min_contribution;
+    uint32_t pixels;
     unsigned precisions; // a set, empty if not given
     ReportOptions report;
 } CertifyOptions;
 
 static const Option options_own[] = {
-    {"size", "WxH", "image size (default: as glint render)", option_size, offsetof(CertifyOptions, size)},
+    {"size", "WxH", "image size (default: as glint render)", option_size,
+     offsetof(CertifyOptions, common.size)},
     {"pixels", "N", "compare about N pixels (default: 2000)", option_count, offsetof(CertifyOptions, pixels),
      NUMBERS(1, PIXELS_MOST)},
     {"precision", "LIST", "any of single, strict, double, certified (default: all that fit)", option_set,
-     offsetof(CertifyOptions, precisions), NAMES(precision_names)},
-    BOUNCES_OPTION(CertifyOptions, bounce_count),
-    MIN_CONTRIBUTION_OPTION(CertifyOptions, min_contribution)};
+     offsetof(CertifyOptions, precisions), NAMES(precision_names)}};
 
 static bool options_check(void *certify_options)
 {
@@ -71,10 +68,8 @@ static const CommandLine command_line = {
         "pixels: "
         "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not "
         "list as uncertified.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CertifyOptions, common),
-               OPTIONS_WITHIN(device_option, CertifyOptions, common),
-               OPTIONS_WITHIN(reference_option, CertifyOptions, common),
-               OPTIONS_WITHIN(common_options, CertifyOptions, common),
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(ray_options, CertifyOptions, common),
+               SCENE_GROUPS(CertifyOptions, common), OPTIONS_WITHIN(reference_option, CertifyOptions, common),
                OPTIONS_WITHIN(perturb_option, CertifyOptions, common),
                OPTIONS_WITHIN(report_options, CertifyOptions, report)},
     OPERANDS(SCENE, CertifyOptions, scene),
@@ -181,8 +176,8 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
 
 static ReferencePath path_of(const CertifyOptions *options)
 {
-    return (ReferencePath){.bounce_count = options->bounce_count,
-                           .min_contribution = options->min_contribution};
+    return (ReferencePath){.bounce_count = options->common.bounce_count,
+                           .min_contribution = options->common.min_contribution};
 }
 
 static Json *certify_json(const Certification *certification)
@@ -198,8 +193,8 @@ static Json *certify_json(const Certification *certification)
                  certification->options->common.perturb_scale);
     json_text(json, "scene", certification->options->scene);
     size_json(json, sample->width, sample->height);
-    json_int64(json, "bounces", certification->options->bounce_count);
-    json_number(json, "min_contribution", certification->options->min_contribution);
+    json_int64(json, "bounces", certification->options->common.bounce_count);
+    json_number(json, "min_contribution", certification->options->common.min_contribution);
     json_int64(json, "pixels", (int64_t)sample->count);
     json_int64(json, "reference_bits", QUAD_BITS);
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
@@ -296,18 +291,12 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     const char *selector = options->common.reference_device;
     if (is_certified && !reference_open(compute, &open->devices, selector) && selector) return EXIT_USER;
     Certification certification = {.options = options, .scene = scene, .compute = compute};
-    uint32_t width = options->size[0], height = options->size[1];
-    scene_choose_image_size(scene, &width, &height);
+    const RenderSettings settings = settings_of_scene(&options->common, scene);
     const double start = clock_seconds();
-    if (!certify_sample_open(&certification.sample, scene, width, height, options->pixels, path_of(options),
-                             progress_interrupted))
+    if (!certify_sample_open(&certification.sample, scene, settings.width, settings.height, options->pixels,
+                             path_of(options), progress_interrupted))
         return EXIT_INTERRUPTED;
     certification.reference_seconds = clock_seconds() - start;
-    RenderSettings settings = settings_whole(&options->common, width, height);
-    settings.bounce_count = options->bounce_count;
-    settings.min_contribution = options->min_contribution;
-    settings.shift_to_eye = true;
-    settings.stop = progress_stops;
     int status = EXIT_DONE;
     for (unsigned i = 0; i < PRECISION_COUNT && status == EXIT_DONE; i++) {
         if (!options->precisions || options->precisions >> i & 1)
@@ -326,7 +315,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
 
 int command_certify(int argument_count, char **arguments)
 {
-    CertifyOptions options = {.pixels = PIXELS_DEFAULT, .bounce_count = BOUNCES_DEFAULT};
+    CertifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT, .pixels = PIXELS_DEFAULT};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Scene scene = {0};

@@ -44,7 +44,7 @@ static const CommandLine command_line = {
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
              "ignored. Of several scenes it prints one line each.\n",
     .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CheckOptions, common),
-               COMMON_OPTION(COMMON_LENIENT, CheckOptions, common)},
+               OPTION_WITHIN(common_options[COMMON_LENIENT], CheckOptions, common)},
     OPERANDS(SCENES, CheckOptions, scenes),
     .check = options_check};
 

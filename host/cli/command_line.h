@@ -51,6 +51,11 @@ typedef struct {
         (array), COUNT_OF(array), offsetof(Type, member), NULL                                               \
     }
 
+#define OPTION_WITHIN(option, Type, member)                                                                  \
+    {                                                                                                        \
+        &(option), 1, offsetof(Type, member), NULL                                                           \
+    }
+
 #define OPERANDS(rule, Type, member) .operands = OPERANDS_##rule, .operands_offset = offsetof(Type, member)
 
 enum { OPTION_GROUPS_MAX = 16 };

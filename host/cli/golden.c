@@ -19,6 +19,7 @@
 #include <string.h>
 #include <unistd.h>
 
+enum { BOUNCES_UNSET = BOUNCES_MAX + 1 };
 enum { TILE_COLUMNS = 12, TILE_ROWS = 8, TILES = TILE_COLUMNS * TILE_ROWS };
 
 static const char file_head[] = "# glint golden 1: images at strict; glint golden check compares them. "
@@ -52,8 +53,8 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     const char *file;
-    Operands scenes;                    // at first with the verb before them
-    uint32_t size[2], samples, bounces; // 0 if not given, except bounces, which are then UINT32_MAX
+    Operands scenes;  // at first with the verb before them
+    uint32_t samples; // 0 if not given
     bool writes;
 } GoldenOptions;
 
@@ -69,10 +70,10 @@ typedef struct {
 
 static const Option options_own[] = {
     {"file", "FILE", "the file of hashes (default: golden.txt)", option_text, offsetof(GoldenOptions, file)},
-    {"size", "WxH", "image size, for write (default: 320x180)", option_size, offsetof(GoldenOptions, size)},
+    {"size", "WxH", "image size, for write (default: 320x180)", option_size,
+     offsetof(GoldenOptions, common.size)},
     {"samples", "N", "samples per pixel, for write (default: 1)", option_count,
-     offsetof(GoldenOptions, samples), NUMBERS(1, SAMPLES_MAX)},
-    BOUNCES_OPTION(GoldenOptions, bounces)};
+     offsetof(GoldenOptions, samples), NUMBERS(1, SAMPLES_MAX)}};
 
 static const ResultTable golden_table = {
     .command = "golden",
@@ -104,13 +105,14 @@ static bool options_check(void *golden_options)
     for (size_t i = 0; i < options->scenes.count; i++)
         if (strpbrk(options->scenes.items[i], "\r\n"))
             return option_usage_fault("golden", "a scene's name has a line break");
-    const bool has_any = options->size[0] > 0 || options->samples > 0 || options->bounces != UINT32_MAX;
+    uint32_t *size = options->common.size, *bounces = &options->common.bounce_count;
+    const bool has_any = size[0] > 0 || options->samples > 0 || *bounces != BOUNCES_UNSET;
     if (!options->writes && has_any)
         return option_usage_fault(
             "golden", "--size, --samples and --bounces are for write; check takes those of the lines");
-    if (options->size[0] == 0) memcpy(options->size, (const uint32_t[2]){320, 180}, sizeof options->size);
+    if (size[0] == 0) memcpy(size, (const uint32_t[2]){320, 180}, sizeof options->common.size);
     if (options->samples == 0) options->samples = 1;
-    if (options->bounces == UINT32_MAX) options->bounces = BOUNCES_DEFAULT;
+    if (*bounces == BOUNCES_UNSET) *bounces = BOUNCES_DEFAULT;
     if (options->writes && options->report.format != FORMAT_TEXT)
         return option_usage_fault("golden", "--format is for check");
     return options->writes || report_options_check(&options->report, &golden_table);
@@ -125,7 +127,8 @@ static const CommandLine command_line = {
              "them with their lines: all of the file without a SCENE. Where an image differs it names the "
              "layer that differs first\n"
              "and the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(device_option, GoldenOptions, common),
+    .groups = {OPTIONS(options_own), OPTION_WITHIN(ray_options[RAY_BOUNCES], GoldenOptions, common),
+               OPTIONS_WITHIN(device_option, GoldenOptions, common),
                OPTIONS_WITHIN(common_options, GoldenOptions, common),
                OPTIONS_WITHIN(driver_options, GoldenOptions, common),
                OPTIONS_WITHIN(report_options, GoldenOptions, report)},
@@ -439,10 +442,10 @@ static int scenes_write(GoldenList *list, const GoldenOptions *options, Compute 
             array_push(*list, (Golden){.scene = memory_copy_text(options->scenes.items[i])});
             golden = &list->items[list->count - 1];
         }
-        golden->width = options->size[0];
-        golden->height = options->size[1];
+        golden->width = options->common.size[0];
+        golden->height = options->common.size[1];
         golden->samples = options->samples;
-        golden->bounces = options->bounces;
+        golden->bounces = options->common.bounce_count;
         Film film = {0};
         const int status = golden_render(golden, &film, options, compute);
         film_free(&film);
@@ -492,7 +495,7 @@ static int scenes_check(const GoldenList *list, const GoldenOptions *options, Co
 int command_golden(int argument_count, char **arguments)
 {
     GoldenOptions options = {
-        .common.precision = PRECISION_STRICT, .file = "golden.txt", .bounces = UINT32_MAX};
+        .common.precision = PRECISION_STRICT, .common.bounce_count = BOUNCES_UNSET, .file = "golden.txt"};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     GoldenList list = {0};

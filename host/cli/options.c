@@ -1,4 +1,5 @@
 #include "host/cli/options.h"
+#include "host/cli/progress.h"
 #include "host/image/image.h"
 
 #include "host/base/array.h"
@@ -114,6 +115,12 @@ const Option common_options[] = {
     [COMMON_MAX_PIXELS] = {"max-pixels", "N", "refuse input images with more pixels (default: 134217728)",
                            option_count, FIELD(input_pixels_max), NUMBERS(1, UINT32_MAX),
                            .effect = input_pixels_limit}};
+const Option ray_options[] = {
+    [RAY_BOUNCES] = {"bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)",
+                     option_count, FIELD(bounce_count), NUMBERS(0, BOUNCES_MAX)},
+    [RAY_MIN_CONTRIBUTION] = {"min-contribution", "W",
+                              "trace no bounced ray whose weight in its pixel is below W (default: 0)",
+                              option_number, FIELD(min_contribution), NUMBERS(0, 1)}};
 const Option set_options[] = {
     {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable", override_add, 0},
     {"camera", "FILE", "a scene whose camera is used", camera_read, FIELD(camera)}};
@@ -186,11 +193,23 @@ RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint3
 {
     RenderSettings settings = settings_of_image(width, height, common->precision);
     settings.lanes = common->lanes;
+    settings.bounce_count = common->bounce_count;
+    settings.min_contribution = common->min_contribution;
     settings.bvh = common->bvh;
     settings.no_cache = common->no_cache;
     settings.perturb_seed = common->perturb_seed;
     settings.perturb_scale = common->perturb_scale;
     settings.stage = common->stage;
+    return settings;
+}
+
+RenderSettings settings_of_scene(const CommonOptions *common, const Scene *scene)
+{
+    uint32_t width = common->size[0], height = common->size[1];
+    scene_choose_image_size(scene, &width, &height);
+    RenderSettings settings = settings_whole(common, width, height);
+    settings.shift_to_eye = true;
+    settings.stop = progress_stops;
     return settings;
 }
 

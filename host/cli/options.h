@@ -21,6 +21,9 @@ typedef struct {
     uint32_t lanes;     // 0 for the device's default
     BvhChoice bvh;
     bool no_cache, lenient;
+    uint32_t size[2]; // of the image, 0 if not given
+    uint32_t bounce_count;
+    double min_contribution;
     uint32_t perturb_seed, perturb_scale; // 0 if not given
     const char *build_options;            // NULL if not given
     uint32_t work_group[2];               // 0 if not given
@@ -39,29 +42,19 @@ typedef struct {
 extern const Option device_option[1], devices_option[1], reference_option[1], precision_option[1];
 enum { COMMON_LANES, COMMON_BVH, COMMON_NO_CACHE, COMMON_LENIENT, COMMON_MAX_PIXELS, COMMON_COUNT };
 extern const Option common_options[COMMON_COUNT];
+enum { RAY_BOUNCES, RAY_MIN_CONTRIBUTION, RAY_COUNT };
+extern const Option ray_options[RAY_COUNT];
 extern const Option set_options[2];         // of scenes whose values can be set
 extern const Option perturb_option[1];      // of commands that render or trace
 extern const Option driver_options[2];      // of commands that measure drivers
 extern const Option keep_kernels_option[1]; // of commands that examine drivers
 OptionReader option_precision;              // of CommonOptions
 
-// One of common_options. `common` is where the CommonOptions are in the command's struct.
-#define COMMON_OPTION(which, Type, common)                                                                   \
-    {                                                                                                        \
-        &common_options[which], 1, offsetof(Type, common), NULL                                              \
-    }
-
-// Rows of options that several commands have, each in its own struct.
-#define BOUNCES_OPTION(Type, field)                                                                          \
-    {                                                                                                        \
-        "bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)", option_count,        \
-            offsetof(Type, field), NUMBERS(0, BOUNCES_MAX)                                                   \
-    }
-#define MIN_CONTRIBUTION_OPTION(Type, field)                                                                 \
-    {                                                                                                        \
-        "min-contribution", "W", "trace no bounced ray whose weight in its pixel is below W (default: 0)",   \
-            option_number, offsetof(Type, field), NUMBERS(0, 1)                                              \
-    }
+// The groups of every command that reads a scene and opens one device. `common` is the CommonOptions in the
+// command's struct.
+#define SCENE_GROUPS(Type, common)                                                                           \
+    OPTIONS_WITHIN(set_options, Type, common), OPTIONS_WITHIN(device_option, Type, common),                  \
+        OPTIONS_WITHIN(common_options, Type, common)
 
 enum { BOUNCES_DEFAULT = 5 };
 
@@ -87,8 +80,11 @@ void messages_print_once(MessageList *messages, MessageList *printed, const char
 // Prints and frees messages. Errors in an .rt file follow the line `Error` that miniRT's testers expect.
 void messages_print(MessageList *messages, const char *path);
 
-// Returns settings for a full image with the common options: one sample, no bounces, the scene not shifted.
+// Returns settings for a full image with the common options: one sample, the scene not shifted to the eye.
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height);
+// Returns settings for a full image of the scene, which chooses the size that the options leave open: one
+// sample, the scene shifted to the eye, stopped when the user interrupts.
+RenderSettings settings_of_scene(const CommonOptions *common, const Scene *scene);
 
 typedef struct {
     DeviceList devices;

@@ -1,5 +1,4 @@
 #include "host/cli/render_options.h"
-#include "host/cli/progress.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -203,7 +202,8 @@ static const Option options_own[] = {
      ".png, .ppm, .exr or .npy; a folder for several scenes; - with --format (default: the scene's name with "
      ".png)",
      option_text, FIELD(output.path), .letter = 'o'},
-    {"size", "WxH", "of the image (default: the scene's own, else 1280 wide)", option_size, FIELD(size)},
+    {"size", "WxH", "of the image (default: the scene's own, else 1280 wide)", option_size,
+     FIELD(common.size)},
     {"samples", "N", "per pixel (default: 1, at the center)", option_count, FIELD(sample_count),
      NUMBERS(1, SAMPLES_MAX)},
     {"region", "X,Y,W,H", "render these pixels only", region_read, 0},
@@ -234,9 +234,7 @@ static const Option options_own[] = {
     {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
      FIELD(common.capture_folder), .effect = folder_create_empty},
     {"format", "F", "format of --output -: png, ppm or npy", format_read, 0, NAMES(format_names)},
-    {"quiet", NULL, "no progress", option_flag, FIELD(quiet)},
-    BOUNCES_OPTION(RenderOptions, bounce_count),
-    MIN_CONTRIBUTION_OPTION(RenderOptions, min_contribution)};
+    {"quiet", NULL, "no progress", option_flag, FIELD(quiet)}};
 
 static bool options_check(void *render_options)
 {
@@ -263,7 +261,8 @@ static bool options_check(void *render_options)
 static const CommandLine command_line = {
     .command = "render",
     .usage = "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, RenderOptions, common),
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(ray_options, RenderOptions, common),
+               OPTIONS_WITHIN(set_options, RenderOptions, common),
                OPTIONS_WITHIN(devices_option, RenderOptions, common),
                OPTIONS_WITHIN(reference_option, RenderOptions, common),
                OPTIONS_WITHIN(precision_option, RenderOptions, common),
@@ -276,8 +275,8 @@ static const CommandLine command_line = {
 int render_options_read(RenderOptions *options, int argument_count, char **arguments)
 {
     *options = (RenderOptions){.common.precision = PRECISION_SINGLE,
+                               .common.bounce_count = BOUNCES_DEFAULT,
                                .sample_count = 1,
-                               .bounce_count = BOUNCES_DEFAULT,
                                .output.bits = 8};
     const int status = command_line_read(&command_line, options, argument_count, arguments);
     if (status == OPTIONS_READ && options->has_all_frames && !frames_count(options)) return EXIT_USER;
@@ -286,7 +285,7 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
 {
-    uint32_t *size = options->size;
+    uint32_t *size = options->common.size;
     scene_choose_image_size(scene, &size[0], &size[1]);
     if (!options->has_region) {
         options->region[2] = size[0];
@@ -298,16 +297,12 @@ bool render_settings_make(RenderSettings *settings, RenderOptions *options, cons
                 region[0], region[1], region[2], region[3], size[0], size[1]);
         return false;
     }
-    *settings = settings_whole(&options->common, size[0], size[1]);
+    *settings = settings_of_scene(&options->common, scene);
     settings->region_x = region[0];
     settings->region_y = region[1];
     settings->region_width = region[2];
     settings->region_height = region[3];
     settings->sample_count = options->sample_count;
-    settings->bounce_count = options->bounce_count;
-    settings->min_contribution = options->min_contribution;
-    settings->shift_to_eye = true;
-    settings->stop = progress_stops;
     settings->hashes_scene = options->checkpoint != NULL;
     return true;
 }

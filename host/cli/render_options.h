@@ -11,9 +11,7 @@ typedef struct {
     const char *scene;         // the current scene
     const char *checkpoint;    // with several frames, their pattern
     ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
-    uint32_t size[2];          // 0 if not given
-    uint32_t sample_count, bounce_count;
-    double min_contribution;
+    uint32_t sample_count;
     uint32_t region[4];                // x, y, width, height
     uint32_t first_frame, frame_count; // of an animation; a count of 0 if not given
     bool has_all_frames, has_region, has_transfer, has_format, quiet, skips_existing;

@@ -106,7 +106,7 @@ static const CommandLine command_line = {
     .groups = {OPTIONS(archive_options),
                OPTIONS_WITHIN(precision_own, ReportChoice, common),
                OPTIONS_WITHIN(device_option, ReportChoice, common),
-               COMMON_OPTION(COMMON_LANES, ReportChoice, common),
+               OPTION_WITHIN(common_options[COMMON_LANES], ReportChoice, common),
                OPTIONS_WITHIN(driver_options, ReportChoice, common),
                {page_option, 1, 0,
                 "With reports of glint bench --json instead, shows their rows side by side: of several "

@@ -44,11 +44,8 @@ static const CommandLine command_line = {
              "each number is rounded once to the precision. At certified also low,high,certainty: bounds of "
              "the exact t,\n"
              "and whether object and bounds are certain, certain in double, or uncertain.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, TraceOptions, common),
-               OPTIONS_WITHIN(device_option, TraceOptions, common),
-               OPTIONS_WITHIN(precision_option, TraceOptions, common),
-               OPTIONS_WITHIN(common_options, TraceOptions, common),
-               OPTIONS_WITHIN(driver_options, TraceOptions, common),
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precision_option, TraceOptions, common),
+               SCENE_GROUPS(TraceOptions, common), OPTIONS_WITHIN(driver_options, TraceOptions, common),
                OPTIONS_WITHIN(perturb_option, TraceOptions, common)},
     OPERANDS(SCENE, TraceOptions, scene),
     .check = options_check};

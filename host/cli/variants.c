@@ -10,7 +10,7 @@
 #include <string.h>
 
 const VariantOptions variant_options_default = {
-    .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO, .bounce_count = BOUNCES_DEFAULT};
+    .common.bounce_count = BOUNCES_DEFAULT, .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO};
 
 const double variants_opened_fraction = 0.4, variants_measured_fraction = 0.9;
 
@@ -27,13 +27,12 @@ static bool samples_read(const Option *option, const char *value, void *options)
 
 const Option variant_choice_options[] = {
     {"samples", "LIST", "per pixel, one row each (default: 1)", samples_read, 0, NUMBERS(1, SAMPLES_MAX)},
-    BOUNCES_OPTION(VariantOptions, bounce_count),
     {"lanes", "LIST", "any of 1, 4, 8, 16 (default and CPU maximum: vector width)", option_set, FIELD(lanes),
      NAMES(lanes_choice_names)},
     {"bvh", "LIST", "any of auto, on, off (default: auto)", option_set, FIELD(bvhs),
      NAMES(bvh_choice_names)}};
 const Option variant_set_options[] = {
-    {"size", "WxH", "image size (default: as glint render)", option_size, FIELD(size)},
+    {"size", "WxH", "image size (default: as glint render)", option_size, FIELD(common.size)},
     {"seconds", "MAX", "time limit of the measurement, converged or not (default: 5 per row)", option_number,
      FIELD(seconds), NUMBERS_ABOVE(0, SECONDS_MAX)}};
 
@@ -86,12 +85,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *choices, s
                                const char *path, size_t scene_index)
 {
     const VariantOptions *options = &choices[choice];
-    uint32_t width = options->size[0], height = options->size[1];
-    scene_choose_image_size(&set->scenes[scene_index], &width, &height);
-    RenderSettings settings = settings_whole(&options->common, width, height);
-    settings.bounce_count = options->bounce_count;
-    settings.shift_to_eye = true;
-    settings.stop = progress_stops;
+    RenderSettings settings = settings_of_scene(&options->common, &set->scenes[scene_index]);
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
     const uint64_t hash = scene_files_hash(&set->scenes[scene_index]);
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)

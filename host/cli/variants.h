@@ -12,31 +12,30 @@ enum { SAMPLE_CHOICES_MAX = 16 };
 typedef struct {
     CommonOptions common;
     unsigned precisions, lanes, bvhs; // sets; empty lanes mean the device's default
-    uint32_t size[2];                 // 0 for the default
     uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0 for one sample
-    uint32_t bounce_count;
-    double seconds;      // 0 for the default
-    bool no_build_times; // of a benchmark
-    const char *name;    // the text of --variant, or NULL
+    double seconds;        // 0 for the default
+    bool no_build_times;   // of a benchmark
+    const char *name;      // the text of --variant, or NULL
 } VariantOptions;
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
 
 // Their fields are in VariantOptions.
-extern const Option variant_choice_options[4]; // --variant accepts these, in addition to --precision
+extern const Option variant_choice_options[3]; // --variant accepts these and others
 extern const Option variant_set_options[2];    // shared by all rows
 enum { SECONDS_MAX = 1000000000 };
 
 // The groups of options of a command with VariantOptions, which follow the command's other groups.
 #define VARIANT_GROUPS(Type, variants)                                                                       \
     OPTIONS_WITHIN(variant_choice_options, Type, variants),                                                  \
+        OPTION_WITHIN(ray_options[RAY_BOUNCES], Type, variants.common),                                      \
         OPTIONS_WITHIN(variant_set_options, Type, variants),                                                 \
         OPTIONS_WITHIN(set_options, Type, variants.common),                                                  \
         OPTIONS_WITHIN(device_option, Type, variants.common),                                                \
         OPTIONS_WITHIN(reference_option, Type, variants.common),                                             \
-        COMMON_OPTION(COMMON_LENIENT, Type, variants.common),                                                \
-        COMMON_OPTION(COMMON_MAX_PIXELS, Type, variants.common)
+        OPTION_WITHIN(common_options[COMMON_LENIENT], Type, variants.common),                                \
+        OPTION_WITHIN(common_options[COMMON_MAX_PIXELS], Type, variants.common)
 
 typedef struct {
     Scene *scenes;

@@ -95,8 +95,8 @@ static const CommandLine command_line = {
         "3 if any fails.\n",
     .groups = {OPTIONS_WITHIN(precision_own, VerifyOptions, common), OPTIONS(options_own),
                OPTIONS_WITHIN(device_option, VerifyOptions, common),
-               COMMON_OPTION(COMMON_LANES, VerifyOptions, common),
-               COMMON_OPTION(COMMON_NO_CACHE, VerifyOptions, common),
+               OPTION_WITHIN(common_options[COMMON_LANES], VerifyOptions, common),
+               OPTION_WITHIN(common_options[COMMON_NO_CACHE], VerifyOptions, common),
                OPTIONS_WITHIN(driver_options, VerifyOptions, common),
                OPTIONS_WITHIN(keep_kernels_option, VerifyOptions, common),
                OPTIONS_WITHIN(perturb_option, VerifyOptions, common),
@@ -260,7 +260,6 @@ static RenderSettings precision_settings(const VerifyOptions *options, Precision
 {
     RenderSettings settings = settings_whole(&options->common, 1, 1);
     settings.precision = precision;
-    settings.bounce_count = BOUNCES_DEFAULT;
     return settings;
 }
 
@@ -449,7 +448,7 @@ static void builder_start(const VerifyOptions *options)
 
 int command_verify(int argument_count, char **arguments)
 {
-    VerifyOptions options = {0};
+    VerifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Verification verification = {.options = &options, .journal = verify_journal_open()};

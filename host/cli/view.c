@@ -14,19 +14,15 @@ enum { SAMPLES_DEFAULT = 16 };
 typedef struct {
     CommonOptions common;
     const char *scene;
-    uint32_t size[2]; // 0 if not given
-    uint32_t sample_count, bounce_count;
-    double min_contribution;
+    uint32_t sample_count;
     bool writes_camera;
 } ViewOptions;
 
 static const Option options_own[] = {
     {"size", "WxH", "of the window (default: the scene's own, else 1280 wide)", option_size,
-     offsetof(ViewOptions, size)},
+     offsetof(ViewOptions, common.size)},
     {"samples", "N", "per pixel, once the camera rests (default: 16)", option_count,
      offsetof(ViewOptions, sample_count), NUMBERS(1, SAMPLES_MAX)},
-    BOUNCES_OPTION(ViewOptions, bounce_count),
-    MIN_CONTRIBUTION_OPTION(ViewOptions, min_contribution),
     {"write-camera", NULL, "C and K write the camera into its file, which is YAML", option_flag,
      offsetof(ViewOptions, writes_camera)}};
 
@@ -52,16 +48,14 @@ static bool options_check(void *view_options)
     return true;
 }
 
-static const CommandLine command_line = {.command = "view",
-                                         .usage = "usage: glint view SCENE [OPTIONS]\n",
-                                         .usage_print = keys_print,
-                                         .groups = {OPTIONS(options_own),
-                                                    OPTIONS_WITHIN(set_options, ViewOptions, common),
-                                                    OPTIONS_WITHIN(device_option, ViewOptions, common),
-                                                    OPTIONS_WITHIN(precision_option, ViewOptions, common),
-                                                    OPTIONS_WITHIN(common_options, ViewOptions, common)},
-                                         OPERANDS(SCENE, ViewOptions, scene),
-                                         .check = options_check};
+static const CommandLine command_line = {
+    .command = "view",
+    .usage = "usage: glint view SCENE [OPTIONS]\n",
+    .usage_print = keys_print,
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(ray_options, ViewOptions, common),
+               OPTIONS_WITHIN(precision_option, ViewOptions, common), SCENE_GROUPS(ViewOptions, common)},
+    OPERANDS(SCENE, ViewOptions, scene),
+    .check = options_check};
 
 #if HAS_WINDOW
 
@@ -85,16 +79,15 @@ static int window_show(ViewOptions *options, const Device *device)
         .frames = {.device = device,
                    .scene_path = options->scene,
                    .scene_options = scene_options_of(&options->common),
-                   .settings = settings_whole(&options->common, options->size[0], options->size[1]),
+                   .settings =
+                       settings_whole(&options->common, options->common.size[0], options->common.size[1]),
                    .save = image_save,
                    .save_context = options},
-        .size = {options->size[0], options->size[1]},
+        .size = {options->common.size[0], options->common.size[1]},
         .writes_camera = options->writes_camera,
         .stop = progress_interrupted,
     };
     window.frames.settings.sample_count = options->sample_count;
-    window.frames.settings.bounce_count = options->bounce_count;
-    window.frames.settings.min_contribution = options->min_contribution;
     window.frames.settings.shift_to_eye = true;
     window.frames.settings.moves = true;
     Progress progress;
@@ -135,8 +128,8 @@ static int scene_view(ViewOptions *options)
 int command_view(int argument_count, char **arguments)
 {
     ViewOptions options = {.common.precision = PRECISION_SINGLE,
-                           .sample_count = SAMPLES_DEFAULT,
-                           .bounce_count = BOUNCES_DEFAULT};
+                           .common.bounce_count = BOUNCES_DEFAULT,
+                           .sample_count = SAMPLES_DEFAULT};
     const int status = command_line_read(&command_line, &options, argument_count, arguments);
     return status == OPTIONS_READ ? scene_view(&options) : status;
 }
