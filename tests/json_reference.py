@@ -76,9 +76,9 @@ NOTES = {
 # A path that begins so has no row, because the introduction, a note or a row names the section that has it.
 ELSEWHERE = {
     "glint render --timing=json": ("glint", "by_device[].passports"),
-    "glint check": (),
-    "glint devices": (),
-    "glint diff": (),
+    "glint check": ("glint",),
+    "glint devices": ("glint",),
+    "glint diff": ("glint",),
     "glint bench": ("glint", *(f"device.{name}" for name in ("name", "board", "pci", "uuid", "platform", "driver", "type", "units", "clock_mhz", "passports")),
                     "runs[].launches[].", "runs[].passports[]."),
     "glint bench --against": ("glint", "date", "host", "build", "device", *(f"runs[].{name}" for name in (

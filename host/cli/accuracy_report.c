@@ -1,6 +1,5 @@
 #include "host/cli/accuracy_report.h"
 
-#include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
@@ -523,12 +522,7 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
 
 Json *accuracy_json(const AccuracyReport *report)
 {
-    Json *json = json_open();
-    json_int64(json, "schema", 1);
-    json_text(json, "glint", glint_version());
-    json_begin_object(json, "device");
-    device_json(json, report->device);
-    json_end(json);
+    Json *json = report_json_open(1, report->device);
     perturb_json(json, report->perturb_seed, report->perturb_scale);
     json_begin_array(json, "scenes");
     for (size_t i = 0; i < report->scene_count; i++)

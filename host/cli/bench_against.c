@@ -272,11 +272,7 @@ static int pairs_run(Against *against, Progress *progress)
 
 static Json *against_json(const Against *against, const Device *device)
 {
-    Json *json = json_open();
-    report_start_json(json);
-    json_begin_object(json, "device");
-    device_json(json, device);
-    json_end(json);
+    Json *json = bench_json_open(device);
     json_text(json, "against", against->options->other);
     json_number(json, "confidence", comparison_confidence);
     json_begin_array(json, "runs");

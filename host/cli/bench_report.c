@@ -333,10 +333,9 @@ void samples_json(Json *json, const char *key, const Series *seconds)
     json_end(json);
 }
 
-void report_start_json(Json *json)
+Json *bench_json_open(const Device *device)
 {
-    json_int64(json, "schema", BENCH_SCHEMA);
-    json_text(json, "glint", glint_version());
+    Json *json = report_json_open(BENCH_SCHEMA, device);
     time_t now = time(NULL);
     struct tm utc;
     char date[32] = "";
@@ -355,6 +354,7 @@ void report_start_json(Json *json)
     json_text(json, "commit", glint_commit());
     json_text(json, "compiler", glint_compiler());
     json_end(json);
+    return json;
 }
 
 void key_json(Json *json, const BenchKey *key)
@@ -427,11 +427,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
 
 Json *bench_json(const BenchReport *report)
 {
-    Json *json = json_open();
-    report_start_json(json);
-    json_begin_object(json, "device");
-    device_json(json, report->device);
-    json_end(json);
+    Json *json = bench_json_open(report->device);
     json_begin_object(json, "calibration");
     json_int64(json, "rounds", CALIBRATION_ROUNDS);
     samples_json(json, "samples_ms", &report->set->calibration.wall);

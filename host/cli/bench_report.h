@@ -38,7 +38,7 @@ Json *bench_json(const BenchReport *report); // the caller closes it
 extern const ResultTable bench_table;        // describes this report and that of --against
 
 // The functions below print parts of a report and are shared with glint bench --against.
-void report_start_json(Json *json); // schema, version, date, host and build
+Json *bench_json_open(const Device *device); // opens a report with its device, date, host and build
 void key_json(Json *json, const BenchKey *key);
 void samples_json(Json *json, const char *key, const Series *seconds); // in milliseconds
 void comparison_json(Json *json, const RowComparison *comparison);

@@ -1,6 +1,5 @@
 // glint certify compares a scene's image at each precision with the reference, on a sample of its pixels.
 #include "host/verify/certify.h"
-#include "host/api/version.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
 #include "host/base/json.h"
@@ -183,12 +182,7 @@ static ReferencePath path_of(const CertifyOptions *options)
 static Json *certify_json(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
-    Json *json = json_open();
-    json_int64(json, "schema", 2);
-    json_text(json, "glint", glint_version());
-    json_begin_object(json, "device");
-    device_json(json, certification->compute->device);
-    json_end(json);
+    Json *json = report_json_open(2, certification->compute->device);
     perturb_json(json, certification->options->common.perturb_seed,
                  certification->options->common.perturb_scale);
     json_text(json, "scene", certification->options->scene);

@@ -5,6 +5,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
+#include "host/cli/report_json.h"
 #include "host/compile/compile.h"
 #include "host/compile/features.h"
 #include "host/compile/scene_bounds.h"
@@ -137,8 +138,7 @@ static void messages_json(Json *json, const MessageList *messages)
 
 static void json_report(const char *path, const Scene *scene, bool loaded, const MessageList *messages)
 {
-    Json *json = json_open();
-    json_int64(json, "schema", 1);
+    Json *json = report_json_open(1, NULL);
     json_text(json, "scene", path);
     json_bool(json, "valid", loaded);
     if (loaded) {

@@ -31,8 +31,7 @@ static const CommandLine command_line = {
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
-    Json *json = json_open();
-    json_int64(json, "schema", 1);
+    Json *json = report_json_open(1, NULL);
     json_int64(json, "platforms", list->platform_count);
     json_int64(json, "platforms_without_device", list->empty_platform_count);
     json_begin_array(json, "devices");

@@ -192,8 +192,7 @@ static Json *diff_json(const DiffOptions *options, const ComparedImages *compari
 {
     const ImageMetrics *metrics = &comparison->metrics;
     const Image *reference = &comparison->reference;
-    Json *json = json_open();
-    json_int64(json, "schema", 2);
+    Json *json = report_json_open(2, NULL);
     json_text(json, "reference", options->reference_path);
     json_text(json, "image", options->test_path);
     size_json(json, reference->width, reference->height);

@@ -1,6 +1,5 @@
 // glint golden writes and checks the images of scenes at strict, which have the same bits on every device, as
 // one line per scene.
-#include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/hash.h"
@@ -369,12 +368,7 @@ static int golden_render(Golden *golden, Film *film, const GoldenOptions *option
 
 static Json *findings_json(const Device *device, const Finding *findings, size_t count)
 {
-    Json *json = json_open();
-    json_int64(json, "schema", 1);
-    json_text(json, "glint", glint_version());
-    json_begin_object(json, "device");
-    device_json(json, device);
-    json_end(json);
+    Json *json = report_json_open(1, device);
     json_begin_array(json, "scenes");
     for (size_t i = 0; i < count; i++) {
         const Finding *finding = &findings[i];

@@ -1,5 +1,6 @@
 #include "host/cli/report_json.h"
 
+#include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/cli/passport_report.h"
 #include <inttypes.h>
@@ -101,8 +102,9 @@ void device_identity_json(Json *json, const Device *device)
     json_text(json, "uuid", null_if_empty(device->uuid));
 }
 
-void device_json(Json *json, const Device *device)
+static void device_json(Json *json, const Device *device)
 {
+    json_begin_object(json, "device");
     json_text(json, "name", device->name);
     device_identity_json(json, device);
     json_text(json, "platform", device->platform_name);
@@ -112,6 +114,16 @@ void device_json(Json *json, const Device *device)
     json_int64(json, "units", device->compute_units);
     json_int64(json, "clock_mhz", device->clock_mhz);
     passports_json(json, device);
+    json_end(json);
+}
+
+Json *report_json_open(int schema, const Device *device)
+{
+    Json *json = json_open();
+    json_int64(json, "schema", schema);
+    json_text(json, "glint", glint_version());
+    if (device) device_json(json, device);
+    return json;
 }
 
 void size_json(Json *json, uint32_t width, uint32_t height)

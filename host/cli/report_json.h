@@ -6,13 +6,15 @@
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
+// Opens a report, whose first members are the version of its schema, that of glint and, unless `device` is
+// NULL, the device.
+Json *report_json_open(int schema, const Device *device);
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
 // Adds the reason for a missing figure to the open object.
 void unavailable_json(Json *json, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
 // Adds board, place on the PCI bus and UUID, each null if unknown.
 void device_identity_json(Json *json, const Device *device);
-void device_json(Json *json, const Device *device); // the device's members, in the open object
 void size_json(Json *json, uint32_t width, uint32_t height);
 void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0

@@ -1,6 +1,5 @@
 #include "host/cli/timing.h"
 
-#include "host/api/version.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
@@ -265,9 +264,7 @@ static void pilot_json(Json *json, const Pilot *pilot)
 static void json_report(Renderer *const *renderers, size_t count, const Ranks *ranks,
                         const RenderSettings *settings, const HostTimes *host)
 {
-    Json *json = json_open();
-    json_int64(json, "schema", 4);
-    json_text(json, "glint", glint_version());
+    Json *json = report_json_open(4, NULL);
     json_text(json, "scene", host->scene);
     if (!isnan(host->frame)) json_number(json, "frame", host->frame);
     size_json(json, settings->region_width, settings->region_height);

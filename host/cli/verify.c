@@ -1,6 +1,5 @@
 // glint verify runs the hard cases on a device and prints one line per case.
 #include "host/verify/verify.h"
-#include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/json.h"
@@ -325,24 +324,13 @@ static void precision_add_json(Json *json, const PrecisionRecord *record, Precis
     json_end(json);
 }
 
-// Adds the program, the device and the options that the results belong to.
-static void origin_add_json(Json *json, const Device *device, const VerifyOptions *options)
-{
-    json_int64(json, "schema", 3);
-    json_text(json, "glint", glint_version());
-    json_int64(json, "reference_bits", verify_reference_bits());
-    json_begin_object(json, "device");
-    device_json(json, device);
-    json_end(json);
-    json_bool(json, "quick", options->quick);
-    perturb_json(json, options->common.perturb_seed, options->common.perturb_scale);
-}
-
 static Json *journal_json(const Verification *verification)
 {
     const VerifyOptions *options = verification->options;
-    Json *json = json_open();
-    origin_add_json(json, verification->compute->device, options);
+    Json *json = report_json_open(3, verification->compute->device);
+    json_int64(json, "reference_bits", verify_reference_bits());
+    json_bool(json, "quick", options->quick);
+    perturb_json(json, options->common.perturb_seed, options->common.perturb_scale);
     json_begin_array(json, "precisions");
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         const PrecisionRecord *record = &verification->journal->precisions[precision];
