@@ -25,8 +25,8 @@ typedef struct {
 static bool budgets_read(const Option *option, const char *value, void *options)
 {
     AccuracyBudgets *budgets = &((AccuracyOptions *)options)->budgets;
-    return option_list(option, value, option_number, budgets->limits, sizeof *budgets->limits, BUDGETS_MAX,
-                       &budgets->count);
+    const OptionItems list = {budgets->limits, sizeof *budgets->limits, BUDGETS_MAX, &budgets->count};
+    return option_list(option, value, option_number, list);
 }
 
 static const Option options_own[] = {

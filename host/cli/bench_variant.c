@@ -158,54 +158,55 @@ bool variant_run(Variant *variant, BenchTimes *times)
     return true;
 }
 
+// Renders that are measured with an energy counter.
+typedef struct {
+    Variant *variant;
+    EnergyMeter *meter;
+    double joules, read_seconds; // the counter's last reading, and how long that took
+    size_t count;                // of the frames
+    bool is_whole;               // false once a render failed or the user interrupted
+} EnergyRun;
+
 // Renders frames until at least `seconds_min` have passed and the counter has changed since its previous
-// reading, for at most `seconds_max` if it does not change. `joules` is its last reading, which took
-// *read_seconds; that of the next ones is stored. Adds the frames to *count, clears *is_whole if a render
-// failed or the user interrupted, and returns the counter's reading.
+// reading, for at most `seconds_max` if it does not change.
 // The device idles during a reading (3.5 ms with NVML), so the frames between two readings take READ_SHARE
 // times as long as one.
-static double frames_run(Variant *variant, EnergyMeter *meter, double joules, double seconds_min,
-                         double *read_seconds, size_t *count, bool *is_whole)
+static void frames_run(EnergyRun *run, double seconds_min)
 {
     enum { READ_SHARE = 20 };
     static const double seconds_max = 5;
     const double start_seconds = clock_seconds();
     double before, seconds;
     do {
-        before = joules;
+        before = run->joules;
         const double frames_start_seconds = clock_seconds();
         do {
-            *is_whole = *is_whole && variant_run(variant, NULL);
-            ++*count;
-        } while (*is_whole && clock_seconds() - frames_start_seconds < READ_SHARE * *read_seconds);
+            run->is_whole = run->is_whole && variant_run(run->variant, NULL);
+            run->count++;
+        } while (run->is_whole && clock_seconds() - frames_start_seconds < READ_SHARE * run->read_seconds);
         const double read_start_seconds = clock_seconds();
-        joules = energy_joules(meter);
-        *read_seconds = clock_seconds() - read_start_seconds;
+        run->joules = energy_joules(run->meter);
+        run->read_seconds = clock_seconds() - read_start_seconds;
         seconds = clock_seconds() - start_seconds;
-    } while (*is_whole && (seconds < seconds_min || (joules == before && seconds < seconds_max)));
-    return joules;
+    } while (run->is_whole && (seconds < seconds_min || (run->joules == before && seconds < seconds_max)));
 }
 
 bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
 {
     static const double seconds_min = 1;
-    bool is_whole = true;
-    size_t count = 0;
-    double read_seconds = 0;
+    EnergyRun run = {variant, meter, .joules = energy_joules(meter), .is_whole = true};
     row->energy.why_not = "the energy counter did not change or could not be read";
-    const double first_joules = energy_joules(meter),
-                 start_joules = frames_run(variant, meter, first_joules, 0, &read_seconds, &count, &is_whole);
-    if (!(start_joules > first_joules)) return is_whole;
-    const double start_seconds = clock_seconds();
-    count = 0;
-    const double joules =
-        frames_run(variant, meter, start_joules, seconds_min, &read_seconds, &count, &is_whole) -
-        start_joules;
-    if (joules > 0)
+    const double first_joules = run.joules;
+    frames_run(&run, 0);
+    if (!(run.joules > first_joules)) return run.is_whole;
+    const double start_seconds = clock_seconds(), start_joules = run.joules;
+    run.count = 0;
+    frames_run(&run, seconds_min);
+    if (run.joules > start_joules)
         row->energy = (BenchEnergy){.source = energy_source(meter),
-                                    .joules = joules / (double)count,
-                                    .seconds = (clock_seconds() - start_seconds) / (double)count};
-    return is_whole;
+                                    .joules = (run.joules - start_joules) / (double)run.count,
+                                    .seconds = (clock_seconds() - start_seconds) / (double)run.count};
+    return run.is_whole;
 }
 
 void variant_close(Variant *variant)

@@ -143,21 +143,20 @@ bool option_choice(const Option *option, const char *value, void *options)
     return true;
 }
 
-bool option_list(const Option *option, const char *value, OptionReader *read, void *items, size_t item_size,
-                 size_t most, size_t *count)
+bool option_list(const Option *option, const char *value, OptionReader *read, OptionItems list)
 {
     Option item = *option;
     item.offset = 0;
-    *count = 0;
+    *list.count = 0;
     for (const char *at = value;; at++) {
         const size_t length = strcspn(at, ",");
         char *word = memory_copy_part(at, length);
-        const bool has_room = *count < most;
-        if (!has_room) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option->name, most);
-        const bool is_read = has_room && read(&item, word, (char *)items + *count * item_size);
+        const bool has_room = *list.count < list.most;
+        if (!has_room) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option->name, list.most);
+        const bool is_read = has_room && read(&item, word, (char *)list.items + *list.count * list.item_size);
         free(word);
         if (!is_read) return false;
-        (*count)++;
+        (*list.count)++;
         at += length;
         if (*at == '\0') return true;
     }
@@ -174,7 +173,8 @@ bool option_set(const Option *option, const char *value, void *options)
     enum { VALUES_MAX = 64, NAMES_MAX = 32 };
     if (option->name_count > NAMES_MAX) fault("--%s with more than %d names", option->name, NAMES_MAX);
     size_t indices[VALUES_MAX], count;
-    if (!option_list(option, value, name_read, indices, sizeof *indices, VALUES_MAX, &count)) return false;
+    const OptionItems list = {indices, sizeof *indices, VALUES_MAX, &count};
+    if (!option_list(option, value, name_read, list)) return false;
     unsigned set = 0;
     for (size_t i = 0; i < count; i++)
         set |= 1u << indices[i];

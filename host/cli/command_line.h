@@ -110,9 +110,14 @@ bool count_read(const Option *option, const char *value, uint32_t *count);
 bool choice_read(const Option *option, const char *value, unsigned *index);
 // Returns the field of the option.
 void *option_field(const Option *option, void *options);
-// Reads at most `most` values, separated by commas, each into the next `item_size` bytes of `items`.
-bool option_list(const Option *option, const char *value, OptionReader *read, void *items, size_t item_size,
-                 size_t most, size_t *count);
+// An array that receives the values of an option.
+typedef struct {
+    void *items;
+    size_t item_size, most; // bytes of an item, and the largest number of them
+    size_t *count;
+} OptionItems;
+// Reads values, separated by commas.
+bool option_list(const Option *option, const char *value, OptionReader *read, OptionItems list);
 // Reads decimal digits only, until their number exceeds 2^31. *end receives the position after them. Returns
 // false if there are none.
 bool digits_read(const char *value, const char **end, uint64_t *result);

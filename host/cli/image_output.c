@@ -24,12 +24,7 @@ typedef struct {
 struct ImageOutput {
     const ImageOutputOptions *options;
     ImageFormat format;
-    const char *scene_path;
-    const Scene *scene;
-    const RenderSettings *settings;
-    Renderer *const *renderers;
-    size_t renderer_count;
-    const Ranks *ranks; // may be NULL
+    ImageOrigin origin;
     bool opened;
     ImageWriter *image, *aovs[LAYER_COUNT];
     Scratch converted[LAYER_COUNT]; // a band's values in other types
@@ -53,20 +48,13 @@ struct ImageOutput {
     } kept;
 };
 
-ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
-                               const RenderSettings *settings, Renderer *const *renderers,
-                               size_t renderer_count, const Ranks *ranks)
+ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOrigin *origin)
 {
     ImageOutput *output = memory_allocate_zeroed(1, sizeof *output);
     *output = (ImageOutput){.options = options,
                             .format = image_output_is_stdout(options->path) ? options->stdout_format
                                                                             : image_format_of(options->path),
-                            .scene_path = scene_path,
-                            .scene = scene,
-                            .settings = settings,
-                            .renderers = renderers,
-                            .renderer_count = renderer_count,
-                            .ranks = ranks};
+                            .origin = *origin};
     return output;
 }
 
@@ -88,20 +76,20 @@ static void notes_add(Notes *notes, const char *key, const char *value)
 // of one make.
 static bool is_mixed(const ImageOutput *output)
 {
-    const Device *first = renderer_report(output->renderers[0])->device;
+    const Device *first = renderer_report(output->origin.renderers[0])->device;
     Rank own = {0};
     rank_set_device(&own, first);
     bool differs = false;
-    for (size_t i = 1; i < output->renderer_count; i++) {
-        const Device *device = renderer_report(output->renderers[i])->device;
+    for (size_t i = 1; i < output->origin.renderer_count; i++) {
+        const Device *device = renderer_report(output->origin.renderers[i])->device;
         differs =
             differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
     }
-    for (size_t i = 0; output->ranks && i < output->ranks->count; i++) {
-        const Rank *rank = &output->ranks->items[i];
+    for (size_t i = 0; output->origin.ranks && i < output->origin.ranks->count; i++) {
+        const Rank *rank = &output->origin.ranks->items[i];
         differs = differs || strcmp(rank->device, own.device) != 0 || strcmp(rank->driver, own.driver) != 0;
     }
-    return differs && output->settings->precision != PRECISION_STRICT;
+    return differs && output->origin.settings->precision != PRECISION_STRICT;
 }
 
 static const char certified_key[] = "Certified";
@@ -126,14 +114,14 @@ bool image_output_holds_floats(ImageFormat format)
 // Returns whether all bands must be kept, because EXR's notes precede its pixels and report all counts.
 static bool keeps_bands(const ImageOutput *output)
 {
-    return output->settings->precision == PRECISION_CERTIFIED && is_exr(output);
+    return output->origin.settings->precision == PRECISION_CERTIFIED && is_exr(output);
 }
 
 // Adds notes with the settings that made the image, which suffice to re-render it.
 static void notes_write(Notes *notes, const ImageOutput *output)
 {
-    const RenderSettings *settings = output->settings;
-    const char *slash = strrchr(output->scene_path, '/');
+    const RenderSettings *settings = output->origin.settings;
+    const char *slash = strrchr(output->origin.scene_path, '/');
     Text value = {0};
 #define NOTE(key, ...)                                                                                       \
     (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
@@ -141,8 +129,8 @@ static void notes_write(Notes *notes, const ImageOutput *output)
 #define NOTE_EACH(key, ...)                                                                                  \
     do {                                                                                                     \
         text_free(&value);                                                                                   \
-        for (size_t i = 0; i < output->renderer_count; i++) {                                                \
-            const Renderer *renderer = output->renderers[i];                                                 \
+        for (size_t i = 0; i < output->origin.renderer_count; i++) {                                         \
+            const Renderer *renderer = output->origin.renderers[i];                                          \
             const RenderReport *report = renderer_report(renderer);                                          \
             (void)report;                                                                                    \
             text_appendf(&value, "%s", i > 0 ? " + " : "");                                                  \
@@ -151,14 +139,14 @@ static void notes_write(Notes *notes, const ImageOutput *output)
         notes_add(notes, key, text_c(&value));                                                               \
     } while (0)
     NOTE("Software", "glint %s", glint_version());
-    NOTE("Scene", "%s", slash ? slash + 1 : output->scene_path);
-    if (output->scene->overrides) {
+    NOTE("Scene", "%s", slash ? slash + 1 : output->origin.scene_path);
+    if (output->origin.scene->overrides) {
         text_free(&value);
-        for (const Source *set = output->scene->overrides; set; set = set->next)
+        for (const Source *set = output->origin.scene->overrides; set; set = set->next)
             text_appendf(&value, "%s%s", set->bytes, set->next ? "\n" : "");
         notes_add(notes, "Set", text_c(&value));
     }
-    if (output->scene->is_animated) NOTE("Frame", "%g", output->scene->frame);
+    if (output->origin.scene->is_animated) NOTE("Frame", "%g", output->origin.scene->frame);
     NOTE_EACH("Device", "%s", report->device->name);
     NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
     NOTE("Precision", "%s", precision_names[settings->precision]);
@@ -189,7 +177,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     if (output->options->dither) NOTE("Dither", "ordered");
     if (output->options->alpha) NOTE("Alpha", "%s", is_exr(output) ? "premultiplied" : "straight");
     NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
-    if (output->ranks) NOTE("Ranks", "%zu", output->ranks->count + 1);
+    if (output->origin.ranks) NOTE("Ranks", "%zu", output->origin.ranks->count + 1);
     if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
 #undef NOTE
 #undef NOTE_EACH
@@ -246,7 +234,7 @@ static void channel_names_append(Text *names, const Film *film, Layer layer)
 
 static bool image_open(ImageOutput *output, const Film *film, const ImageNote *notes, MessageList *messages)
 {
-    const RenderSettings *settings = output->settings;
+    const RenderSettings *settings = output->origin.settings;
     ImageHeader header = layer_header(film, LAYER_COLOR);
     header.format = output->format;
     header.transfer = output->options->transfer;
@@ -286,7 +274,7 @@ static bool files_open(ImageOutput *output, const Film *band, MessageList *messa
     for (size_t i = 0; i < notes.count; i++)
         list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
     Film film = *band;
-    film.height = output->settings->region_height;
+    film.height = output->origin.settings->region_height;
     bool opened = image_open(output, &film, list, messages);
     text_free(&notes.text);
 
@@ -320,7 +308,7 @@ static const double *positions_in_world(ImageOutput *output, const Film *band)
     size_t count = 3 * film_pixel_count(band);
     double *world = scratch_reserve(&output->positions, count * sizeof *world);
     numbers_widen(world, band->layers[LAYER_POSITION], count, band->is_double);
-    Vector3 eye = output->scene->camera.position;
+    Vector3 eye = output->origin.scene->camera.position;
     const double axes[3] = {eye.x, eye.y, eye.z};
     for (size_t i = 0; i < count; i++)
         world[i] += axes[i % 3];
@@ -450,7 +438,7 @@ static bool kept_write(ImageOutput *output, MessageList *messages)
 // Adds the notes that follow the pixels.
 static bool late_notes_write(ImageOutput *output, MessageList *messages)
 {
-    if (output->settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
+    if (output->origin.settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
     Text text = {0};
     certified_describe(&text, output);
     const ImageNote note = {certified_key, text_c(&text)};

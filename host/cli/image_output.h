@@ -13,11 +13,19 @@ typedef struct ImageOutput ImageOutput;
 // Returns whether the format holds linear floats, not display values.
 bool image_output_holds_floats(ImageFormat format);
 
+// What makes an image, for its notes.
+typedef struct {
+    const char *scene_path;
+    const Scene *scene;
+    const RenderSettings *settings;
+    Renderer *const *renderers;
+    size_t renderer_count;
+    const Ranks *ranks; // render parts of the image; may be NULL
+} ImageOrigin;
+
 // Opens the output. Its files are opened with the first band, and their notes name the devices of all
-// renderers. `ranks`, which render parts of the image, may be NULL.
-ImageOutput *image_output_open(const ImageOutputOptions *options, const char *scene_path, const Scene *scene,
-                               const RenderSettings *settings, Renderer *const *renderers,
-                               size_t renderer_count, const Ranks *ranks);
+// renderers.
+ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOrigin *origin);
 // Encodes a copy of the band while the caller continues, unless options.synchronous. The messages belong to
 // the output until it is committed or abandoned. Returns false if this band or an earlier one could not be
 // written.

@@ -143,8 +143,9 @@ static int image_render(ImageRender *render)
     const bool is_last = shutter_is_last(shutter);
     if (shutter->time == 0) progress_open(&shutter->progress, options->quiet);
     if (is_last)
-        render->output = image_output_open(&options->output, options->scene, render->scene, &render->settings,
-                                           renderers, devices->count, ranks);
+        render->output = image_output_open(&options->output,
+                                           &(ImageOrigin){options->scene, render->scene, &render->settings,
+                                                          renderers, devices->count, ranks});
     const unsigned aovs = is_last ? image_output_aovs(&options->output) : 0;
     if (ranks) ranks->film = renderer_film_header(renderers[0], aovs);
     const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,

@@ -19,8 +19,9 @@ enum { WARM_UP_RUNS = 3, WARM_UP_SECONDS = 2, ENOUGH_RUNS = 20 };
 static bool samples_read(const Option *option, const char *value, void *options)
 {
     VariantOptions *variants = options;
-    return option_list(option, value, option_count, variants->samples, sizeof *variants->samples,
-                       SAMPLE_CHOICES_MAX, &variants->sample_choices);
+    const OptionItems list = {variants->samples, sizeof *variants->samples, SAMPLE_CHOICES_MAX,
+                              &variants->sample_choices};
+    return option_list(option, value, option_count, list);
 }
 
 #define FIELD(member) offsetof(VariantOptions, member)
@@ -36,8 +37,9 @@ const Option variant_set_options[] = {
     {"seconds", "MAX", "time limit of the measurement, converged or not (default: 5 per row)", option_number,
      FIELD(seconds), NUMBERS_ABOVE(0, SECONDS_MAX)}};
 
-static void variant_add(VariantSet *set, const VariantOptions *options, size_t choice, const char *path,
-                        uint64_t scene_hash, size_t scene_index, const RenderSettings *settings)
+// Adds a variant. `key` has what its row shares with others of its scene and choice.
+static void variant_add(VariantSet *set, const VariantOptions *options, size_t choice, size_t scene_index,
+                        const RenderSettings *settings, BenchKey key)
 {
     Variant *variant = &set->variants[set->count];
     *variant = (Variant){.scene = &set->scenes[scene_index], .choice = choice, .settings = *settings};
@@ -46,18 +48,11 @@ static void variant_add(VariantSet *set, const VariantOptions *options, size_t c
         memcpy(variant->work_group, options->common.work_group, sizeof variant->work_group);
     }
     set->scene_indices[set->count] = scene_index;
-    set->rows[set->count++] = (BenchRow){.key = {
-                                             .scene = path,
-                                             .precision = precision_names[settings->precision],
-                                             .bvh = bvh_choice_names[settings->bvh],
-                                             .variant = options->name,
-                                             .lanes = settings->lanes,
-                                             .width = settings->width,
-                                             .height = settings->height,
-                                             .samples = settings->sample_count,
-                                             .bounces = settings->bounce_count,
-                                             .scene_hash = scene_hash,
-                                         }};
+    key.precision = precision_names[settings->precision];
+    key.bvh = bvh_choice_names[settings->bvh];
+    key.lanes = settings->lanes;
+    key.samples = settings->sample_count;
+    set->rows[set->count++] = (BenchRow){.key = key};
 }
 
 static uint64_t file_hash(uint64_t hash, const char *path)
@@ -87,7 +82,12 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *choices, s
     const VariantOptions *options = &choices[choice];
     RenderSettings settings = settings_of_scene(&options->common, &set->scenes[scene_index]);
     const size_t sample_choices = options->sample_choices > 0 ? options->sample_choices : 1;
-    const uint64_t hash = scene_files_hash(&set->scenes[scene_index]);
+    const BenchKey key = {.scene = path,
+                          .variant = options->name,
+                          .width = settings.width,
+                          .height = settings.height,
+                          .bounces = settings.bounce_count,
+                          .scene_hash = scene_files_hash(&set->scenes[scene_index])};
     for (unsigned precision = 0; precision < PRECISION_COUNT; precision++)
         for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
             for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
@@ -99,7 +99,7 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *choices, s
                     settings.lanes = options->lanes ? lanes_choice_values[lanes] : 0;
                     settings.bvh = (BvhChoice)bvh;
                     settings.sample_count = options->sample_choices > 0 ? options->samples[i] : 1;
-                    variant_add(set, options, choice, path, hash, scene_index, &settings);
+                    variant_add(set, options, choice, scene_index, &settings, key);
                 }
 }
 

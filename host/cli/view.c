@@ -60,15 +60,16 @@ static const CommandLine command_line = {
 #if HAS_WINDOW
 
 // Saves the image as glint render writes it.
-static bool image_save(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
-                       Renderer *renderer, const Film *film, MessageList *messages)
+static bool image_save(void *context, const char *path, const CompleteImage *image, MessageList *messages)
 {
     const ViewOptions *view = context;
-    const Transfer transfer = scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
+    const Transfer transfer = image->scene->color_meaning == COLORS_DISPLAY ? TRANSFER_NONE : TRANSFER_SRGB;
     const ImageOutputOptions options = {.path = path, .transfer = transfer, .bits = 8};
-    ImageOutput *output = image_output_open(&options, view->scene, scene, settings, &renderer, 1, NULL);
+    const ImageOrigin origin = {view->scene, image->scene, image->settings, &image->renderer, 1, NULL};
+    ImageOutput *output = image_output_open(&options, &origin);
     double seconds;
-    if (image_output_write(output, film, messages)) return image_output_commit(output, messages, &seconds);
+    if (image_output_write(output, image->film, messages))
+        return image_output_commit(output, messages, &seconds);
     image_output_abandon(output);
     return false;
 }

@@ -137,13 +137,15 @@ static void worst_record(const FilmComparison *comparison, AccuracyMeasure type,
     }
 }
 
-static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, EdgeCount *count,
-                        size_t pixel, bool edge, const uint32_t values[2], uint32_t light)
+static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel, bool edge,
+                        const uint32_t values[2], uint32_t light)
 {
-    if (edge)
-        count->edge++;
-    else
-        count->away++;
+    AccuracyErrors *errors = comparison->errors;
+    EdgeCount *count = type == ACCURACY_OBJECT   ? &errors->object
+                       : type == ACCURACY_SHADOW ? &errors->shadow
+                                                 : &errors->path;
+    count->edge += edge;
+    count->away += !edge;
     worst_record(comparison, type, pixel,
                  &(AccuracyWorst){.away = !edge,
                                   .light = light,
@@ -163,7 +165,7 @@ static bool shadows_compare(const FilmComparison *comparison, size_t pixel)
         const uint32_t values[2] = {comparison->reference->shadow[bit], comparison->variant->shadow[bit]};
         if (values[0] == values[1]) continue;
         equal = false;
-        count_wrong(comparison, ACCURACY_SHADOW, &comparison->errors->shadow, pixel,
+        count_wrong(comparison, ACCURACY_SHADOW, pixel,
                     comparison->edges->shadow[bit] || comparison->edges->silhouette[pixel], values, light);
     }
     return equal;
@@ -173,8 +175,7 @@ static bool path_compare(const FilmComparison *comparison, size_t pixel)
 {
     const uint32_t values[2] = {comparison->reference->path[pixel], comparison->variant->path[pixel]};
     if (values[0] == values[1]) return true;
-    count_wrong(comparison, ACCURACY_PATH, &comparison->errors->path, pixel, comparison->edges->path[pixel],
-                values, 0);
+    count_wrong(comparison, ACCURACY_PATH, pixel, comparison->edges->path[pixel], values, 0);
     return false;
 }
 
@@ -232,8 +233,7 @@ static void pixel_compare(const FilmComparison *comparison, size_t pixel)
     if (errors->why_colors_only) return;
     const uint32_t objects[2] = {comparison->reference->object[pixel], comparison->variant->object[pixel]};
     if (objects[0] != objects[1]) {
-        count_wrong(comparison, ACCURACY_OBJECT, &errors->object, pixel, comparison->edges->silhouette[pixel],
-                    objects, 0);
+        count_wrong(comparison, ACCURACY_OBJECT, pixel, comparison->edges->silhouette[pixel], objects, 0);
         return;
     }
     bool same_shadows = shadows_compare(comparison, pixel), same_path = path_compare(comparison, pixel);

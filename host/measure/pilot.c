@@ -70,6 +70,14 @@ static uint32_t cell_choose(const Pilot *pilot, const RenderSettings *settings)
     return cell;
 }
 
+// What every precision renders a sample of.
+typedef struct {
+    Pilot *pilot;
+    Compute *compute;
+    const Scene *scene;
+    RenderSettings settings; // the precision is ignored
+} PilotRun;
+
 // The sample as its bands arrive, with their times.
 typedef struct {
     Film film;
@@ -98,17 +106,19 @@ static double pixel_seconds(const SampleFilm *sample)
     return (sample->last_seconds - sample->first_seconds) / (double)(sample->pixels - sample->first_pixels);
 }
 
-// Renders the pixels outside the squares and stores them behind those drawn from the squares.
-static bool rest_render(Renderer *renderer, Film *film, size_t drawn, const Scene *scene,
-                        const RenderSettings *settings, uint32_t cell, MessageList *messages)
+// Renders the pixels outside the squares, with these settings, and stores them behind the `drawn` ones, which
+// are from the squares.
+static bool rest_render(const PilotRun *run, Renderer *renderer, const RenderSettings *settings, Film *film,
+                        size_t drawn, MessageList *messages)
 {
     RenderSettings rest[REST_COUNT];
-    rest_of(settings, cell, rest);
+    rest_of(settings, run->pilot->cell, rest);
     double *colors = film->color + 3 * drawn;
     for (int i = 0; i < REST_COUNT; i++) {
         Film part;
         if (rest[i].region_width == 0 || rest[i].region_height == 0) continue;
-        if (!renderer_move(renderer, scene, &rest[i], messages) || !renderer_render_film(renderer, 0, &part))
+        if (!renderer_move(renderer, run->scene, &rest[i], messages) ||
+            !renderer_render_film(renderer, 0, &part))
             return false;
         const size_t count = 3 * film_pixel_count(&part);
         memcpy(colors, part.color, count * sizeof *colors);
@@ -120,16 +130,18 @@ static bool rest_render(Renderer *renderer, Film *film, size_t drawn, const Scen
 
 // Renders the sample into a film of one row. Returns false with nothing to free if the precision does not
 // suit the device or the scene, if settings->stop ended the pilot or if the device failed.
-static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute *compute, const Scene *scene,
-                          RenderSettings settings, MessageList *messages)
+static bool sample_render(const PilotRun *run, Precision precision, Film *film, MessageList *messages)
 {
+    Pilot *pilot = run->pilot;
+    const Scene *scene = run->scene;
+    RenderSettings settings = run->settings;
     PilotCandidate *candidate = &pilot->candidates[precision];
     candidate->status = PILOT_UNAVAILABLE;
     settings.precision = precision;
     if (precision == PRECISION_DOUBLE) settings.perturb_seed = settings.perturb_scale = 0;
     uint32_t cell = pilot->cell > 0 ? pilot->cell : cell_for(&settings, PIXELS_WANTED);
     RenderSettings squares = squares_of(&settings, cell);
-    Renderer *renderer = renderer_open(compute, scene, &squares, messages);
+    Renderer *renderer = renderer_open(run->compute, scene, &squares, messages);
     if (!renderer) return false;
     bool whole = true;
     if (pilot->cell == 0) {
@@ -148,7 +160,7 @@ static bool sample_render(Pilot *pilot, Precision precision, Film *film, Compute
     *film = film_allocate((uint32_t)(drawn + rest), 1, 0, AOV_COLOR);
     memcpy(film->color, sample.film.color, 3 * drawn * sizeof *film->color);
     film_free(&sample.film);
-    whole = whole && rest_render(renderer, film, drawn, scene, &settings, cell, messages);
+    whole = whole && rest_render(run, renderer, &settings, film, drawn, messages);
     if (whole) {
         candidate->status = PILOT_MEASURED;
         candidate->pixel_seconds = pixel_seconds(&sample);
@@ -178,11 +190,11 @@ static Precision fastest_choose(const Pilot *pilot)
     return chosen;
 }
 
-static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *compute, const Scene *scene,
-                               const RenderSettings *settings)
+static bool candidates_measure(const PilotRun *run, const Film *reference)
 {
-    Sampling sampling = sampling_of(pilot, settings, pilot->cell);
-    sampling.display_values = scene->color_meaning == COLORS_DISPLAY;
+    Pilot *pilot = run->pilot;
+    Sampling sampling = sampling_of(pilot, &run->settings, pilot->cell);
+    sampling.display_values = run->scene->color_meaning == COLORS_DISPLAY;
     if (!sample_classify(&pilot->budget, reference, reference, &sampling).keeps) return true;
     bool is_kept = false;
     for (unsigned i = 0; i < ARITHMETIC_COUNT; i++) {
@@ -191,7 +203,7 @@ static bool candidates_measure(Pilot *pilot, const Film *reference, Compute *com
         if (i > PRECISION_SINGLE && is_kept) break;
         Film sample;
         MessageList unfit = {0};
-        const bool whole = sample_render(pilot, (Precision)i, &sample, compute, scene, *settings, &unfit);
+        const bool whole = sample_render(run, (Precision)i, &sample, &unfit);
         const bool is_unfit = unfit.count > 0;
         message_list_free(&unfit);
         if (!whole && is_unfit) continue;
@@ -208,18 +220,18 @@ bool pilot_run(Pilot *pilot, const ErrorBudget *budget, Compute *compute, const 
                const RenderSettings *settings, MessageList *messages)
 {
     const double start = clock_seconds();
-    RenderSettings own = *settings;
-    own.hashes_scene = false;
-    own.moves = true;
+    PilotRun run = {pilot, compute, scene, *settings};
+    run.settings.hashes_scene = false;
+    run.settings.moves = true;
     *pilot = (Pilot){
         .budget = *budget,
         .confidence = pilot_confidence,
         .image_pixels = (size_t)settings->region_width * settings->region_height,
     };
     Film reference;
-    if (!sample_render(pilot, PRECISION_DOUBLE, &reference, compute, scene, own, messages)) return false;
+    if (!sample_render(&run, PRECISION_DOUBLE, &reference, messages)) return false;
     pilot->candidates[PRECISION_DOUBLE].verdict.keeps = true;
-    const bool whole = candidates_measure(pilot, &reference, compute, scene, &own);
+    const bool whole = candidates_measure(&run, &reference);
     film_free(&reference);
     pilot->chosen = fastest_choose(pilot);
     pilot->seconds = clock_seconds() - start;

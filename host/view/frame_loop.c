@@ -15,8 +15,8 @@ static void image_save(FrameLoop *loop, char *path)
         film.real_size = sizeof *narrow;
     }
     MessageList messages = {0};
-    bool saved = loop->options.save(loop->options.save_context, path, &loop->scene, &loop->settings,
-                                    loop->renderer, &film, &messages);
+    const CompleteImage image = {&loop->scene, &loop->settings, loop->renderer, &film};
+    const bool saved = loop->options.save(loop->options.save_context, path, &image, &messages);
     messages_publish(loop, &messages);
     free(narrow);
     if (saved) message_publish(loop, text_format("saved %s\n", path));

@@ -9,6 +9,14 @@
 #include "host/view/camera_moves.h"
 #include "host/view/views.h"
 
+// An image that has all its samples, with what rendered it.
+typedef struct {
+    const Scene *scene;
+    const RenderSettings *settings;
+    Renderer *renderer;
+    const Film *film;
+} CompleteImage;
+
 typedef struct {
     const Device *device;
     const char *scene_path;
@@ -19,8 +27,7 @@ typedef struct {
     void *notify_context;
     // Writes the color of a complete image in the precision of its render. Returns false with a message if
     // it cannot.
-    bool (*save)(void *context, const char *path, const Scene *scene, const RenderSettings *settings,
-                 Renderer *renderer, const Film *film, MessageList *messages);
+    bool (*save)(void *context, const char *path, const CompleteImage *image, MessageList *messages);
     void *save_context;
 } FrameLoopOptions;
 
