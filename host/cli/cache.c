@@ -12,7 +12,7 @@ typedef struct {
 } CacheOptions;
 
 static const Option options_own[] = {
-    {"clear", NULL, "remove them all", option_flag, offsetof(CacheOptions, clears)}};
+    {"clear", NULL, "remove all programs from the cache", option_flag, offsetof(CacheOptions, clears)}};
 
 static const CommandLine command_line = {
     .command = "cache",

@@ -91,7 +91,7 @@ bool option_number(const Option *option, const char *value, void *options)
     return option_fault(option, value, "a number from %g to %g", option->low, option->high);
 }
 
-bool option_size(const Option *option, const char *value, void *options)
+static bool sides_read(const Option *option, const char *value, void *options, const char *example)
 {
     const uint64_t largest = IMAGE_SIDE_MAX;
     const char *at;
@@ -99,12 +99,22 @@ bool option_size(const Option *option, const char *value, void *options)
     if (!digits_read(value, &at, &width) || (*at != 'x' && *at != 'X') ||
         !digits_read(at + 1, &at, &height) || *at != '\0' || width < 1 || height < 1 || width > largest ||
         height > largest)
-        return option_fault(option, value, "WIDTHxHEIGHT, such as 16x4, each from 1 to %u",
+        return option_fault(option, value, "WIDTHxHEIGHT, such as %s, each from 1 to %u", example,
                             (unsigned)largest);
     uint32_t *size = option_field(option, options);
     size[0] = (uint32_t)width;
     size[1] = (uint32_t)height;
     return true;
+}
+
+bool option_size(const Option *option, const char *value, void *options)
+{
+    return sides_read(option, value, options, "1280x720");
+}
+
+bool option_work_group(const Option *option, const char *value, void *options)
+{
+    return sides_read(option, value, options, "16x4");
 }
 
 // Prints the names and, if one is near the value, the guess that it was meant. Returns false.

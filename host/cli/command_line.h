@@ -93,13 +93,14 @@ enum { OPTIONS_READ = -1 };
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments);
 
 // Readers. The types are those of their fields.
-OptionReader option_flag;   // bool: set
-OptionReader option_text;   // const char *
-OptionReader option_count;  // uint32_t: an integer from `low` to `high`
-OptionReader option_number; // double, from `low` to `high`
-OptionReader option_size;   // uint32_t[2], of WxH
-OptionReader option_choice; // an enum: the index of the name
-OptionReader option_set;    // unsigned: one bit for each name of a comma-separated list
+OptionReader option_flag;       // bool: set
+OptionReader option_text;       // const char *
+OptionReader option_count;      // uint32_t: an integer from `low` to `high`
+OptionReader option_number;     // double, from `low` to `high`
+OptionReader option_size;       // uint32_t[2]: WxH pixels
+OptionReader option_work_group; // uint32_t[2]: WxH work-items
+OptionReader option_choice;     // an enum: the index of the name
+OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
 
 // Effects of options whose value is the path of a folder, which must be writable.
 OptionEffect folder_create;

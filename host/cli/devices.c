@@ -18,7 +18,7 @@ typedef struct {
 } DevicesOptions;
 
 static const Option options_own[] = {
-    {"probe", NULL, "measure it now", option_flag, offsetof(DevicesOptions, probes)},
+    {"probe", NULL, "measure the arithmetic now", option_flag, offsetof(DevicesOptions, probes)},
     {"json", NULL, "print JSON", option_flag, offsetof(DevicesOptions, as_json)}};
 
 static const CommandLine command_line = {

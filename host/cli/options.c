@@ -89,27 +89,30 @@ static bool camera_read(const Option *option, const char *value, void *options)
 
 #define FIELD(member) offsetof(CommonOptions, member)
 
-const Option device_option[] = {{"device", "D",
-                                 "index, part of the name, place on the PCI bus, cpu or gpu (default: "
-                                 "GLINT_DEVICE, else a GPU, else a CPU)",
-                                 option_text, FIELD(device)}};
+const Option device_option[] = {
+    {"device", "D",
+     "the device: its index, part of its name, its place on the PCI bus, cpu or gpu (default: "
+     "GLINT_DEVICE, else a GPU, else a CPU)",
+     option_text, FIELD(device)}};
 const Option devices_option[] = {
     {"device", "LIST",
-     "all, or several: each an index, part of the name, place on the PCI bus, cpu or gpu, with commas "
-     "between (default: GLINT_DEVICE, else a GPU, else a CPU)",
+     "the devices: all, or a list with commas, each by its index, part of its name, its place on the PCI "
+     "bus, cpu or gpu (default: GLINT_DEVICE, else a GPU, else a CPU)",
      option_text, FIELD(device)}};
-const Option reference_option[] = {{"reference-device", "D",
-                                    "renders references and the pixels that certified re-renders (default: "
-                                    "the device itself, else one with fp64)",
-                                    option_text, FIELD(reference_device)}};
+const Option reference_option[] = {
+    {"reference-device", "D",
+     "the device that renders references and the pixels that certified re-renders (default: "
+     "the device itself, else one with fp64)",
+     option_text, FIELD(reference_device)}};
 const Option precision_option[] = {{"precision", "P", "single, strict, double or certified (default: single)",
                                     option_precision, 0, NAMES(precision_names)}};
 const Option common_options[] = {
     [COMMON_LANES] = {"lanes", "N",
                       "rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)", lanes_read,
                       FIELD(lanes), NAMES(lanes_choice_names)},
-    [COMMON_BVH] = {"bvh", "B", "auto, on or off; does not change the image (default: auto)", option_choice,
-                    FIELD(bvh), NAMES(bvh_choice_names)},
+    [COMMON_BVH] = {"bvh", "B",
+                    "whether to use a BVH, which does not change the image: auto, on or off (default: auto)",
+                    option_choice, FIELD(bvh), NAMES(bvh_choice_names)},
     [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(no_cache)},
     [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)},
     [COMMON_MAX_PIXELS] = {"max-pixels", "N", "refuse input images with more pixels (default: 134217728)",
@@ -123,13 +126,14 @@ const Option ray_options[] = {
                               option_number, FIELD(min_contribution), NUMBERS(0, 1)}};
 const Option set_options[] = {
     {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable", override_add, 0},
-    {"camera", "FILE", "a scene whose camera is used", camera_read, FIELD(camera)}};
+    {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(camera)}};
 const Option perturb_option[] = {{"perturb", "SEED[:SCALE]",
                                   "inject the rounding error that OpenCL permits, times SCALE (default: 1)",
                                   perturb_read, 0}};
 const Option driver_options[] = {
-    {"work-group", "WxH", "work-items of a group (default: 8x8, 1x1 for lanes on a CPU, or fewer)",
-     option_size, FIELD(work_group)},
+    {"work-group", "WxH",
+     "width and height of a work-group in work-items (default: 8x8, 1x1 for lanes on a CPU, or fewer)",
+     option_work_group, FIELD(work_group)},
     {"build-options", "OPTIONS", "passed to the driver's compiler, such as \"-cl-opt-disable\"", option_text,
      FIELD(build_options)}};
 const Option keep_kernels_option[] = {{"keep-kernels", "FOLDER",

@@ -202,12 +202,12 @@ static const Option options_own[] = {
      ".png, .ppm, .exr or .npy; a folder for several scenes; - with --format (default: the scene's name with "
      ".png)",
      option_text, FIELD(output.path), .letter = 'o'},
-    {"size", "WxH", "of the image (default: the scene's own, else 1280 wide)", option_size,
+    {"size", "WxH", "width and height in pixels (default: the scene's own, else 1280 wide)", option_size,
      FIELD(common.size)},
-    {"samples", "N", "per pixel (default: 1, at the center)", option_count, FIELD(sample_count),
+    {"samples", "N", "samples per pixel (default: 1, at the center)", option_count, FIELD(sample_count),
      NUMBERS(1, SAMPLES_MAX)},
     {"region", "X,Y,W,H", "render these pixels only", region_read, 0},
-    {"aov", "LIST", "more files, IMAGE.NAME.npy for each NAME of:" LAYER_LIST(HELP_LAYER), option_set,
+    {"aov", "LIST", "also write IMAGE.NAME.npy for each NAME in the list:" LAYER_LIST(HELP_LAYER), option_set,
      FIELD(output.aovs), NAMES(layer_names)},
     {"max-error", "E[:METRIC]",
      "choose the fastest precision within this error in linear light; METRIC: rmse, max or flip (default: "
@@ -215,14 +215,14 @@ static const Option options_own[] = {
      option_error_budget, FIELD(budget)},
     {"timing", "[=STYLE]", "report times of stages and launches: text, json or trace", timing_style_read,
      FIELD(timing)},
-    {"transfer", "T", "srgb or none (default: srgb; none for .rt, .cfg, .nff and .dat)", transfer_read,
-     FIELD(output.transfer), NAMES(transfer_names)},
+    {"transfer", "T", "transfer curve, srgb or none (default: srgb; none for .rt, .cfg, .nff and .dat)",
+     transfer_read, FIELD(output.transfer), NAMES(transfer_names)},
     {"bits", "N", "8 or 16 per channel of a PNG or PPM (default: 8)", bits_read, FIELD(output.bits),
      NAMES(bits_names)},
-    {"exposure", "STOPS", "of a PNG or PPM: twice as bright per stop (default: 0)", option_number,
+    {"exposure", "STOPS", "make a PNG or PPM twice as bright per stop (default: 0)", option_number,
      FIELD(output.exposure), NUMBERS(-64, 64)},
-    {"tone", "T", "curve of a PNG or PPM, none or filmic (default: none, which clips at 1)", option_choice,
-     FIELD(output.tone), NAMES(tone_names)},
+    {"tone", "T", "tone curve of a PNG or PPM: none or filmic (default: none, which clips at 1)",
+     option_choice, FIELD(output.tone), NAMES(tone_names)},
     {"dither", NULL, "hide the steps of 8 bits in a pattern", option_flag, FIELD(output.dither)},
     {"alpha", NULL, "transparent background, for PNG and EXR", option_flag, FIELD(output.alpha)},
     {"checkpoint", "FILE", "keep finished bands in FILE; the same command resumes there", option_text,
@@ -234,7 +234,7 @@ static const Option options_own[] = {
     {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
      FIELD(common.capture_folder), .effect = folder_create_empty},
     {"format", "F", "format of --output -: png, ppm or npy", format_read, 0, NAMES(format_names)},
-    {"quiet", NULL, "no progress", option_flag, FIELD(quiet)}};
+    {"quiet", NULL, "print no progress", option_flag, FIELD(quiet)}};
 
 static bool options_check(void *render_options)
 {

@@ -27,7 +27,8 @@ static bool samples_read(const Option *option, const char *value, void *options)
 #define FIELD(member) offsetof(VariantOptions, member)
 
 const Option variant_choice_options[] = {
-    {"samples", "LIST", "per pixel, one row each (default: 1)", samples_read, 0, NUMBERS(1, SAMPLES_MAX)},
+    {"samples", "LIST", "samples per pixel, with one row for each number (default: 1)", samples_read, 0,
+     NUMBERS(1, SAMPLES_MAX)},
     {"lanes", "LIST", "any of 1, 4, 8, 16 (default and CPU maximum: vector width)", option_set, FIELD(lanes),
      NAMES(lanes_choice_names)},
     {"bvh", "LIST", "any of auto, on, off (default: auto)", option_set, FIELD(bvhs),

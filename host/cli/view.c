@@ -19,9 +19,9 @@ typedef struct {
 } ViewOptions;
 
 static const Option options_own[] = {
-    {"size", "WxH", "of the window (default: the scene's own, else 1280 wide)", option_size,
-     offsetof(ViewOptions, common.size)},
-    {"samples", "N", "per pixel, once the camera rests (default: 16)", option_count,
+    {"size", "WxH", "width and height of the window in pixels (default: the scene's own, else 1280 wide)",
+     option_size, offsetof(ViewOptions, common.size)},
+    {"samples", "N", "samples per pixel once the camera rests (default: 16)", option_count,
      offsetof(ViewOptions, sample_count), NUMBERS(1, SAMPLES_MAX)},
     {"write-camera", NULL, "C and K write the camera into its file, which is YAML", option_flag,
      offsetof(ViewOptions, writes_camera)}};
