@@ -15,10 +15,10 @@ bool render_stops(void *context)
 void message_publish(FrameLoop *loop, char *message)
 {
     pthread_mutex_lock(&loop->mutex);
-    char *waiting = loop->message;
-    loop->message = message;
+    char *waiting = loop->shared.message;
+    loop->shared.message = message;
     if (waiting && *waiting && *message) {
-        loop->message = text_format("%s%s", waiting, message);
+        loop->shared.message = text_format("%s%s", waiting, message);
         free(message);
     }
     free(waiting);
@@ -38,9 +38,9 @@ void frame_publish(FrameLoop *loop, uint32_t samples)
     loop->frame.number = loop->current_number;
     loop->frame.samples = samples;
     pthread_mutex_lock(&loop->mutex);
-    Frame taken = loop->ready;
-    loop->ready = loop->frame;
-    loop->has_ready = true;
+    Frame taken = loop->shared.ready;
+    loop->shared.ready = loop->frame;
+    loop->shared.has_ready = true;
     pthread_mutex_unlock(&loop->mutex);
     loop->frame = taken;
     stage_end(loop->stage);
@@ -53,17 +53,17 @@ void scene_publish(FrameLoop *loop)
     ImageSize size = {0};
     scene_choose_image_size(&loop->scene, &size.width, &size.height);
     pthread_mutex_lock(&loop->mutex);
-    SceneUpdate *update = &loop->update;
-    update->has_new_camera |= loop->scene_state == SCENE_LOADING ||
+    SceneUpdate *update = &loop->shared.update;
+    update->has_new_camera |= loop->shared.scene_state == SCENE_LOADING ||
                               (update->frame == loop->scene_frame && !cameras_equal(&update->camera, camera));
     update->camera = *camera;
     update->frame = loop->scene_frame;
     update->frame_count = file_obstacle(loop->options.scene_path) ? 0 : loop->scene.frame_count;
     update->frame_rate = loop->scene.frame_rate;
-    loop->has_update = true;
+    loop->shared.has_update = true;
     if (loop->current.follows_scene) loop->current.camera = *camera;
-    loop->scene_state = SCENE_LOADED;
-    loop->scene_size = size;
+    loop->shared.scene_state = SCENE_LOADED;
+    loop->shared.scene_size = size;
     pthread_mutex_unlock(&loop->mutex);
     loop->options.notify(loop->options.notify_context);
 }
@@ -71,7 +71,7 @@ void scene_publish(FrameLoop *loop)
 void refusal_publish(FrameLoop *loop)
 {
     pthread_mutex_lock(&loop->mutex);
-    if (loop->scene_state == SCENE_LOADING) loop->scene_state = SCENE_REFUSED;
+    if (loop->shared.scene_state == SCENE_LOADING) loop->shared.scene_state = SCENE_REFUSED;
     pthread_mutex_unlock(&loop->mutex);
     loop->options.notify(loop->options.notify_context);
 }
@@ -80,7 +80,7 @@ void files_changed(void *context)
 {
     FrameLoop *loop = context;
     pthread_mutex_lock(&loop->mutex);
-    loop->reloads = true;
+    loop->shared.reloads = true;
     atomic_store(&loop->has_news, true);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
@@ -89,9 +89,9 @@ void files_changed(void *context)
 bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])
 {
     pthread_mutex_lock(&loop->mutex);
-    const bool has_probe = loop->has_probe;
-    memcpy(pixel, loop->probe, sizeof loop->probe);
-    loop->has_probe = false;
+    const bool has_probe = loop->shared.has_probe;
+    memcpy(pixel, loop->shared.probe, sizeof loop->shared.probe);
+    loop->shared.has_probe = false;
     pthread_mutex_unlock(&loop->mutex);
     return has_probe;
 }
@@ -99,8 +99,8 @@ bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])
 void facts_publish(FrameLoop *loop, char *facts)
 {
     pthread_mutex_lock(&loop->mutex);
-    free(loop->facts);
-    loop->facts = facts;
+    free(loop->shared.facts);
+    loop->shared.facts = facts;
     pthread_mutex_unlock(&loop->mutex);
     loop->options.notify(loop->options.notify_context);
 }
@@ -108,27 +108,28 @@ void facts_publish(FrameLoop *loop, char *facts)
 Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
 {
     pthread_mutex_lock(&loop->mutex);
-    while (!loop->quits && !loop->reloads && loop->request_number == loop->current_number &&
-           !(can_save && loop->save_path) && !(loop->renderer && loop->has_probe))
+    while (!loop->shared.quits && !loop->shared.reloads &&
+           loop->shared.request_number == loop->current_number && !(can_save && loop->shared.save_path) &&
+           !(loop->renderer && loop->shared.has_probe))
         pthread_cond_wait(&loop->changed, &loop->mutex);
     Work work = WORK_SAVE;
-    if (loop->quits) {
+    if (loop->shared.quits) {
         work = WORK_END;
-    } else if (loop->reloads) {
+    } else if (loop->shared.reloads) {
         work = WORK_RELOAD;
-        loop->reloads = false;
-    } else if (loop->request_number != loop->current_number) {
+        loop->shared.reloads = false;
+    } else if (loop->shared.request_number != loop->current_number) {
         work = WORK_RENDER;
-        loop->current = loop->request;
-        if (loop->current.follows_scene) loop->current.camera = loop->update.camera;
-        loop->current_number = loop->request_number;
-    } else if (loop->renderer && loop->has_probe) {
+        loop->current = loop->shared.request;
+        if (loop->current.follows_scene) loop->current.camera = loop->shared.update.camera;
+        loop->current_number = loop->shared.request_number;
+    } else if (loop->renderer && loop->shared.has_probe) {
         work = WORK_PROBE;
     } else {
-        *save_path = loop->save_path;
-        loop->save_path = NULL;
+        *save_path = loop->shared.save_path;
+        loop->shared.save_path = NULL;
     }
-    atomic_store(&loop->has_news, loop->request_number != loop->current_number);
+    atomic_store(&loop->has_news, loop->shared.request_number != loop->current_number);
     pthread_mutex_unlock(&loop->mutex);
     return work;
 }
@@ -136,8 +137,8 @@ Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
 SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size)
 {
     pthread_mutex_lock(&loop->mutex);
-    SceneState state = loop->scene_state;
-    *size = loop->scene_size;
+    SceneState state = loop->shared.scene_state;
+    *size = loop->shared.scene_size;
     pthread_mutex_unlock(&loop->mutex);
     return state;
 }
@@ -145,8 +146,8 @@ SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size)
 unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)
 {
     pthread_mutex_lock(&loop->mutex);
-    loop->request = *request;
-    unsigned number = ++loop->request_number;
+    loop->shared.request = *request;
+    unsigned number = ++loop->shared.request_number;
     atomic_store(&loop->has_news, true);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
@@ -156,8 +157,8 @@ unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)
 void frame_loop_save(FrameLoop *loop, const char *path)
 {
     pthread_mutex_lock(&loop->mutex);
-    free(loop->save_path);
-    loop->save_path = memory_copy_text(path);
+    free(loop->shared.save_path);
+    loop->shared.save_path = memory_copy_text(path);
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
 }
@@ -165,9 +166,9 @@ void frame_loop_save(FrameLoop *loop, const char *path)
 void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
 {
     pthread_mutex_lock(&loop->mutex);
-    loop->probe[0] = x;
-    loop->probe[1] = y;
-    loop->has_probe = true;
+    loop->shared.probe[0] = x;
+    loop->shared.probe[1] = y;
+    loop->shared.has_probe = true;
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
 }
@@ -184,18 +185,18 @@ static char *text_acquire(FrameLoop *loop, char **text)
 
 char *frame_loop_acquire_facts(FrameLoop *loop)
 {
-    return text_acquire(loop, &loop->facts);
+    return text_acquire(loop, &loop->shared.facts);
 }
 
 bool frame_loop_acquire(FrameLoop *loop, Frame *frame)
 {
     pthread_mutex_lock(&loop->mutex);
-    bool is_new = loop->has_ready;
+    bool is_new = loop->shared.has_ready;
     if (is_new) {
         Frame shown = *frame;
-        *frame = loop->ready;
-        loop->ready = shown;
-        loop->has_ready = false;
+        *frame = loop->shared.ready;
+        loop->shared.ready = shown;
+        loop->shared.has_ready = false;
     }
     pthread_mutex_unlock(&loop->mutex);
     return is_new;
@@ -204,17 +205,17 @@ bool frame_loop_acquire(FrameLoop *loop, Frame *frame)
 bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update)
 {
     pthread_mutex_lock(&loop->mutex);
-    bool is_new = loop->has_update;
-    loop->has_update = false;
-    if (is_new) *update = loop->update;
-    loop->update.has_new_camera = false;
+    bool is_new = loop->shared.has_update;
+    loop->shared.has_update = false;
+    if (is_new) *update = loop->shared.update;
+    loop->shared.update.has_new_camera = false;
     pthread_mutex_unlock(&loop->mutex);
     return is_new;
 }
 
 char *frame_loop_acquire_message(FrameLoop *loop)
 {
-    return text_acquire(loop, &loop->message);
+    return text_acquire(loop, &loop->shared.message);
 }
 
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds)

@@ -48,7 +48,7 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
 {
     FrameLoop *loop = memory_allocate_zeroed(1, sizeof *loop);
     loop->options = *options;
-    loop->reloads = true;
+    loop->shared.reloads = true;
     loop->settings = options->settings;
     loop->stage = stage_open(false);
     loop->settings.stop = render_stops;
@@ -70,7 +70,7 @@ void frame_loop_close(FrameLoop *loop)
 {
     atomic_store(&loop->ends, true);
     pthread_mutex_lock(&loop->mutex);
-    loop->quits = true;
+    loop->shared.quits = true;
     pthread_cond_signal(&loop->changed);
     pthread_mutex_unlock(&loop->mutex);
     pthread_join(loop->thread, NULL);
@@ -81,10 +81,10 @@ void frame_loop_close(FrameLoop *loop)
     pthread_cond_destroy(&loop->changed);
     film_free(&loop->film);
     frame_free(&loop->frame);
-    frame_free(&loop->ready);
-    free(loop->save_path);
-    free(loop->message);
-    free(loop->facts);
-    text_free(&loop->written);
+    frame_free(&loop->shared.ready);
+    free(loop->shared.save_path);
+    free(loop->shared.message);
+    free(loop->shared.facts);
+    text_free(&loop->shared.written);
     free(loop);
 }

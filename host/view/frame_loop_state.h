@@ -7,17 +7,8 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-struct FrameLoop {
-    FrameLoopOptions options;
-    pthread_t thread;
-    pthread_mutex_t mutex;
-    pthread_cond_t changed;
-    Stage *stage;
-    atomic_bool has_news;     // a request that was not yet read
-    atomic_bool first_is_due; // new requests do not end the render
-    atomic_bool ends;         // the current render and all later ones
-
-    // under the mutex
+// What the window's thread and the loop's pass to each other. Only under the mutex.
+typedef struct {
     FrameRequest request;
     unsigned request_number;
     SceneState scene_state;
@@ -30,8 +21,22 @@ struct FrameLoop {
     Text written;      // into the scene's file; the watch has not reported it yet
     bool has_ready, has_update, has_probe, quits;
     bool reloads; // the scene's files have changed, or have not been read
+} SharedState;
 
-    // the thread's own
+struct FrameLoop {
+    FrameLoopOptions options; // constant
+    pthread_t thread;
+    pthread_mutex_t mutex;
+    pthread_cond_t changed; // the shared state
+    SharedState shared;
+
+    // used by both threads without the mutex
+    Stage *stage;
+    atomic_bool has_news;     // a request that was not yet read
+    atomic_bool first_is_due; // new requests do not end the render
+    atomic_bool ends;         // the current render and all later ones
+
+    // owned by the loop's thread
     bool is_mistaken;     // whether the scene's file, as it is now, has a mistake
     bool has_preview;     // the request's first frame is coarse, or of arrays that another eye saw
     uint32_t divisor;     // the coarse frame's

@@ -46,8 +46,8 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
 bool is_own_write(FrameLoop *loop)
 {
     pthread_mutex_lock(&loop->mutex);
-    Text written = loop->written;
-    loop->written = (Text){0};
+    Text written = loop->shared.written;
+    loop->shared.written = (Text){0};
     pthread_mutex_unlock(&loop->mutex);
     Text text = {0};
     MessageList messages = {0};
@@ -112,15 +112,15 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
     }
     // before the change is visible, so that the loop recognizes it as its own
     pthread_mutex_lock(&loop->mutex);
-    text_free(&loop->written);
-    loop->written = text;
-    const Camera file_camera = loop->update.camera;
-    loop->update.camera = *camera;
+    text_free(&loop->shared.written);
+    loop->shared.written = text;
+    const Camera file_camera = loop->shared.update.camera;
+    loop->shared.update.camera = *camera;
     pthread_mutex_unlock(&loop->mutex);
     if (output_commit(&output, messages)) return true;
     pthread_mutex_lock(&loop->mutex);
-    text_free(&loop->written);
-    loop->update.camera = file_camera;
+    text_free(&loop->shared.written);
+    loop->shared.update.camera = file_camera;
     pthread_mutex_unlock(&loop->mutex);
     return false;
 }

@@ -9,7 +9,7 @@ enum { WAIT_AT_REST = 100, WAIT_IN_FLIGHT = 4 };
 static void frame_notify(void *context)
 {
     Window *window = context;
-    SDL_PushEvent(&(SDL_Event){.type = window->frame_event});
+    SDL_PushEvent(&(SDL_Event){.type = window->screen.frame_event});
 }
 
 const char *scene_name(const Window *window)
@@ -45,20 +45,20 @@ void request_send(Window *window)
 // Asks for the facts of the pixel under the cursor, if they are shown, and takes them.
 static void facts_exchange(Window *window)
 {
-    const double *at = window->hover;
+    const double *at = window->facts.at;
     const bool is_inside =
         at[0] >= 0 && at[1] >= 0 && at[0] < window->size.width && at[1] < window->size.height;
-    if (window->shows_facts && window->facts_are_due && is_inside && window->request > 0) {
+    if (window->facts.are_shown && window->facts.are_due && is_inside && window->request > 0) {
         frame_loop_probe(window->frames, (uint32_t)at[0], (uint32_t)at[1]);
-        window->facts_are_due = false;
+        window->facts.are_due = false;
     }
     char *facts = frame_loop_acquire_facts(window->frames);
     if (!facts) return;
-    if (window->prints_facts) fputs(facts, stdout);
+    if (window->facts.prints) fputs(facts, stdout);
     fflush(stdout);
-    window->prints_facts = false;
-    free(window->facts);
-    window->facts = facts;
+    window->facts.prints = false;
+    free(window->facts.text);
+    window->facts.text = facts;
     window->redraws = true;
 }
 
@@ -66,7 +66,7 @@ static void facts_exchange(Window *window)
 static void size_read(Window *window)
 {
     int width = 1, height = 1;
-    SDL_GetRendererOutputSize(window->target, &width, &height);
+    SDL_GetRendererOutputSize(window->screen.renderer, &width, &height);
     const ImageSize size = {(uint32_t)width, (uint32_t)height};
     if (width < 1 || height < 1 || (size.width == window->size.width && size.height == window->size.height))
         return;
@@ -104,11 +104,11 @@ static void event_handle(Window *window, const SDL_Event *event)
         drag_begin(window, &event->button);
         break;
     case SDL_MOUSEBUTTONUP:
-        window->drag = DRAG_NONE;
+        window->mouse.drag = DRAG_NONE;
         break;
     case SDL_MOUSEMOTION:
-        position_set(window, window->hover, event->motion.x, event->motion.y);
-        window->facts_are_due = true;
+        position_set(window, window->facts.at, event->motion.x, event->motion.y);
+        window->facts.are_due = true;
         drag_move(window, &event->motion);
         break;
     case SDL_MOUSEWHEEL:
@@ -128,7 +128,8 @@ static void message_acquire(Window *window)
     if (!message) return;
     size_t length = strlen(message);
     if (length > 0) fprintf(stderr, "%s%s", message, message[length - 1] == '\n' ? "" : "\n");
-    if (length > 0) window->plays = window->key_is_due = false; // each frame might bring another
+    if (length > 0)
+        window->play.is_running = window->play.key_is_due = false; // each frame might bring another
     message_show(window, message);
 }
 
@@ -148,7 +149,7 @@ static void scene_receive(Window *window)
     window->is_loaded = frame_loop_scene(window->frames, &size) == SCENE_LOADED;
     if (!window->is_loaded || window->options->size.width > 0) return;
     size = size_fit(size);
-    SDL_SetWindowSize(window->window, (int)size.width, (int)size.height);
+    SDL_SetWindowSize(window->screen.window, (int)size.width, (int)size.height);
     size_read(window);
 }
 
@@ -165,7 +166,7 @@ static void scene_acquire(Window *window)
     if (!frame_loop_acquire_scene(window->frames, &window->scene)) return;
     if (follows || window->scene.has_new_camera) window->camera = window->scene.camera;
     window->camera_changed |= window->scene.has_new_camera;
-    window->plays &= has_time_line(window);
+    window->play.is_running &= has_time_line(window);
     if (window->scene_frame > 0 && window->scene_frame >= window->scene.frame_count)
         scene_frame_show(window, (int64_t)window->scene.frame_count - 1);
     if (window->scene.frame_rate != frame_rate)
@@ -179,8 +180,8 @@ static void work_exchange(Window *window)
     key_record(window);
     request_send(window);
     if (frame_loop_acquire(window->frames, &window->frame)) {
-        window->facts_are_due |= window->frame.number != window->facts_request;
-        window->facts_request = window->frame.number;
+        window->facts.are_due |= window->frame.number != window->facts.request;
+        window->facts.request = window->frame.number;
         frame_show(window);
     }
     facts_exchange(window);
@@ -192,13 +193,13 @@ static WindowEnd events_run(Window *window)
 {
     while (!window->closes) {
         SDL_Event event;
-        int wait = window->drag == DRAG_LOOK || window->plays ? WAIT_IN_FLIGHT : WAIT_AT_REST;
+        int wait = window->mouse.drag == DRAG_LOOK || window->play.is_running ? WAIT_IN_FLIGHT : WAIT_AT_REST;
         for (int had = SDL_WaitEventTimeout(&event, wait); had; had = SDL_PollEvent(&event))
             event_handle(window, &event);
         if (window->options->stop()) return WINDOW_STOPPED;
         size_read(window);
-        if (window->drag == DRAG_LOOK) fly(window);
-        if (window->plays) play(window);
+        if (window->mouse.drag == DRAG_LOOK) fly(window);
+        if (window->play.is_running) play(window);
         work_exchange(window);
         if (!window->is_loaded && is_refused(window)) {
             message_acquire(window); // it may have come since the last look, together with the refusal
@@ -217,20 +218,21 @@ static WindowEnd window_fault(const char *what)
 
 static void window_close(Window *window)
 {
-    if (window->window) SDL_HideWindow(window->window); // a kernel may still be built for a while
+    if (window->screen.window)
+        SDL_HideWindow(window->screen.window); // a kernel may still be built for a while
     if (window->frames) frame_loop_close(window->frames);
     frame_free(&window->frame);
     free(window->message);
-    free(window->facts);
+    free(window->facts.text);
     text_free(&window->stage);
-    caption_close(window->caption);
-    if (window->texture) SDL_DestroyTexture(window->texture);
-    if (window->target) SDL_DestroyRenderer(window->target);
+    caption_close(window->screen.caption);
+    if (window->screen.texture) SDL_DestroyTexture(window->screen.texture);
+    if (window->screen.renderer) SDL_DestroyRenderer(window->screen.renderer);
     // X11's window stays until the process ends. The loop's last event to it may still be on its way, on a
     // separate connection, and Xlib ends the process with status 1 if it finds no window.
     const char *driver = SDL_GetCurrentVideoDriver();
     if (driver && strcmp(driver, "x11") == 0) return;
-    if (window->window) SDL_DestroyWindow(window->window);
+    if (window->screen.window) SDL_DestroyWindow(window->screen.window);
     SDL_Quit();
 }
 
@@ -255,7 +257,8 @@ static float text_scale(const Window *window, ImageSize size)
 {
     const float pixels = (float)window->size.width / (float)size.width, usual_dpi = 96;
     float dpi;
-    if (pixels > 1 || SDL_GetDisplayDPI(SDL_GetWindowDisplayIndex(window->window), &dpi, NULL, NULL) != 0)
+    if (pixels > 1 ||
+        SDL_GetDisplayDPI(SDL_GetWindowDisplayIndex(window->screen.window), &dpi, NULL, NULL) != 0)
         return pixels;
     return SDL_clamp(dpi / usual_dpi, 1.0F, 3.0F); // displays may misreport their size
 }
@@ -269,15 +272,16 @@ static bool window_open(Window *window)
     // where SDL draws in software, OpenGL is software too, and slower; SDL would open the window a second
     // time for it
     SDL_SetHintWithPriority(SDL_HINT_FRAMEBUFFER_ACCELERATION, "0", SDL_HINT_DEFAULT);
-    window->window =
+    window->screen.window =
         SDL_CreateWindow(scene_name(window), SDL_WINDOWPOS_UNDEFINED, SDL_WINDOWPOS_UNDEFINED,
                          (int)size.width, (int)size.height, SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
-    if (window->window) window->target = SDL_CreateRenderer(window->window, -1, SDL_RENDERER_PRESENTVSYNC);
-    if (!window->target) return false;
+    if (window->screen.window)
+        window->screen.renderer = SDL_CreateRenderer(window->screen.window, -1, SDL_RENDERER_PRESENTVSYNC);
+    if (!window->screen.renderer) return false;
     size_read(window);
-    window->caption = caption_open(window->target, text_scale(window, size));
+    window->screen.caption = caption_open(window->screen.renderer, text_scale(window, size));
     window->precision = options->frames.settings.precision;
-    window->frame_event = SDL_RegisterEvents(1);
+    window->screen.frame_event = SDL_RegisterEvents(1);
     FrameLoopOptions frames = options->frames;
     frames.notify = frame_notify;
     frames.notify_context = window;
@@ -288,7 +292,7 @@ static bool window_open(Window *window)
 WindowEnd window_run(const WindowOptions *options)
 {
     const bool has_video = SDL_Init(SDL_INIT_VIDEO) == 0;
-    Window window = {.options = options, .redraws = true, .pivot_at = {-1, -1}};
+    Window window = {.options = options, .redraws = true, .mouse.pivot_at = {-1, -1}};
     WindowEnd end = WINDOW_ABSENT;
     if (!display_exists()) {
         fputs("glint: no window can be opened: there is no display; is DISPLAY or WAYLAND_DISPLAY set?\n",

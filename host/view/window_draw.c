@@ -28,7 +28,7 @@ static void title_set(const Window *window)
     else
         text_appendf(&title, ", %u %s", count, count == 1 ? "sample" : "samples");
     text_appendf(&title, " - glint (H: help)");
-    SDL_SetWindowTitle(window->window, text_c(&title));
+    SDL_SetWindowTitle(window->screen.window, text_c(&title));
     text_free(&title);
 }
 
@@ -36,14 +36,15 @@ void frame_show(Window *window)
 {
     const Frame *frame = &window->frame;
     int width = (int)frame->width, height = (int)frame->height;
-    if (!window->texture || window->texture_width != width || window->texture_height != height) {
-        if (window->texture) SDL_DestroyTexture(window->texture);
-        window->texture = SDL_CreateTexture(window->target, SDL_PIXELFORMAT_RGB24,
-                                            SDL_TEXTUREACCESS_STREAMING, width, height);
-        window->texture_width = width;
-        window->texture_height = height;
+    if (!window->screen.texture || window->screen.texture_width != width ||
+        window->screen.texture_height != height) {
+        if (window->screen.texture) SDL_DestroyTexture(window->screen.texture);
+        window->screen.texture = SDL_CreateTexture(window->screen.renderer, SDL_PIXELFORMAT_RGB24,
+                                                   SDL_TEXTUREACCESS_STREAMING, width, height);
+        window->screen.texture_width = width;
+        window->screen.texture_height = height;
     }
-    if (window->texture) SDL_UpdateTexture(window->texture, NULL, frame->pixels, 3 * width);
+    if (window->screen.texture) SDL_UpdateTexture(window->screen.texture, NULL, frame->pixels, 3 * width);
     window->redraws = true;
 }
 
@@ -65,7 +66,7 @@ static void help_draw(const Window *window)
     Text help = {0};
     for (size_t i = 0; i < COUNT_OF(help_rows); i++)
         text_appendf(&help, "%s%-12s  %s", i > 0 ? "\n" : "", help_rows[i].input, help_rows[i].effect);
-    caption_draw(window->caption, CAPTION_TOP, text_c(&help));
+    caption_draw(window->screen.caption, CAPTION_TOP, text_c(&help));
     text_free(&help);
 }
 
@@ -76,9 +77,9 @@ static void facts_draw(const Window *window)
     if (window->shows_times && window->frame.summary) text_appendf(&text, "%s", window->frame.summary);
     if (text.count > 0 && window->frame.largest_error >= 0)
         text_appendf(&text, "\nlargest error against double: %.3g", window->frame.largest_error);
-    if (window->shows_facts && window->facts)
-        text_appendf(&text, "%s%s", text.count > 0 ? "\n" : "", window->facts);
-    caption_draw(window->caption, CAPTION_TOP, text_c(&text));
+    if (window->facts.are_shown && window->facts.text)
+        text_appendf(&text, "%s%s", text.count > 0 ? "\n" : "", window->facts.text);
+    caption_draw(window->screen.caption, CAPTION_TOP, text_c(&text));
     text_free(&text);
 }
 
@@ -90,25 +91,25 @@ static void message_draw(const Window *window)
     if (text.count > 0 && text.items[text.count - 1] != '\n') text_appendf(&text, "\n");
     text_appendf(&text, "%s", text_c(&window->stage));
     if (text.count > 0 && text.items[text.count - 1] == '\n') text.items[text.count - 1] = '\0';
-    caption_draw(window->caption, CAPTION_BOTTOM, text_c(&text));
+    caption_draw(window->screen.caption, CAPTION_BOTTOM, text_c(&text));
     text_free(&text);
 }
 
 void window_draw(Window *window)
 {
-    SDL_SetRenderDrawColor(window->target, 0, 0, 0, 255);
-    SDL_RenderClear(window->target);
-    if (window->texture) SDL_RenderCopy(window->target, window->texture, NULL, NULL);
-    caption_reserve(window->caption, time_line_height(window));
+    SDL_SetRenderDrawColor(window->screen.renderer, 0, 0, 0, 255);
+    SDL_RenderClear(window->screen.renderer);
+    if (window->screen.texture) SDL_RenderCopy(window->screen.renderer, window->screen.texture, NULL, NULL);
+    caption_reserve(window->screen.caption, time_line_height(window));
     if (window->frame.pixels && window->frame.largest_error >= 0)
-        legend_draw(window->caption, window->target, window->frame.largest_error);
+        legend_draw(window->screen.caption, window->screen.renderer, window->frame.largest_error);
     if (window->shows_help)
         help_draw(window);
     else
         facts_draw(window);
     message_draw(window);
     time_line_draw(window);
-    SDL_RenderPresent(window->target);
+    SDL_RenderPresent(window->screen.renderer);
     title_set(window);
     window->redraws = false;
 }

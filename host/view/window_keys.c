@@ -55,14 +55,14 @@ static void key_ask(Window *window)
     else if (!has_time_line(window))
         message_show(window, memory_copy_text("K needs an animation: a scene with 'frames' above 1"));
     else
-        window->key_is_due = true;
-    window->plays = false;
+        window->play.key_is_due = true;
+    window->play.is_running = false;
 }
 
 void key_record(Window *window)
 {
-    if (!window->key_is_due || window->scene.frame != window->scene_frame) return;
-    window->key_is_due = false;
+    if (!window->play.key_is_due || window->scene.frame != window->scene_frame) return;
+    window->play.key_is_due = false;
     camera_write(window, &window->scene_frame);
 }
 
@@ -77,7 +77,7 @@ static void image_save(Window *window, const char *ending)
         text_free(&path);
         text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
     } while (access(text_c(&path), F_OK) == 0);
-    window->plays = false;
+    window->play.is_running = false;
     request_send(window); // saves what was asked for before
     frame_loop_save(window->frames, text_c(&path));
     text_free(&path);
@@ -87,22 +87,22 @@ static void facts_toggle(Window *window)
 {
     int x, y;
     SDL_GetMouseState(&x, &y);
-    position_set(window, window->hover, x, y);
-    window->shows_facts = window->facts_are_due = window->prints_facts = !window->shows_facts;
-    free(window->facts);
-    window->facts = NULL;
+    position_set(window, window->facts.at, x, y);
+    window->facts.are_shown = window->facts.are_due = window->facts.prints = !window->facts.are_shown;
+    free(window->facts.text);
+    window->facts.text = NULL;
     window->redraws = true;
 }
 
 static void full_screen_toggle(const Window *window)
 {
-    bool is_full = SDL_GetWindowFlags(window->window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
-    SDL_SetWindowFullscreen(window->window, is_full ? 0 : SDL_WINDOW_FULLSCREEN_DESKTOP);
+    bool is_full = SDL_GetWindowFlags(window->screen.window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
+    SDL_SetWindowFullscreen(window->screen.window, is_full ? 0 : SDL_WINDOW_FULLSCREEN_DESKTOP);
 }
 
 void key_press(Window *window, const SDL_KeyboardEvent *event)
 {
-    if (window->drag == DRAG_LOOK && event->keysym.sym != SDLK_ESCAPE) return; // they fly
+    if (window->mouse.drag == DRAG_LOOK && event->keysym.sym != SDLK_ESCAPE) return; // they fly
     message_show(window, NULL);
     switch (event->keysym.sym) {
     case SDLK_LEFT:
@@ -122,7 +122,7 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
         break;
     case SDLK_COMMA:
     case SDLK_PERIOD:
-        window->plays = false;
+        window->play.is_running = false;
         scene_frame_show(window, window->scene_frame + (event->keysym.sym == SDLK_PERIOD ? INT64_C(1) : -1));
         break;
     case SDLK_r:

@@ -10,7 +10,7 @@ static const double FLY_SPEED = 1;      // distances to the point looked at, per
 void position_set(const Window *window, double position[2], int x, int y)
 {
     int width, height;
-    SDL_GetWindowSize(window->window, &width, &height);
+    SDL_GetWindowSize(window->screen.window, &width, &height);
     position[0] = x * (double)window->size.width / width;
     position[1] = y * (double)window->size.height / height;
 }
@@ -37,49 +37,49 @@ static double distance_known(const Window *window, const double at[2])
 static void pivot_pick(Window *window, const double at[2])
 {
     double distance = distance_known(window, at);
-    if (distance <= 0 && memcmp(at, window->pivot_at, sizeof window->pivot_at) == 0) return;
+    if (distance <= 0 && memcmp(at, window->mouse.pivot_at, sizeof window->mouse.pivot_at) == 0) return;
     if (distance <= 0) distance = target_distance(window);
     const CameraRay ray = camera_ray(&window->camera, window->size, at[0], at[1]);
-    window->pivot = vector_add(ray.origin, vector_scale(ray.direction, distance));
-    memcpy(window->pivot_at, at, sizeof window->pivot_at);
+    window->mouse.pivot = vector_add(ray.origin, vector_scale(ray.direction, distance));
+    memcpy(window->mouse.pivot_at, at, sizeof window->mouse.pivot_at);
 }
 
 void drag_begin(Window *window, const SDL_MouseButtonEvent *event)
 {
-    position_set(window, window->mouse, event->x, event->y);
-    if (event->button == SDL_BUTTON_LEFT && is_in_time_line(window, window->mouse)) {
-        window->drag = DRAG_TIME;
-        time_line_follow(window, window->mouse);
+    position_set(window, window->mouse.at, event->x, event->y);
+    if (event->button == SDL_BUTTON_LEFT && is_in_time_line(window, window->mouse.at)) {
+        window->mouse.drag = DRAG_TIME;
+        time_line_follow(window, window->mouse.at);
         return;
     }
-    pivot_pick(window, window->mouse);
+    pivot_pick(window, window->mouse.at);
     if (event->button == SDL_BUTTON_LEFT && event->clicks == 2) {
-        camera_look_at(&window->camera, window->pivot);
+        camera_look_at(&window->camera, window->mouse.pivot);
         window->camera_changed = true;
         return;
     }
     bool pans = event->button == SDL_BUTTON_MIDDLE || SDL_GetModState() & KMOD_SHIFT;
-    window->drag = event->button == SDL_BUTTON_RIGHT ? DRAG_LOOK : pans ? DRAG_PAN : DRAG_ORBIT;
-    window->pan_distance = vector_length(vector_subtract(window->pivot, window->camera.position));
-    window->flown_seconds = clock_seconds();
+    window->mouse.drag = event->button == SDL_BUTTON_RIGHT ? DRAG_LOOK : pans ? DRAG_PAN : DRAG_ORBIT;
+    window->mouse.pan_distance = vector_length(vector_subtract(window->mouse.pivot, window->camera.position));
+    window->mouse.flown_seconds = clock_seconds();
 }
 
 void drag_move(Window *window, const SDL_MouseMotionEvent *event)
 {
-    if (window->drag == DRAG_NONE) return;
+    if (window->mouse.drag == DRAG_NONE) return;
     double to[2];
     position_set(window, to, event->x, event->y);
-    if (window->drag == DRAG_TIME) {
+    if (window->mouse.drag == DRAG_TIME) {
         time_line_follow(window, to);
         return;
     }
-    double right = to[0] - window->mouse[0], down = to[1] - window->mouse[1];
+    double right = to[0] - window->mouse.at[0], down = to[1] - window->mouse.at[1];
     Camera *camera = &window->camera;
-    if (window->drag == DRAG_ORBIT) {
+    if (window->mouse.drag == DRAG_ORBIT) {
         double angle = M_PI / window->size.height;
-        camera_orbit(camera, window->pivot, -right * angle, -down * angle);
-    } else if (window->drag == DRAG_PAN) {
-        camera_pan(camera, window->size, window->pan_distance, window->mouse, to);
+        camera_orbit(camera, window->mouse.pivot, -right * angle, -down * angle);
+    } else if (window->mouse.drag == DRAG_PAN) {
+        camera_pan(camera, window->size, window->mouse.pan_distance, window->mouse.at, to);
     } else {
         // what is seen ahead follows the mouse
         double tangent = camera->half_tangent * 2 /
@@ -87,7 +87,7 @@ void drag_move(Window *window, const SDL_MouseMotionEvent *event)
         double angle = fmin(tangent, M_PI / window->size.height);
         camera_orbit(camera, camera->position, -right * angle, -down * angle);
     }
-    memcpy(window->mouse, to, sizeof to);
+    memcpy(window->mouse.at, to, sizeof to);
     window->camera_changed = true;
 }
 
@@ -98,14 +98,14 @@ void wheel_turn(Window *window, const SDL_MouseWheelEvent *event)
     SDL_GetMouseState(&x, &y);
     position_set(window, at, x, y);
     pivot_pick(window, at);
-    camera_dolly(&window->camera, window->pivot, pow(WHEEL_FACTOR, (double)event->preciseY));
+    camera_dolly(&window->camera, window->mouse.pivot, pow(WHEEL_FACTOR, (double)event->preciseY));
     window->camera_changed = true;
 }
 
 void fly(Window *window)
 {
-    double now = clock_seconds(), seconds = now - window->flown_seconds;
-    window->flown_seconds = now;
+    double now = clock_seconds(), seconds = now - window->mouse.flown_seconds;
+    window->mouse.flown_seconds = now;
     const Uint8 *keys = SDL_GetKeyboardState(NULL);
     int forward = keys[SDL_SCANCODE_W] - keys[SDL_SCANCODE_S];
     int right = keys[SDL_SCANCODE_D] - keys[SDL_SCANCODE_A];

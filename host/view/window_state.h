@@ -7,44 +7,65 @@
 
 typedef enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN, DRAG_LOOK, DRAG_TIME } Drag;
 
+// What SDL has of the window.
 typedef struct {
-    const WindowOptions *options;
     SDL_Window *window;
-    SDL_Renderer *target;
+    SDL_Renderer *renderer;
     SDL_Texture *texture; // the frame's pixels
     int texture_width, texture_height;
     Caption *caption;
-    FrameLoop *frames;
     Uint32 frame_event;
+} Screen;
 
-    ImageSize size; // in pixels, which a point of the window may have several of
-    Camera camera;  // follows the scene's own unless it was moved
-    SceneUpdate scene;
+typedef struct {
+    Drag drag;
+    double at[2], pan_distance; // in pixels
+    Vector3 pivot;              // the point that was last picked, and where
+    double pivot_at[2];
+    double flown_seconds; // the moment up to which the camera has flown
+} Mouse;
+
+typedef struct {
+    bool is_running, key_is_due; // a key is recorded once the scene of its frame was read
+    double start_seconds;        // the moment, and the frame of the animation then, from which it plays
+    uint32_t start_frame;
+} Play;
+
+// What the pixel under the cursor shows.
+typedef struct {
+    double at[2];     // the cursor, in pixels
+    char *text;       // NULL: not shown, or not known yet
+    unsigned request; // the request whose image the text describes
+    bool are_shown, are_due, prints;
+} PixelFacts;
+
+// All of it is owned by the window's thread. The FrameLoop has what the thread that renders owns and what
+// both share.
+typedef struct {
+    const WindowOptions *options;
+    FrameLoop *frames;
+    Screen screen;
+
+    // what is asked for
+    ImageSize size;       // in pixels, which a point of the window may have several of
+    Camera camera;        // follows the scene's own unless it was moved
     uint32_t scene_frame; // the animation's frame of the last or the next request
     View view;
     Precision precision;
     bool camera_changed, scene_frame_changed, image_changed;
-    bool is_loaded;         // the scene
     unsigned request;       // the last one
     unsigned image_request; // the last one for another view, precision or size
+
+    // what the loop has delivered
+    bool is_loaded; // the scene
+    SceneUpdate scene;
     Frame frame;
 
-    Drag drag;
-    double mouse[2], pan_distance; // in pixels
-    Vector3 pivot;                 // the point that was last picked, and where
-    double pivot_at[2];
-    double flown_seconds; // the moment up to which the camera has flown
-
-    bool plays, key_is_due; // once the scene of its frame was read
-    double play_seconds;    // the moment, and the frame of the animation then, from which it plays
-    uint32_t play_frame;
-
-    char *message;   // at the bottom, until the next key
-    Text stage;      // what keeps the next frame waiting; empty: not shown
-    double hover[2]; // the cursor, in pixels
-    char *facts;     // of the pixel there; NULL: not shown, or not known yet
-    bool shows_facts, facts_are_due, prints_facts;
-    unsigned facts_request; // the request whose image they describe
+    Mouse mouse;
+    Play play;
+    PixelFacts facts;
+    char *message; // at the bottom, until the next key
+    Text stage;    // what keeps the next frame waiting; empty: not shown
     bool shows_help, shows_times, redraws, closes;
 } Window;
 

@@ -14,8 +14,8 @@ bool has_time_line(const Window *window)
 
 static void play_start(Window *window)
 {
-    window->play_seconds = clock_seconds();
-    window->play_frame = window->scene_frame;
+    window->play.start_seconds = clock_seconds();
+    window->play.start_frame = window->scene_frame;
 }
 
 void scene_frame_show(Window *window, int64_t frame)
@@ -30,24 +30,25 @@ void scene_frame_show(Window *window, int64_t frame)
 
 void play_toggle(Window *window)
 {
-    window->plays = !window->plays && has_time_line(window);
+    window->play.is_running = !window->play.is_running && has_time_line(window);
     play_start(window);
 }
 
 void play(Window *window)
 {
-    if (window->drag == DRAG_TIME) play_start(window);
+    if (window->mouse.drag == DRAG_TIME) play_start(window);
     if (window->frame.number != window->request || window->scene_frame_changed) return;
     const double rate = window->scene.frame_rate > 0 ? window->scene.frame_rate : FRAME_RATE_DEFAULT;
-    const double frames = rate * (clock_seconds() - window->play_seconds);
-    const uint32_t due = (uint32_t)((window->play_frame + (uint64_t)frames) % window->scene.frame_count);
+    const double frames = rate * (clock_seconds() - window->play.start_seconds);
+    const uint32_t due =
+        (uint32_t)((window->play.start_frame + (uint64_t)frames) % window->scene.frame_count);
     window->scene_frame_changed = due != window->scene_frame;
     window->scene_frame = due;
 }
 
 int time_line_height(const Window *window)
 {
-    return has_time_line(window) ? caption_character(window->caption).y + 2 * MARGIN : 0;
+    return has_time_line(window) ? caption_character(window->screen.caption).y + 2 * MARGIN : 0;
 }
 
 bool is_in_time_line(const Window *window, const double at[2])
@@ -63,9 +64,9 @@ void time_line_follow(Window *window, const double at[2])
 
 static void area_fill(const Window *window, SDL_Rect area, SDL_Color color)
 {
-    SDL_SetRenderDrawBlendMode(window->target, SDL_BLENDMODE_BLEND);
-    SDL_SetRenderDrawColor(window->target, color.r, color.g, color.b, color.a);
-    SDL_RenderFillRect(window->target, &area);
+    SDL_SetRenderDrawBlendMode(window->screen.renderer, SDL_BLENDMODE_BLEND);
+    SDL_SetRenderDrawColor(window->screen.renderer, color.r, color.g, color.b, color.a);
+    SDL_RenderFillRect(window->screen.renderer, &area);
 }
 
 void time_line_draw(const Window *window)
@@ -80,5 +81,5 @@ void time_line_draw(const Window *window)
               (SDL_Color){96, 160, 255, 255});
     char text[64];
     snprintf(text, sizeof text, "frame %u of %u", window->scene_frame, window->scene.frame_count);
-    caption_draw_line(window->caption, INDENT, top + MARGIN, text);
+    caption_draw_line(window->screen.caption, INDENT, top + MARGIN, text);
 }
