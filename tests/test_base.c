@@ -156,10 +156,7 @@ TEST(test_text_nearest)
 
 TEST(test_array)
 {
-    struct {
-        uint64_t *items;
-        size_t count, capacity;
-    } numbers = {0};
+    ARRAY_OF(uint64_t) numbers = {0};
     for (uint64_t i = 0; i < 5000; i++)
         array_push(numbers, i * i);
     assert_int_equal(numbers.count, 5000);

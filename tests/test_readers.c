@@ -1,5 +1,6 @@
 // Feeds randomly damaged files to the readers of tests/fuzz/readers.c in a sanitized build. tools/fuzz
 // generates inputs guided by coverage. run_tests: sanitized
+#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/compile/random_shape.h"
@@ -15,10 +16,7 @@
 // A reader that takes longer for one input ends by SIGALRM.
 enum { SECONDS_MAX = 20, LENGTH_MAX = 1 << 16, EDITS_MAX = 6 };
 
-typedef struct {
-    Text *items;
-    size_t count, capacity;
-} Seeds;
+typedef ARRAY_OF(Text) Seeds;
 
 static Random random_state;
 

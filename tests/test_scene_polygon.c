@@ -8,10 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct {
-    Vector3 *items;
-    size_t count, capacity;
-} Outline;
+typedef ARRAY_OF(Vector3) Outline;
 
 static PolygonTriangles triangles;
 

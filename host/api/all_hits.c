@@ -15,10 +15,7 @@ typedef struct {
     double t, normal[3], position[3];
 } BatchHit;
 
-typedef struct {
-    BatchHit *items;
-    size_t count, capacity;
-} BatchHits;
+typedef ARRAY_OF(BatchHit) BatchHits;
 
 typedef struct {
     TraceRay *rays;    // scaled, those that may hit more

@@ -1,6 +1,7 @@
 // Collects errors and warnings for the user with their file, line and column.
 #pragma once
 
+#include "host/base/array.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -16,10 +17,7 @@ typedef struct {
     char *source_line;     // the line itself for the caret, or NULL
 } Message;
 
-typedef struct {
-    Message *items;
-    size_t count, capacity;
-} MessageList;
+typedef ARRAY_OF(Message) MessageList;
 
 // The text in memory that a message points into, so that its line can be shown with a caret.
 typedef struct Source {

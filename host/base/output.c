@@ -22,10 +22,7 @@ typedef struct {
     const char *name;
 } Pending;
 
-static struct {
-    Pending *items;
-    size_t count, capacity;
-} pending;
+static ARRAY_OF(Pending) pending;
 
 static pthread_mutex_t pending_mutex = PTHREAD_MUTEX_INITIALIZER; // of `pending`, which threads share
 

@@ -18,10 +18,7 @@ struct Stage {
     bool keeps_spans;
     pthread_t opener;
     double stage_start_seconds;
-    struct {
-        HostSpan *items;
-        size_t count, capacity;
-    } spans;
+    ARRAY_OF(HostSpan) spans;
 };
 
 Stage *stage_open(bool keeps_spans)

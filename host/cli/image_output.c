@@ -42,10 +42,7 @@ struct ImageOutput {
 
     RerenderCounts rerenders; // the sum over all bands so far
     // All bands, if the file records their counts before their pixels.
-    struct {
-        Film *items;
-        size_t count, capacity;
-    } kept;
+    ARRAY_OF(Film) kept;
 };
 
 ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOrigin *origin)

@@ -284,10 +284,7 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
 
 // Computes that are released only when the process ends. They are listed so that LeakSanitizer does not
 // report them as leaks.
-static struct {
-    Compute *items;
-    size_t count, capacity;
-} left;
+static ARRAY_OF(Compute) left;
 
 // Closes a Compute. Returns EXIT_MACHINE with a message if the device failed, else `status`.
 static int compute_end(Compute *compute, int status)

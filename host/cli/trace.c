@@ -50,10 +50,7 @@ static const CommandLine command_line = {
     OPERANDS(SCENE, TraceOptions, scene),
     .check = options_check};
 
-typedef struct {
-    TraceRay *items;
-    size_t count, capacity;
-} RayList;
+typedef ARRAY_OF(TraceRay) RayList;
 
 // Reads up to eight numbers of a line. Returns their count, or -1 if a word is not a number.
 static int line_numbers(Report *report, size_t start, size_t end, double numbers[8])

@@ -25,10 +25,7 @@ typedef struct {
     int alpha;             // or -1
 } Candidate;
 
-typedef struct {
-    Candidate *items;
-    size_t count, capacity;
-} CandidateList;
+typedef ARRAY_OF(Candidate) CandidateList;
 
 static Base base_of(const char *name)
 {

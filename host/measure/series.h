@@ -1,12 +1,10 @@
 // Summarizes repeated measurements of one quantity without supposing a distribution.
 #pragma once
 
+#include "host/base/array.h"
 #include <stddef.h>
 
-typedef struct {
-    double *items;
-    size_t count, capacity;
-} Series;
+typedef ARRAY_OF(double) Series;
 
 typedef struct {
     double min, lower_quartile, median, upper_quartile, max;

@@ -103,12 +103,9 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
 typedef struct {
     pthread_mutex_t mutex;
     RenderCommand *command;
-    size_t next, end; // frames that were not dealt yet
-    struct {
-        size_t *items; // of ranks whose devices failed
-        size_t count, capacity;
-    } again;
-    size_t workers, dealt; // workers whose devices work, frames that are being rendered
+    size_t next, end;       // frames that were not dealt yet
+    ARRAY_OF(size_t) again; // of ranks whose devices failed
+    size_t workers, dealt;  // workers whose devices work, frames that are being rendered
     bool has_ended;
 } Deal;
 

@@ -7,6 +7,7 @@
 // fails, since no result depends on it. A failed Compute is closed, not repaired. Others are not affected.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/opencl/device.h"
@@ -29,14 +30,11 @@ typedef struct {
 typedef struct Compute {
     const Device *device; // outlives the Compute
     cl_context context;
-    cl_command_queue queue;       // in order, profiling on
-    ComputeFailure failure;       // the first
-    ComputeFailure unmap_failure; // the first of an unmap; a failure of the Compute at the next launch
-    struct Compute *reference;    // another device, for work in double; NULL: this one does it
-    struct {
-        CapturedArgument *items;
-        size_t count, capacity;
-    } captured; // empty unless the device has a capture folder
+    cl_command_queue queue;              // in order, profiling on
+    ComputeFailure failure;              // the first
+    ComputeFailure unmap_failure;        // the first of an unmap; a failure of the Compute at the next launch
+    struct Compute *reference;           // another device, for work in double; NULL: this one does it
+    ARRAY_OF(CapturedArgument) captured; // empty unless the device has a capture folder
 } Compute;
 
 // Opens the device. Returns false on failure. compute_close closes it in either case.

@@ -1,6 +1,7 @@
 // Launches the probes of kernels/passport.cl. The host checks all results of the device.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/opencl/exact.h"
 #include "host/opencl/passport.h"
 #include "kernels/probes.h"
@@ -28,10 +29,7 @@ typedef struct {
     Program program;
     cl_kernel kernel;
     cl_mem operands, results;
-    struct {
-        LaunchTime *items;
-        size_t count, capacity;
-    } launches;
+    ARRAY_OF(LaunchTime) launches;
     cl_uint timed_rounds; // of chains that are long enough to be timed
     double start;         // of the measurement, after the builds
     uint64_t random;

@@ -2,6 +2,7 @@
 // and scene_compile (host/compile) turns it into the device's arrays.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "host/scene/affine.h"
@@ -281,36 +282,15 @@ typedef struct {
         // The product of the sky's color, both ranges of a cell and this is a part of the light's color.
         double cell_factor;
     } sky;
-    struct {
-        Light *items;
-        size_t count, capacity;
-    } lights;
-    struct {
-        Material *items;
-        size_t count, capacity;
-    } materials;
-    struct {
-        char **items;
-        size_t count, capacity;
-    } material_names; // one for each material; may be ""
-    struct {
-        Object *items;
-        size_t count, capacity;
-    } objects; // an object's id is the number of primitives before it
-    struct {
-        Mesh *items;
-        size_t count, capacity;
-    } meshes;
+    ARRAY_OF(Light) lights;
+    ARRAY_OF(Material) materials;
+    ARRAY_OF(char *) material_names; // one for each material; may be ""
+    ARRAY_OF(Object) objects;        // an object's id is the number of primitives before it
+    ARRAY_OF(Mesh) meshes;
     size_t copied_triangle_count; // of meshes whose file another mesh has
-    struct {
-        SceneTexture *items;
-        size_t count, capacity;
-    } textures;
+    ARRAY_OF(SceneTexture) textures;
     uint64_t text_hash; // of the bytes of all files and the overrides; hash_bytes
-    struct {
-        IncludedFile *items;
-        size_t count, capacity;
-    } included;
+    ARRAY_OF(IncludedFile) included;
     Source *overrides;    // what replaced values of the file, PATH=VALUE each, in order; NULL if none
     bool is_animated;     // values depend on the frame
     uint32_t frame_count; // of the animation; 0: not given

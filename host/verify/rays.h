@@ -2,6 +2,7 @@
 // reference computes the answers; tests/oracle.sh checks those in exact arithmetic.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/verify/families.h"
 #include "host/verify/run.h"
 
@@ -46,10 +47,7 @@ typedef struct {
     VerifyRay required;
 } VerifyTestRay;
 
-typedef struct {
-    VerifyTestRay *items;
-    size_t count, capacity;
-} VerifyTestRays;
+typedef ARRAY_OF(VerifyTestRay) VerifyTestRays;
 
 // Returns the scene of a set. The caller frees it with scene_free.
 Scene verify_rays_scene(const VerifyRays *set);

@@ -28,10 +28,7 @@ struct Watch {
     pthread_t thread;
     pthread_mutex_t mutex; // guards what follows
     bool has_failed;       // a folder cannot be watched, which is reported once
-    struct {
-        WatchedFile *items;
-        size_t count, capacity;
-    } files;
+    ARRAY_OF(WatchedFile) files;
 };
 
 static bool is_watched(Watch *watch, const struct inotify_event *event)
