@@ -210,7 +210,7 @@ static void drift_print(const BenchReport *report, const BenchRow *row, FILE *st
 static void row_print(const BenchReport *report, size_t i, FILE *stream)
 {
     const BenchRow *row = &report->set->rows[i];
-    fprintf(stream, "  %-6s %5u  %-4s", row->key.precision, row->key.lanes, row->key.bvh);
+    fprintf(stream, "  %-9s %5u  %-4s", row->key.precision, row->key.lanes, row->key.bvh);
     if (row->failure) {
         fprintf(stream, "  not available: %s\n", row->failure);
         variant_print(report, i, stream);
@@ -260,8 +260,8 @@ static void rays_print(const uint64_t *rays, const char *indent, FILE *stream)
 }
 
 static const char table_head[] =
-    "                      frame ms                   kernel ms                           build ms\n"
-    "                       min   median      max      min   median      max  clock runs   cold  kept"
+    "                                 frame ms                  kernel ms                        build ms\n"
+    "  precision lanes  bvh       min   median      max      min   median      max  clock runs  cold kept"
     " Mrays/s  kernel\n";
 
 void bench_print_text(const BenchReport *report, FILE *stream)
