@@ -118,6 +118,13 @@ static inline mask quotient_is_bounded(real a, real b)
     return fabs(a) < fabs(b) * (real)(1 / SMALLEST_RATIO);
 }
 
+// Returns a / b, or `otherwise` if that is out of range.
+static inline real divide_or(real a, real b, real otherwise)
+{
+    mask usable = quotient_is_bounded(a, b);
+    return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
+}
+
 // Returns the square root of a >= 0, correctly rounded at `strict` on every device; 0 for 0.
 static inline real real_sqrt(real a)
 {

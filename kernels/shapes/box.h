@@ -26,16 +26,30 @@ static inline Interval slab_crossings(real low, real high, real origin, real dir
                       lanes_select(parallel, always, real_max(to_low, to_high))};
 }
 
-static inline mask box_hit(const Box *box, const Ray *ray, real *t)
+// The intervals of t where a ray is between the two faces across each axis.
+typedef struct {
+    Interval x, y, z;
+} BoxSlabs;
+
+static inline BoxSlabs box_slabs(const Box *box, const Ray *ray)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
-    Interval x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
-    Interval y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
-    Interval z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
-    real near = real_max(real_max(x.near, y.near), z.near);
-    real far = real_min(real_min(x.far, y.far), z.far);
-    *t = ray_first(ray, near, far);
-    return RAY_ACTIVE(ray) & (near <= far) & (*t > ray->tmin);
+    return (BoxSlabs){slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x),
+                      slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y),
+                      slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z)};
+}
+
+// Returns the interval where a ray is between all faces.
+static inline Interval slabs_common(BoxSlabs slabs)
+{
+    return intervals_common(intervals_common(slabs.x, slabs.y), slabs.z);
+}
+
+static inline mask box_hit(const Box *box, const Ray *ray, real *t)
+{
+    const Interval inside = slabs_common(box_slabs(box, ray));
+    *t = ray_first(ray, inside.near, inside.far);
+    return RAY_ACTIVE(ray) & (inside.near <= inside.far) & (*t > ray->tmin);
 }
 
 // Returns |t - crossing| for the nearer of a slab's crossings. Sets *low_face if that is the slab's low
@@ -58,13 +72,11 @@ static inline real slab_clamp(real value, real low, real high)
 static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
-    Interval x = slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x);
-    Interval y = slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y);
-    Interval z = slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z);
+    const BoxSlabs slabs = box_slabs(box, ray);
     mask low_x, low_y, low_z;
-    real to_x = slab_distance(x, ray->direction.x, t, &low_x);
-    real to_y = slab_distance(y, ray->direction.y, t, &low_y);
-    real to_z = slab_distance(z, ray->direction.z, t, &low_z);
+    real to_x = slab_distance(slabs.x, ray->direction.x, t, &low_x);
+    real to_y = slab_distance(slabs.y, ray->direction.y, t, &low_y);
+    real to_z = slab_distance(slabs.z, ray->direction.z, t, &low_z);
     mask on_x = (to_x <= to_y) & (to_x <= to_z);
     mask on_y = !on_x & (to_y <= to_z);
     mask on_z = !on_x & !on_y;
@@ -99,10 +111,9 @@ static inline Interval certain_slab(real low, real high, real more, real origin,
 static inline Interval certain_box(const Box *box, const Ray *ray, real more)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high), o = ray->origin, d = ray->direction;
-    Interval x = certain_slab(low.x, high.x, more, o.x, d.x, ray->inverse.x);
-    Interval y = certain_slab(low.y, high.y, more, o.y, d.y, ray->inverse.y);
-    Interval z = certain_slab(low.z, high.z, more, o.z, d.z, ray->inverse.z);
-    return (Interval){real_max(real_max(x.near, y.near), z.near), real_min(real_min(x.far, y.far), z.far)};
+    return slabs_common((BoxSlabs){certain_slab(low.x, high.x, more, o.x, d.x, ray->inverse.x),
+                                   certain_slab(low.y, high.y, more, o.y, d.y, ray->inverse.y),
+                                   certain_slab(low.z, high.z, more, o.z, d.z, ray->inverse.z)});
 }
 
 // Returns the hit with bounds. The enlarged box contains the interval of the exact crossings, and the shrunk
@@ -121,14 +132,10 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
     if (!lanes_any(perhaps)) return certain_miss();
     Interval inner = certain_box(box, ray, -place);
-    mask certain = perhaps & (inner.near < inner.far);
-    real near_high = lanes_select(certain, inner.near, NEVER);
-    CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
-    CertainHit far =
-        certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
-    // if the ray starts on a face, the other crossing counts
-    mask leaves = ray->origin_object == (integer)((scalar_integer)box->id.x);
-    return certain_select(leaves & certain, far, certain_first(ray, near, near_high, far));
+    mask certain = perhaps & (inner.near < inner.far),
+         leaves = ray->origin_object == (integer)((scalar_integer)box->id.x);
+    const CertainInterval inside = {outer, inner, {-NEVER, NEVER}, certain, perhaps};
+    return certain_interval_hit(&inside, ray, leaves & certain);
 }
 
 // Sets the errors of a point. Faces that join at an edge have different normals, so another face that is as

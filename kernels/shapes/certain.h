@@ -19,13 +19,6 @@ typedef struct {
     real t, low, high;
 } CertainHit;
 
-// Returns a / b, or `otherwise` if that is out of range.
-static inline real divide_or(real a, real b, real otherwise)
-{
-    mask usable = quotient_is_bounded(a, b);
-    return lanes_select(usable, real_divide(a, lanes_select(usable, b, (real)(1))), otherwise);
-}
-
 // Returns a bound on the distance of the exact ray from the packet's, up to a distance along it.
 static inline real ray_place_error(const Ray *ray, real distance)
 {
@@ -83,10 +76,24 @@ static inline CertainHit certain_miss(void)
     return (CertainHit){mask_none(), mask_none(), (real)(0), (real)(0), (real)(0)};
 }
 
-// Returns the first of two crossings, or the second if the first lies before the start.
-static inline CertainHit certain_first(const Ray *ray, CertainHit near, real near_high, CertainHit far)
+// The interval of t in which the exact ray is inside a convex set. If `certain`, it contains `inner`. If
+// `perhaps`, it lies within `outer`. Its ends are close to those of `roots`, unless these are NEVER.
+typedef struct {
+    Interval outer, inner, roots;
+    mask certain, perhaps;
+} CertainInterval;
+
+// Returns where the ray enters the set or, if it starts inside or on its surface in the lanes `leaves`, where
+// it leaves it.
+static inline CertainHit certain_interval_hit(const CertainInterval *inside, const Ray *ray, mask leaves)
 {
-    return certain_select(near_high < ray->tmin, far, near);
+    const mask certain = inside->certain, perhaps = inside->perhaps;
+    real near_high = lanes_select(certain, inside->inner.near, NEVER),
+         far_low = lanes_select(certain, inside->inner.far, ray->tmin);
+    CertainHit near = certain_crossing(ray, certain, perhaps, inside->outer.near, near_high),
+               far = certain_crossing(ray, certain, perhaps, far_low, inside->outer.far);
+    return certain_select(leaves | (near_high < ray->tmin), certain_at(far, inside->roots.far),
+                          certain_at(near, inside->roots.near));
 }
 
 static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
@@ -175,6 +182,26 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     real computed = lanes_select(crossed.refines, (real)(2.5f * UNIT_ROUNDOFF) * distance, along + along);
     crossed.t_error = inverse_length * (moved + computed);
     return crossed;
+}
+
+// The part of a line within the bounding sphere of a finite shape, in the lanes where it is not empty or
+// behind the ray's start.
+typedef struct {
+    mask lanes;
+    Interval part;
+    real middle_t; // the closest point to the center
+} BoundedLine;
+
+static inline BoundedLine line_within_bounds(Vector center, real radius, const Ray *ray)
+{
+    const CertainSphere bounding =
+        certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
+    BoundedLine line = {bounding.perhaps, {(real)(0), (real)(0)}, bounding.middle_t};
+    if (!lanes_any(line.lanes)) return line;
+    line.part = (Interval){sphere_near(&bounding, ray) - bounding.t_error,
+                           sphere_far(&bounding, ray) + bounding.t_error};
+    line.lanes = line.lanes & (line.part.far >= ray->tmin);
+    return line;
 }
 
 #endif

@@ -8,14 +8,8 @@
 #define CERTAIN_ROUND_H
 
 #include "shapes/certain.h"
+#include "shapes/quadratic.h"
 #include "shapes/surface_point.h"
-
-// If `certain`, the exact interval of t contains `inner`. If `perhaps`, it lies within `outer`. Its ends are
-// close to those of `roots`.
-typedef struct {
-    Interval outer, inner, roots;
-    mask certain, perhaps;
-} CertainInterval;
 
 // The inside is rho <= radius + slope z, or rho^2 <= k z if k > 0, for the distance rho from the axis and the
 // height z along it.
@@ -127,23 +121,23 @@ static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
     return quadratic;
 }
 
-// Returns whether a height above a plane, which is linear, stays above 0 between `from` and `to`, and beyond
-// except in the lanes `ends`.
-static inline mask height_is_positive(real height, real slope, real slope_error, real t, real from, real to,
+// Returns whether a height above a plane, which is linear and given at t, stays above 0 in a part of the
+// line, and beyond except in the lanes `ends`.
+static inline mask height_is_positive(real height, real slope, real slope_error, real t, Interval part,
                                       mask ends)
 {
-    real at_from = height - real_max(slope + slope_error, (real)(0)) * (t - from);
-    real at_to = height + (slope - slope_error) * (to - t);
+    real at_from = height - real_max(slope + slope_error, (real)(0)) * (t - part.near);
+    real at_to = height + (slope - slope_error) * (part.far - t);
     return (height > (real)(0)) & (at_from > (real)(0)) &
            ((slope >= slope_error) | (ends & (at_to > (real)(0))));
 }
 
-// Returns whether the exact ray misses the side between `from` >= 0 and `to`, and beyond except in the lanes
-// `ends`. At t1, about its closest approach, a plane separates it from the side, or from a parallel surface.
-// Tilted slightly, the plane does so for unbounded rays: rho is at least n . x for n = (across / rho + s q /
-// |q|) / (1 + |s|), and rho^2 at least 2 a . x - a . a for any a.
+// Returns whether the exact ray misses the side in a part of the line, which starts at 0 or later, and beyond
+// except in the lanes `ends`. At t1, about its closest approach, a plane separates it from the side, or from
+// a parallel surface. Tilted slightly, the plane does so for unbounded rays: rho is at least n . x for n =
+// (across / rho + s q / |q|) / (1 + |s|), and rho^2 at least 2 a . x - a . a for any a.
 static inline mask round_misses(const Round *round, const RoundQuadratic *quadratic, const Ray *ray,
-                                real from, real to, mask ends)
+                                Interval part, mask ends)
 {
     const real zero = (real)(0), one = (real)(1);
     real qq = vector_dot(quadratic->q, quadratic->q), q_length = real_sqrt(qq), t1;
@@ -156,10 +150,10 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         real t0 = divide_or(-vector_dot(quadratic->m, quadratic->q), qq, zero);
         real rho = vector_norm(vector_fma(quadratic->q, t0, quadratic->m));
         real steepness = real_sqrt(real_max((q_length - h) * (q_length + h), zero));
-        real end = lanes_select(h > zero, to, from);
+        real end = lanes_select(h > zero, part.far, part.near);
         t1 = lanes_select(tilts, t0 + divide_or(h * rho, q_length * steepness, zero), end);
     }
-    t1 = real_min(real_max(t1, from), to);
+    t1 = interval_clamp(part, t1);
     RoundPoint point = round_point(round, ray, t1);
     real along = vector_dot(point.across, quadratic->q), along_unit = divide_or(along, q_length, zero);
     real height = point.value - point.band, slope, slope_error, tilted, tilted_slope;
@@ -173,8 +167,8 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
     } else {
         height = divide_or(height, point.rho + fabs(point.radius), zero);
         slope_error = rise_error;
-        real part = divide_or(along_unit, point.rho, zero), wanted = divide_or(h, q_length, zero);
-        real difference = wanted - part;
+        real share = divide_or(along_unit, point.rho, zero), wanted = divide_or(h, q_length, zero);
+        real difference = wanted - share;
         real room = lanes_select(difference > zero, one - wanted, one + wanted);
         real tilt = divide_or(difference, room, zero);
         tilted_slope = h - quadratic->h;
@@ -182,43 +176,34 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
         // height. `along_unit` is off by 17 u rho, rho by 9 u, the sum and the quotient add up to 15 u.
         real tilted_rho = fabs(tilt) * point.rho * (real)(1 + 64 * UNIT_ROUNDOFF);
         tilted = height + divide_or(real_fma(tilt, along_unit, -tilted_rho), one + fabs(tilt), zero);
-        slope = real_fma(part, q_length, -quadratic->h);
+        slope = real_fma(share, q_length, -quadratic->h);
     }
-    return height_is_positive(height, slope, slope_error, t1, from, to, ends) |
-           (tilts & height_is_positive(tilted, tilted_slope, slope_error, t1, from, to, ends));
+    return height_is_positive(height, slope, slope_error, t1, part, ends) |
+           (tilts & height_is_positive(tilted, tilted_slope, slope_error, t1, part, ends));
 }
 
-// Returns the interval where the exact ray is inside the side. Roots are searched between `from` and `to`,
+// Returns the interval where the exact ray is inside the side. Roots are searched in a part of the line,
 // beyond which nothing matters if `is_finite`. `perhaps` applies to t >= tmin.
-static inline CertainInterval round_interval(const Round *round, const Ray *ray, mask lanes, real from,
-                                             real to, bool is_finite)
+static inline CertainInterval round_interval(const Round *round, const Ray *ray, mask lanes, Interval part,
+                                             bool is_finite)
 {
     CertainInterval interval;
     interval.outer = interval.inner = interval.roots = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     interval.certain = mask_none();
     const RoundQuadratic quadratic = round_quadratic(round, ray);
     real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF); // for rays to a light
-    mask ends = is_finite ? mask_all() : end < to;
-    interval.perhaps = lanes & !round_misses(round, &quadratic, ray, real_max(from, ray->tmin),
-                                             real_max(real_min(to, end), ray->tmin), ends);
+    mask ends = is_finite ? mask_all() : end < part.far;
+    const Interval ahead = {real_max(part.near, ray->tmin), real_max(real_min(part.far, end), ray->tmin)};
+    interval.perhaps = lanes & !round_misses(round, &quadratic, ray, ahead, ends);
     if (!lanes_any(interval.perhaps)) return interval;
 
-    real a = quadratic.a, root = real_sqrt(real_max(quadratic.discriminant, (real)(0)));
-    mask ahead = quadratic.b < (real)(0);
-    real sum = lanes_select(ahead, root - quadratic.b, -(root + quadratic.b));
-    mask positive = (sum > (real)(0)) == (a >= (real)(0));
-    real one = divide_or(sum, a, lanes_select(positive, (real)(LARGEST), (real)(-LARGEST)));
-    real other = lanes_select(sum == (real)(0), one, divide_or(quadratic.c, sum, one));
-    real near = real_min(one, other), far = real_max(one, other);
-    // a cone around the ray's direction is left or entered once, and the other root belongs to the other
-    // nappe
-    mask outer = a<(real)(0), grows = quadratic.h>(real)(0);
-    real entry = lanes_select(outer, lanes_select(grows, far, (real)(-LARGEST)), near);
-    real leave = lanes_select(outer, lanes_select(grows, (real)(LARGEST), near), far);
-    real roots[2] = {entry, leave};
+    const real a = quadratic.a;
+    const Interval crossed = quadratic_inside(
+        quadratic_roots(a, quadratic.b, quadratic.c, quadratic.discriminant), a, quadratic.h);
+    real roots[2] = {crossed.near, crossed.far};
     real before[2], after[2];
     for (uint i = 0; i < 2; i++) {
-        real t = real_min(real_max(roots[i], from), to);
+        real t = interval_clamp(part, roots[i]);
         RoundPoint point = round_point(round, ray, t);
         real slope = real_fma(a, t, quadratic.b); // half the slope
         real step = divide_or((real)(0.5f) * point.value, slope, (real)(0));
@@ -235,8 +220,8 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         after[i] = t + width;
     }
     interval.roots = (Interval){roots[0], roots[1]};
-    const real enter_out = real_max(before[0], from), enter_in = real_min(after[0], to),
-               leave_in = real_max(before[1], from), leave_out = real_min(after[1], to);
+    const real enter_out = real_max(before[0], part.near), enter_in = real_min(after[0], part.far),
+               leave_in = real_max(before[1], part.near), leave_out = real_min(after[1], part.far);
     RoundPoint outside_before = round_point(round, ray, enter_out),
                inside_first = round_point(round, ray, enter_in),
                inside_last = round_point(round, ray, leave_in),
@@ -256,16 +241,12 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     return interval;
 }
 
-static inline Interval intervals_common(Interval a, Interval b)
+// Returns the part of the line beyond which a rounding of the distance exceeds a 1024th of the size, so that
+// nothing is certain.
+static inline Interval round_range(const Ray *ray, real size)
 {
-    return (Interval){real_max(a.near, b.near), real_min(a.far, b.far)};
-}
-
-// Returns the t beyond which a rounding of the distance exceeds a 1024th of the size, so that nothing is
-// certain.
-static inline real round_range(const Ray *ray, real size)
-{
-    return (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray_inverse_length(ray);
+    const real range = (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray_inverse_length(ray);
+    return (Interval){-range, range};
 }
 
 // The error in u of the coordinates that the axis' direction and the products add. If the radius depends on

@@ -12,18 +12,13 @@ static inline CertainHit round_first_hit(uint flags, const Ray *ray, const Certa
                                          const CertainInterval *slab, mask leaves)
 {
     if (flags & REVOLUTION_CAPPED) {
-        Interval outer = intervals_common(side->outer, slab->outer),
-                 inner = intervals_common(side->inner, slab->inner),
-                 roots = intervals_common(side->roots, slab->roots);
-        mask perhaps = side->perhaps & slab->perhaps & (outer.near <= outer.far);
-        mask certain = perhaps & side->certain & slab->certain & (inner.near < inner.far);
-        real near_high = lanes_select(certain, inner.near, NEVER);
-        CertainHit near = certain_crossing(ray, certain, perhaps, outer.near, near_high);
-        CertainHit far =
-            certain_crossing(ray, certain, perhaps, lanes_select(certain, inner.far, ray->tmin), outer.far);
-        near = certain_at(near, roots.near);
-        far = certain_at(far, roots.far);
-        return certain_select(leaves, far, certain_first(ray, near, near_high, far));
+        CertainInterval solid;
+        solid.outer = intervals_common(side->outer, slab->outer);
+        solid.inner = intervals_common(side->inner, slab->inner);
+        solid.roots = intervals_common(side->roots, slab->roots);
+        solid.perhaps = side->perhaps & slab->perhaps & (solid.outer.near <= solid.outer.far);
+        solid.certain = solid.perhaps & side->certain & slab->certain & (solid.inner.near < solid.inner.far);
+        return certain_interval_hit(&solid, ray, leaves);
     }
     CertainHit hits[2];
     mask passed[2];
@@ -86,21 +81,10 @@ static inline CertainInterval round_slab(const Round *round, const Ray *ray, rea
     return slab;
 }
 
-// Computes the part of the line within a sphere that contains a finite shape.
-static inline mask round_bounds(Vector center, real radius, const Ray *ray, real *from, real *to)
-{
-    CertainSphere bounding =
-        certain_sphere(center, radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
-    if (!lanes_any(bounding.perhaps)) return mask_none();
-    *from = sphere_near(&bounding, ray) - bounding.t_error;
-    *to = sphere_far(&bounding, ray) + bounding.t_error;
-    return bounding.perhaps & (*to >= ray->tmin);
-}
-
 // Returns the first hit on both nappes of an unbounded cone, each of which is a convex body. A ray that
 // starts on one nappe leaves that one.
 static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ray, mask lanes, mask leaves,
-                                          real from, real to)
+                                          Interval range)
 {
     real radius = real_fma(round.slope, vector_dot(round.axis, round.start), round.radius);
     real error = round.start_error * ((real)(1) + fabs(round.slope));
@@ -109,7 +93,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
     for (uint i = 0; i < 2; i++) {
         mask on_it = leaves & (radius > (real)(0));
         CertainInterval side =
-            round_interval(&round, ray, lanes & !(on_it & ray->leaves_outward), from, to, false);
+            round_interval(&round, ray, lanes & !(on_it & ray->leaves_outward), range, false);
         hits[i] = round_first_hit(flags, ray, &side, &slab, on_it);
         round.radius = -round.radius;
         round.slope = -round.slope;
@@ -131,27 +115,28 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 {
     const Round *round = &solid->round;
     mask leaves = ray->origin_object == (integer)((scalar_integer)id.x), lanes = RAY_ACTIVE(ray);
-    real from, to;
+    Interval part;
     if (solid->is_finite) {
-        lanes = lanes & round_bounds(solid->middle, solid->widest + solid->half_height + round->start_error,
-                                     ray, &from, &to);
+        const BoundedLine bounded =
+            line_within_bounds(solid->middle, solid->widest + solid->half_height + round->start_error, ray);
+        lanes = bounded.lanes;
+        part = bounded.part;
         if (!lanes_any(lanes)) return certain_miss();
     } else {
-        to = round_range(ray, vector_norm1(round->start) + vector_norm1(ray->origin) + solid->widest +
-                                  round->foot_norm1);
-        from = -to;
-        if (two_nappes) return nappes_first_hit(*round, id.y, ray, lanes, leaves, from, to);
+        part = round_range(ray, vector_norm1(round->start) + vector_norm1(ray->origin) + solid->widest +
+                                    round->foot_norm1);
+        if (two_nappes) return nappes_first_hit(*round, id.y, ray, lanes, leaves, part);
     }
     lanes = lanes & !(leaves & ray->leaves_outward);
     CertainInterval slab = round_unbounded();
     if (solid->is_finite) {
         slab = round_slab(round, ray, solid->low, solid->high);
-        slab.outer = intervals_common(slab.outer, (Interval){from, to});
+        slab.outer = intervals_common(slab.outer, part);
         slab.perhaps = slab.outer.near <= slab.outer.far;
         lanes = lanes & slab.perhaps;
         if (!lanes_any(lanes)) return certain_miss();
     }
-    CertainInterval side = round_interval(round, ray, lanes, from, to, solid->is_finite);
+    CertainInterval side = round_interval(round, ray, lanes, part, solid->is_finite);
     return round_first_hit(id.y, ray, &side, &slab, leaves);
 }
 
@@ -185,5 +170,20 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
     point->normal_error = lanes_select(on_cap, (real)(4) * turned, point->normal_error);
     return near_end & near_side;
 }
+
+// The functions with bounds of a shape whose name_round returns it as a RoundSolid.
+#define ROUND_SHAPE(name, Type, two_nappes)                                                                  \
+    static inline CertainHit name##_certain_hit(const Type *shape, const Ray *ray)                           \
+    {                                                                                                        \
+        const RoundSolid solid = name##_round(shape, ray);                                                   \
+        return round_solid_hit(&solid, shape->id, two_nappes, ray);                                          \
+    }                                                                                                        \
+                                                                                                             \
+    static inline mask name##_set_errors(const Type *shape, const Ray *ray, real t, real place_error,        \
+                                         SurfacePoint *point)                                                \
+    {                                                                                                        \
+        const RoundSolid solid = name##_round(shape, ray);                                                   \
+        return round_set_errors(&solid, shape->id.y, ray, t, place_error, point);                            \
+    }
 
 #endif

@@ -16,13 +16,8 @@
 #include "shapes/certain_solid.h"
 #include "shapes/ends.h"
 #include "shapes/eye_power.h"
+#include "shapes/quadratic.h"
 #include "shapes/surface_point.h"
-
-typedef struct {
-    Interval side; // the ray is inside the surface between them
-    Interval slab; // the ray is on the apex' side of the end
-    mask real_roots;
-} ParaboloidCrossings;
 
 // Returns the interval of t where the ray is on the apex' side of the shape's end plane.
 static inline Interval paraboloid_slab(real end, Pair from, real towards)
@@ -35,7 +30,7 @@ static inline Interval paraboloid_slab(real end, Pair from, real towards)
                       lanes_select(leaving | parallel, t, (real)(LARGEST))};
 }
 
-static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, const Ray *ray)
+static inline EndedCrossings paraboloid_crossings(const Paraboloid *shape, const Ray *ray)
 {
     Vector axis = vector_of(shape->axis_end);
     const real half_k = (real)(0.5f * shape->apex_k.w), k = (real)(shape->apex_k.w);
@@ -71,18 +66,10 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
         discriminant = lanes_select(near_side, exact, discriminant);
     }
 
-    ParaboloidCrossings crossings;
+    EndedCrossings crossings;
     crossings.real_roots = discriminant >= (real)(0);
-    real root = real_sqrt(real_max(discriminant, (real)(0)));
-    mask ahead = b < (real)(0);
-    real sum = lanes_select(ahead, root - b, -(root + b));
-    mask zero = sum == (real)(0);
     // a ray along the axis has a = 0 and one root, since the other is infinitely far on the open side
-    mask within = quotient_is_bounded(sum, a);
-    real far_root = lanes_select(within, real_divide(sum, lanes_select(within, a, (real)(1))),
-                                 lanes_select(ahead, (real)(LARGEST), (real)(-LARGEST)));
-    real near_root = lanes_select(zero, far_root, real_divide(c, lanes_select(zero, (real)(1), sum)));
-    crossings.side = (Interval){real_min(near_root, far_root), real_max(near_root, far_root)};
+    crossings.side = quadratic_interval(quadratic_roots(a, b, c, discriminant));
     crossings.slab = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     if (shape->id.y & REVOLUTION_FINITE)
         crossings.slab = paraboloid_slab((real)(shape->axis_end.w), height, rise.high);
@@ -91,9 +78,8 @@ static inline ParaboloidCrossings paraboloid_crossings(const Paraboloid *shape, 
 
 static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real *t)
 {
-    ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
-    mask hit = RAY_ACTIVE(ray) & crossings.real_roots;
-    hit = hit & ends_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
+    const EndedCrossings crossings = paraboloid_crossings(shape, ray);
+    mask hit = RAY_ACTIVE(ray) & ends_first_hit(shape->id.y, ray, &crossings, t);
     return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
@@ -101,7 +87,7 @@ static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real 
 // gradient of rho^2 - 4 f z, which is 2 (rho - 2 f w), for the unit axis w.
 static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, const Ray *ray, real t)
 {
-    ParaboloidCrossings crossings = paraboloid_crossings(shape, ray);
+    const EndedCrossings crossings = paraboloid_crossings(shape, ray);
     Vector apex = vector_of(shape->apex_k), axis = vector_of(shape->axis_end);
     real squared_axis = vector_dot(axis, axis);
     real half_lift = real_divide((real)(0.5f * shape->apex_k.w), squared_axis); // 2 f / |w|
@@ -131,12 +117,12 @@ static inline SurfacePoint paraboloid_surface_point(const Paraboloid *shape, con
         Vector on_plane = vector_fma(axis, gap, p);
         SurfacePoint cap = surface_point_make(vector_add(on_plane, apex), vector_normalize(axis), size);
         if (has_eye_power(shape->id)) surface_point_move_to_ray(&cap, ray, t, size);
-        surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
+        surface_point_replace(&point, ends_on_cap(&crossings, t), &cap);
     }
     return point;
 }
 
-static inline RoundSolid round_of_paraboloid(const Paraboloid *shape, const Ray *ray)
+static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ray)
 {
     RoundSolid solid;
     Round *round = &solid.round;
@@ -163,17 +149,6 @@ static inline RoundSolid round_of_paraboloid(const Paraboloid *shape, const Ray 
     return solid;
 }
 
-static inline CertainHit paraboloid_certain_hit(const Paraboloid *shape, const Ray *ray)
-{
-    const RoundSolid solid = round_of_paraboloid(shape, ray);
-    return round_solid_hit(&solid, shape->id, false, ray);
-}
-
-static inline mask paraboloid_set_errors(const Paraboloid *shape, const Ray *ray, real t, real place_error,
-                                         SurfacePoint *point)
-{
-    const RoundSolid solid = round_of_paraboloid(shape, ray);
-    return round_set_errors(&solid, shape->id.y, ray, t, place_error, point);
-}
+ROUND_SHAPE(paraboloid, Paraboloid, false)
 
 #endif

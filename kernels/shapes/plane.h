@@ -83,10 +83,7 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     // nearly parallel, it crosses beyond the least distance over the greatest approach
     real least = real_max(fabs(height) - height_error, (real)(0));
     real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
-    mask moves = quotient_is_bounded(least, greatest);
-    real parallel_low =
-        lanes_select(moves, real_divide(least, lanes_select(moves, greatest, (real)(1))), (real)(LARGEST)) *
-        (real)(1 - 16 * UNIT_ROUNDOFF);
+    real parallel_low = divide_or(least, greatest, (real)(LARGEST)) * (real)(1 - 16 * UNIT_ROUNDOFF);
     *low = lanes_select(crosses, *low, parallel_low);
     *high = lanes_select(crosses, *high, (real)(LARGEST));
     return crosses;

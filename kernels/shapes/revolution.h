@@ -17,6 +17,7 @@
 #include "shapes/certain_solid.h"
 #include "shapes/ends.h"
 #include "shapes/eye_power.h"
+#include "shapes/quadratic.h"
 
 typedef struct {
     real a, b, c, discriminant;
@@ -204,14 +205,6 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
     return t;
 }
 
-typedef struct {
-    Interval side; // the ray is inside the unbounded surface between these; if `outer`, outside them
-    mask outer;
-    mask real_roots;
-    Interval slab; // the ray is between the ends
-    Vector m, q;   // at t the point is |m + t q| / |w| from the axis
-} RevolutionCrossings;
-
 // Returns the interval of t between the planes of a finite shape's ends.
 static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
 {
@@ -229,16 +222,6 @@ static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
                           real_inverse_or_zero(towards));
 }
 
-// Restricts `outer` lanes to the nappe that the ends bound, towards which the radius grows.
-static inline void revolution_keep_nappe(RevolutionCrossings *crossings, mask growing)
-{
-    Interval side = crossings->side;
-    Interval nappe = {lanes_select(growing, side.far, (real)(-LARGEST)),
-                      lanes_select(growing, (real)(LARGEST), side.near)};
-    crossings->side.near = lanes_select(crossings->outer, nappe.near, side.near);
-    crossings->side.far = lanes_select(crossings->outer, nappe.far, side.far);
-}
-
 // Returns the lanes whose line may cross the unbounded surface: those with roots, those within a cone except
 // for an interval between its nappes, and those along the side.
 static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
@@ -246,63 +229,45 @@ static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
     return (quadric->discriminant >= (real)(0)) | (quadric->a <= (real)(0));
 }
 
-// Returns the interval between the roots c / q and q / a. q / a is a root only if it is finite. A ray along
-// the side has a = 0, one root, c / q, and one at infinity. *zero receives q = 0.
-static inline Interval revolution_roots(const RevolutionQuadric *quadric, bool sloped, mask *zero)
+// Returns the roots, polished where they are not compensated. A ray along the side has a = 0, one root, c /
+// q, and one at infinity.
+static inline QuadraticRoots revolution_roots(const RevolutionQuadric *quadric, bool sloped)
 {
-    real root = real_sqrt(real_max(quadric->discriminant, (real)(0)));
-    mask ahead = quadric->b < (real)(0);
-    real q = lanes_select(ahead, root - quadric->b, -(root + quadric->b));
-    *zero = q == (real)(0);
-    mask within = quotient_is_bounded(q, quadric->a);
-    mask positive_ratio = (q > (real)(0)) == (quadric->a >= (real)(0));
-    real q_over_a = lanes_select(within, real_divide(q, lanes_select(within, quadric->a, (real)(1))),
-                                 lanes_select(positive_ratio, (real)(LARGEST), (real)(-LARGEST)));
-    real c_over_q = lanes_select(*zero, q_over_a, real_divide(quadric->c, lanes_select(*zero, (real)(1), q)));
+    QuadraticRoots roots = quadratic_roots(quadric->a, quadric->b, quadric->c, quadric->discriminant);
     if (sloped && !IS_COMPENSATED) {
-        c_over_q = lanes_select(quadric->compensated, c_over_q, revolution_polish(quadric, c_over_q));
+        roots.c_over_q =
+            lanes_select(quadric->compensated, roots.c_over_q, revolution_polish(quadric, roots.c_over_q));
         // with a near 0 a step may pass through infinity, which would swap inside and outside
-        real polished = revolution_polish(quadric, q_over_a);
-        mask same_side = (polished < c_over_q) == (q_over_a < c_over_q);
-        q_over_a = lanes_select(same_side & !quadric->compensated, polished, q_over_a);
+        real polished = revolution_polish(quadric, roots.q_over_a);
+        mask same_side = (polished < roots.c_over_q) == (roots.q_over_a < roots.c_over_q);
+        roots.q_over_a = lanes_select(same_side & !quadric->compensated, polished, roots.q_over_a);
     }
-    return (Interval){real_min(c_over_q, q_over_a), real_max(c_over_q, q_over_a)};
+    return roots;
 }
 
-// Decides lanes along a cylinder's axis, or along a cone's through its apex, which are inside everywhere or
-// nowhere.
-static inline void revolution_along_axis(RevolutionCrossings *crossings, const RevolutionQuadric *quadric,
-                                         mask along)
+static inline EndedCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray,
+                                                  const RevolutionQuadric *quadric)
 {
-    mask inside = along & (quadric->c <= (real)(0));
-    crossings->side.near = lanes_select(along, (real)(-LARGEST), crossings->side.near);
-    crossings->side.far = lanes_select(along, (real)(LARGEST), crossings->side.far);
-    crossings->real_roots = (crossings->real_roots & !along) | inside;
-}
-
-static inline RevolutionCrossings revolution_crossings(const Revolution *shape, bool sloped, const Ray *ray,
-                                                       const RevolutionQuadric *quadric)
-{
-    RevolutionCrossings crossings;
-    mask zero;
-    crossings.side = revolution_roots(quadric, sloped, &zero);
-    crossings.outer = quadric->a < (real)(0);
-    crossings.real_roots = (quadric->discriminant >= (real)(0)) | crossings.outer;
-    revolution_along_axis(&crossings, quadric, (quadric->a == (real)(0)) & zero);
-    crossings.slab = (Interval){(real)(-LARGEST), (real)(LARGEST)};
-    if (shape->id.y & REVOLUTION_FINITE) {
+    const real zero = (real)(0), everywhere = (real)(LARGEST);
+    const QuadraticRoots roots = revolution_roots(quadric, sloped);
+    const mask has_roots = (quadric->discriminant >= zero) | (quadric->a < zero);
+    EndedCrossings crossings = {quadratic_interval(roots), {-everywhere, everywhere}, has_roots};
+    if (shape->id.y & REVOLUTION_FINITE) { // the ends bound one nappe
+        crossings.side = quadratic_inside(roots, quadric->a, quadric->h);
         crossings.slab = revolution_slab(shape, ray);
-        revolution_keep_nappe(&crossings, quadric->h > (real)(0));
     }
-    crossings.m = quadric->m;
-    crossings.q = quadric->q;
+    // along a cylinder's axis, or along a cone's through its apex, the ray is inside everywhere or nowhere
+    const mask along = (quadric->a == zero) & (quadric->b == zero) & (quadric->discriminant <= zero);
+    crossings.side.near = lanes_select(along, -everywhere, crossings.side.near);
+    crossings.side.far = lanes_select(along, everywhere, crossings.side.far);
+    crossings.real_roots = (has_roots & !along) | (along & (quadric->c <= zero));
     return crossings;
 }
 
 // Returns the lanes whose point at t is not farther from the axis than the shape's largest radius, within 8 u
 // of the distance. A ray along a cone's side has a root near infinity with a random sign, and the wrong sign
 // swaps inside and outside.
-static inline mask revolution_reaches(const Revolution *shape, const RevolutionCrossings *crossings,
+static inline mask revolution_reaches(const Revolution *shape, const RevolutionQuadric *quadric,
                                       const Ray *ray, real t)
 {
     scalar base = shape->base_radius.w, slope = shape->axis_slope.w;
@@ -311,7 +276,7 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionC
     real size =
         vector_norm1(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_norm1(offset);
     real error = (real)(8 * UNIT_ROUNDOFF * shape->range.y) * size;
-    return vector_norm(vector_fma(crossings->q, t, crossings->m)) <= (real)(widest) + error;
+    return vector_norm(vector_fma(quadric->q, t, quadric->m)) <= (real)(widest) + error;
 }
 
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
@@ -319,11 +284,9 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     mask hit = RAY_ACTIVE(ray) & revolution_line_crosses(&quadric);
     if (!lanes_any(hit)) return hit;
-    RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
-    hit = hit & crossings.real_roots;
-    hit = hit & ends_first_hit(shape->id.y, ray, crossings.side, crossings.slab, t);
-    if (sloped && (shape->id.y & REVOLUTION_FINITE))
-        hit = hit & revolution_reaches(shape, &crossings, ray, *t);
+    const EndedCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
+    hit = hit & ends_first_hit(shape->id.y, ray, &crossings, t);
+    if (sloped && (shape->id.y & REVOLUTION_FINITE)) hit = hit & revolution_reaches(shape, &quadric, ray, *t);
     return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }
 
@@ -387,34 +350,14 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     if (IS_COMPENSATED || has_power) surface_point_move_to_ray(&point, ray, t, rounding_scale);
     if (shape->id.y & REVOLUTION_CAPPED) {
         RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
-        RevolutionCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
+        const EndedCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
         // relative to the rounded F, the point of a thin plate could appear at its other end
         if (has_eye_power(shape->id)) height = vector_dot(ray_point(ray, t), vector_of(shape->axis_slope));
         SurfacePoint cap = revolution_cap_point(shape, p, height, rounding_scale);
         if (has_power) surface_point_move_to_ray(&cap, ray, t, rounding_scale);
-        surface_point_replace(&point, ends_on_cap(crossings.side, crossings.slab, t), &cap);
+        surface_point_replace(&point, ends_on_cap(&crossings, t), &cap);
     }
     return point;
-}
-
-static inline mask cylinder_hit(const Cylinder *cylinder, const Ray *ray, real *t)
-{
-    return revolution_hit(cylinder, false, ray, t);
-}
-
-static inline SurfacePoint cylinder_surface_point(const Cylinder *cylinder, const Ray *ray, real t)
-{
-    return revolution_surface_point(cylinder, false, ray, t);
-}
-
-static inline mask cone_hit(const Cone *cone, const Ray *ray, real *t)
-{
-    return revolution_hit(cone, true, ray, t);
-}
-
-static inline SurfacePoint cone_surface_point(const Cone *cone, const Ray *ray, real t)
-{
-    return revolution_surface_point(cone, true, ray, t);
 }
 
 // Bounds how far roundings of a shape's numbers move it, which the eye's power excludes.
@@ -461,30 +404,26 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     return solid;
 }
 
-static inline CertainHit cylinder_certain_hit(const Cylinder *cylinder, const Ray *ray)
-{
-    const RoundSolid solid = round_of_revolution(cylinder, false, ray);
-    return round_solid_hit(&solid, cylinder->id, false, ray);
-}
+// The functions of cylinders and cones, which differ only in their slope.
+#define REVOLUTION_SHAPE(name, sloped)                                                                       \
+    static inline mask name##_hit(const Revolution *shape, const Ray *ray, real *t)                          \
+    {                                                                                                        \
+        return revolution_hit(shape, sloped, ray, t);                                                        \
+    }                                                                                                        \
+                                                                                                             \
+    static inline SurfacePoint name##_surface_point(const Revolution *shape, const Ray *ray, real t)         \
+    {                                                                                                        \
+        return revolution_surface_point(shape, sloped, ray, t);                                              \
+    }                                                                                                        \
+                                                                                                             \
+    static inline RoundSolid name##_round(const Revolution *shape, const Ray *ray)                           \
+    {                                                                                                        \
+        return round_of_revolution(shape, sloped, ray);                                                      \
+    }                                                                                                        \
+                                                                                                             \
+    ROUND_SHAPE(name, Revolution, sloped)
 
-static inline mask cylinder_set_errors(const Cylinder *cylinder, const Ray *ray, real t, real place_error,
-                                       SurfacePoint *point)
-{
-    const RoundSolid solid = round_of_revolution(cylinder, false, ray);
-    return round_set_errors(&solid, cylinder->id.y, ray, t, place_error, point);
-}
-
-static inline CertainHit cone_certain_hit(const Cone *cone, const Ray *ray)
-{
-    const RoundSolid solid = round_of_revolution(cone, true, ray);
-    return round_solid_hit(&solid, cone->id, true, ray);
-}
-
-static inline mask cone_set_errors(const Cone *cone, const Ray *ray, real t, real place_error,
-                                   SurfacePoint *point)
-{
-    const RoundSolid solid = round_of_revolution(cone, true, ray);
-    return round_set_errors(&solid, cone->id.y, ray, t, place_error, point);
-}
+REVOLUTION_SHAPE(cylinder, false)
+REVOLUTION_SHAPE(cone, true)
 
 #endif

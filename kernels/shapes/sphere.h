@@ -174,8 +174,8 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     round_set_place_errors(&round, ray, zero, ROUND_ERROR);
     round.has_power = true;
     round.curves = false;
-    real range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));
-    CertainInterval side = round_interval(&round, ray, lanes, -range, range, false), slab = round_unbounded();
+    const Interval range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));
+    CertainInterval side = round_interval(&round, ray, lanes, range, false), slab = round_unbounded();
     return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, leaves);
 }
 

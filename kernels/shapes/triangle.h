@@ -132,8 +132,7 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
         along = vector_dot_compensated(normal, ray->direction);
         height = vector_dot_compensated(normal, vector_subtract(a, ray->origin));
     }
-    mask crosses = quotient_is_bounded(height, along);
-    return lanes_select(crosses, real_divide(height, lanes_select(crosses, along, (real)(1))), in_plane);
+    return divide_or(height, along, in_plane);
 }
 
 // Returns the interval of t between the vertices' least and largest coordinate on one axis, widened by the
