@@ -64,18 +64,17 @@ static inline real torus_tube_value_at(const TorusTube *tube, const Ray *ray, re
 
 // Returns the zero along the ray in a bracket at whose ends the signs differ. The first guess is the ray's
 // start if that is in the bracket, since the bracket's middle is far from it.
-static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, real low, real high, mask entering)
+static inline real torus_tube_zero(const TorusTube *tube, const Ray *ray, Interval bracket, mask entering)
 {
-    real t = lanes_select(low <= ray->tmin, real_max(low, ray->tmin), (real)(0.5f) * (low + high));
+    real t =
+        lanes_select(bracket.near <= ray->tmin, real_max(bracket.near, ray->tmin), interval_middle(bracket));
     for (uint i = 0; i < TORUS_ZERO_STEPS + TORUS_ZERO_STEPS; i++) {
         real slope;
         real value = torus_tube_value_at(tube, ray, t, &slope);
-        mask before = (value > (real)(0)) == entering;
-        low = lanes_select(before, t, low);
-        high = lanes_select(before, high, t);
+        real next = bracket_narrow(&bracket, (value > (real)(0)) == entering, t, value, slope);
         // a step below the rounding may leave the bracket, whose middle is far away
         mask settled = fabs(value) <= (real)(2 * UNIT_ROUNDOFF) * fabs(slope * t);
-        real next = lanes_select(settled, t, bracket_next(low, high, t, value, slope));
+        next = lanes_select(settled, t, next);
         if (lanes_all(next == t)) break;
         t = next;
     }
@@ -113,21 +112,21 @@ static inline real torus_tube_end(const real breaks[TORUS_BREAKS], uint i, real 
     return i == 0 || i == TORUS_TUBE_ENDS - 1 ? end : i % 2 ? end - margin : end + margin;
 }
 
-// Finds the first zero beyond the ray's start. The breaks are in s, in parts of `unit`, in which the torus'
-// size is about 1. They are off by some roundings of that, or by its root where the quartic's turning points
-// meet, which may exceed the tube's radius. So two zeros may be within a break's margins, and the turning
-// point between them is found by the slope.
-static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
-                                  const real breaks[TORUS_BREAKS], real unit, real closest_t, real *t)
+// Finds the first zero beyond the ray's start. The breaks are in s, in which the torus' size is about 1. They
+// are off by some roundings of that, or by its root where the quartic's turning points meet, which may exceed
+// the tube's radius. So two zeros may be within a break's margins, and the turning point between them is
+// found by the slope.
+static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit, const TorusLine *line,
+                                  const real breaks[TORUS_BREAKS], real *t)
 {
     const TorusTube tube = torus_tube(torus);
     mask found = mask_none();
     real slope_low, slope_high, slope;
     const real margin = (real)(IS_DOUBLE ? 0x1p-25f : 0x1p-11f);
-    real low = real_max(real_fma(breaks[0], unit, closest_t), ray->tmin);
+    real low = real_max(torus_line_t(line, breaks[0]), ray->tmin);
     real before = torus_tube_value_at(&tube, ray, low, &slope_low);
     for (uint i = 1; i < TORUS_TUBE_ENDS; i++) {
-        real high = real_max(real_fma(torus_tube_end(breaks, i, margin), unit, closest_t), low);
+        real high = real_max(torus_line_t(line, torus_tube_end(breaks, i, margin)), low);
         real after = torus_tube_value_at(&tube, ray, high, &slope_high);
         mask entering = before > (real)(0), turns = (slope_low < (real)(0)) != (slope_high < (real)(0));
         mask hides =
@@ -140,7 +139,7 @@ static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
         }
         mask first = hit & !found & (entering != (value_at_end > (real)(0)));
         if (lanes_any(first)) {
-            *t = lanes_select(first, torus_tube_zero(&tube, ray, low, end, entering), *t);
+            *t = lanes_select(first, torus_tube_zero(&tube, ray, (Interval){low, end}, entering), *t);
             found = found | first;
         }
         low = high;
@@ -152,57 +151,36 @@ static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit,
 
 static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
 {
-    real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
+    const real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w);
     real closest_t;
     Vector closest = torus_closest(torus, ray, &closest_t);
-    real bounding_radius = major + minor;
-    real squared_distance = vector_dot(closest, closest);
-    real half_chord_squared =
-        real_fma(bounding_radius * (real)(TORUS_ENLARGEMENT), bounding_radius, -squared_distance);
-    mask hit = RAY_ACTIVE(ray) & (half_chord_squared >= (real)(0));
+    mask hit =
+        RAY_ACTIVE(ray) & (torus_half_chord_squared(major, minor, vector_dot(closest, closest)) >= (real)(0));
     if (!lanes_any(hit)) return hit;
 
-    Vector axis = vector_of(torus->axis_minor);
-    real inverse_length = real_sqrt(ray->inverse_squared);
-    Vector direction = vector_scale(ray->direction, inverse_length);
-    real unit = (real)(1); // a power of two, in whose parts nothing overflows
-    if (has_eye_power(torus->id)) {
-        unit = real_inverse_power_of_two(bounding_radius);
-        closest = vector_scale(closest, unit);
-        squared_distance *= unit * unit;
-        half_chord_squared *= unit * unit;
-        major *= unit;
-        minor *= unit;
-    }
-    TorusLine line = {vector_cross(closest, axis),
-                      vector_cross(direction, axis),
-                      vector_dot(closest, axis),
-                      vector_dot(direction, axis),
-                      major,
-                      minor};
+    const bool has_power = has_eye_power(torus->id);
+    const real unit = has_power ? real_inverse_power_of_two(major + minor) : (real)(1);
+    const TorusLine line = torus_line(torus, ray, closest, closest_t, unit);
     real breaks[TORUS_BREAKS];
-    torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
-
-    if (has_eye_power(torus->id))
-        return torus_tube_hit(torus, ray, hit, breaks, real_divide(inverse_length, unit), closest_t, t);
+    torus_breaks(&line, breaks);
+    if (has_power) return torus_tube_hit(torus, ray, hit, &line, breaks, t);
 
     real start = (ray->tmin - closest_t) * real_sqrt(ray->squared); // the ray's start as s
-    real slope, found_s = (real)(LARGEST);
-    real before = torus_distance(&line, breaks[0], &slope);
+    real found_s = (real)(LARGEST), before = torus_line_distance(&line, breaks[0]).value;
     mask found = mask_none();
     for (uint i = 0; i + 1 < TORUS_BREAKS; i++) {
-        real after = torus_distance(&line, breaks[i + 1], &slope);
+        real after = torus_line_distance(&line, breaks[i + 1]).value;
         mask entering = before > (real)(0);
         mask crosses = hit & !found & (entering != (after > (real)(0))) & (breaks[i + 1] > start);
         if (lanes_any(crosses)) {
-            real s = torus_zero(&line, breaks[i], breaks[i + 1], entering);
-            mask first = crosses & (real_fma(s, inverse_length, closest_t) > ray->tmin);
+            real s = torus_zero(&line, (Interval){breaks[i], breaks[i + 1]}, entering);
+            mask first = crosses & (torus_line_t(&line, s) > ray->tmin);
             found_s = lanes_select(first, s, found_s);
             found = found | first;
         }
         before = after;
     }
-    *t = lanes_select(found, real_fma(found_s, inverse_length, closest_t), *t);
+    *t = lanes_select(found, torus_line_t(&line, found_s), *t);
     return found;
 }
 
@@ -237,8 +215,9 @@ typedef struct {
 } CertainTorus;
 
 typedef struct {
-    real distance, slope, rho;
+    TorusDistance distance;
     real rounding, place; // bounds of its error: of roundings alone, and with the ray's error
+    mask outside, known;  // known: the exact ray's point is on the same side
 } TorusPoint;
 
 static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
@@ -260,24 +239,19 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
     TorusPoint point;
     Vector x = vector_fma(ray->direction, t, torus->start);
     real z = vector_dot(torus->axis, x), rise = vector_dot(torus->axis, ray->direction);
-    Vector across = vector_fma(torus->axis, -z, x);
-    point.rho = vector_norm(across);
-    real off = point.rho - torus->major, from_circle = real_sqrt(real_fma(off, off, z * z));
-    real rho_slope = vector_dot(across, ray->direction) * real_inverse_or_zero(point.rho);
-    point.slope = real_fma(off, rho_slope, z * rise) * real_inverse_or_zero(from_circle);
-    point.distance = from_circle - torus->minor;
+    point.distance =
+        torus_distance(vector_fma(torus->axis, -z, x), ray->direction, z, rise, torus->major, torus->minor);
     point.rounding = real_fma(torus->rounding_per_t, fabs(t), torus->start_rounding);
     point.place = point.rounding + ray_place_error(ray, ray->length * fabs(t));
+    point.outside = point.distance.value > (real)(0);
+    point.known = fabs(point.distance.value) > point.place;
     return point;
 }
 
 // Returns a bound on how fast the normal turns along the surface.
 static inline real torus_curvature(const CertainTorus *torus, real rho)
 {
-    real least = real_min(rho, torus->minor);
-    mask flat = least > (real)(SMALLEST_RATIO);
-    return lanes_select(flat, real_divide((real)(2), lanes_select(flat, least, (real)(1))),
-                        (real)(1 / SMALLEST_RATIO));
+    return divide_or((real)(2), real_min(rho, torus->minor), (real)(1 / SMALLEST_RATIO));
 }
 
 // Returns the t before which a ray that starts on the torus cannot return to it, or 0 if that is unknown.
@@ -285,7 +259,8 @@ static inline real torus_curvature(const CertainTorus *torus, real rho)
 static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 {
     TorusPoint start = torus_point(torus, ray, (real)(0));
-    real curvature = torus_curvature(torus, start.rho), cosine = fabs(start.slope) * ray_inverse_length(ray);
+    real curvature = torus_curvature(torus, start.distance.rho),
+         cosine = fabs(start.distance.slope) * ray_inverse_length(ray);
     real error =
         real_fma((real)(2) * start.place, curvature, ray->direction_error) + (real)(32 * UNIT_ROUNDOFF);
     real least = real_divide((real)(2), curvature);
@@ -299,29 +274,28 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {
-    real low = bracket.near, high = bracket.far, t = (real)(0.5f) * (low + high);
+    Interval computed = bracket; // where the packet's ray crosses
+    real t = interval_middle(bracket), steepness;
     TorusPoint point;
     for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
         point = torus_point(torus, ray, t);
-        mask before = (point.distance > (real)(0)) == entering, certain = fabs(point.distance) > point.place;
-        bracket.near = lanes_select(before & certain, real_max(bracket.near, t), bracket.near);
-        bracket.far = lanes_select(certain & !before, real_min(bracket.far, t), bracket.far);
-        low = lanes_select(before, t, low);
-        high = lanes_select(before, high, t);
-        real next = bracket_next(low, high, t, point.distance, point.slope);
-        mask settled = fabs(next - t) * fabs(point.slope) <= (real)(0.0625f) * point.place;
+        steepness = fabs(point.distance.slope);
+        mask before = point.outside == entering;
+        bracket.near = lanes_select(point.known & before, real_max(bracket.near, t), bracket.near);
+        bracket.far = lanes_select(point.known & !before, real_min(bracket.far, t), bracket.far);
+        real next = bracket_narrow(&computed, before, t, point.distance.value, point.distance.slope);
+        mask settled = fabs(next - t) * steepness <= (real)(0.0625f) * point.place;
         next = lanes_select(settled, t, next);
         if (lanes_all(next == t)) break;
         t = next;
     }
-    mask steep = fabs(point.slope) * ray_inverse_length(ray) > (real)(0x1p-10f);
-    real width = real_divide((real)(1.25f) * point.place, lanes_select(steep, fabs(point.slope), (real)(1)));
+    mask steep = steepness * ray_inverse_length(ray) > (real)(0x1p-10f);
+    real width = real_divide((real)(1.25f) * point.place, lanes_select(steep, steepness, (real)(1)));
     const real sides[2] = {t - width, t + width};
     for (uint i = 0; i < 2; i++) {
         TorusPoint side = torus_point(torus, ray, sides[i]);
-        mask certain =
-            steep & (fabs(side.distance) > side.place) & (sides[i] > bracket.near) & (sides[i] < bracket.far);
-        mask before = (side.distance > (real)(0)) == entering;
+        mask certain = steep & side.known & (sides[i] > bracket.near) & (sides[i] < bracket.far);
+        mask before = side.outside == entering;
         bracket.near = lanes_select(certain & before, sides[i], bracket.near);
         bracket.far = lanes_select(certain & !before, sides[i], bracket.far);
     }
@@ -332,52 +306,34 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
 {
     const CertainTorus certain = certain_torus(torus, ray);
     const real radius = certain.major + certain.minor;
-    CertainSphere bounding = certain_sphere(vector_of(torus->center_major),
-                                            radius * (real)(1 + 64 * UNIT_ROUNDOFF), ray, RAY_ACTIVE(ray));
-    if (!lanes_any(bounding.perhaps)) return certain_miss();
-    real from = sphere_near(&bounding, ray) - bounding.t_error,
-         to = sphere_far(&bounding, ray) + bounding.t_error;
-    mask lanes = bounding.perhaps & (to >= ray->tmin);
-    if (!lanes_any(lanes)) return certain_miss();
+    const BoundedLine bounded = line_within_bounds(vector_of(torus->center_major), radius, ray);
+    if (!lanes_any(bounded.lanes)) return certain_miss();
 
-    Vector closest = vector_fma(ray->direction, bounding.middle_t, certain.start);
-    real inverse_length = real_sqrt(ray->inverse_squared);
-    Vector direction = vector_scale(ray->direction, inverse_length);
-    real squared_distance = vector_dot(closest, closest);
-    real half_chord_squared = real_fma(radius * (real)(TORUS_ENLARGEMENT), radius, -squared_distance);
-    TorusLine line = {vector_cross(closest, certain.axis),
-                      vector_cross(direction, certain.axis),
-                      vector_dot(closest, certain.axis),
-                      vector_dot(direction, certain.axis),
-                      certain.major,
-                      certain.minor};
+    Vector closest = vector_fma(ray->direction, bounded.middle_t, certain.start);
+    const TorusLine line = torus_line(torus, ray, closest, bounded.middle_t, (real)(1));
     real breaks[TORUS_BREAKS];
-    torus_breaks(&line, squared_distance, real_sqrt(real_max(half_chord_squared, (real)(0))), breaks);
+    torus_breaks(&line, breaks);
 
     mask leaves = ray->origin_object == (integer)((scalar_integer)torus->id.x);
-    real start = real_max(from, ray->tmin), departure = torus_departure(&certain, ray);
-    start = lanes_select(leaves, departure, start);
-    TorusPoint point = torus_point(&certain, ray, start);
+    real departure = torus_departure(&certain, ray);
+    real before = lanes_select(leaves, departure, real_max(bounded.part.near, ray->tmin));
+    TorusPoint point = torus_point(&certain, ray, before);
     // a break is a turning point within rounding; its distance moves by less than this part of the rounding
     const real margin = real_fma(radius, real_divide((real)(0.125f), certain.minor), (real)(2));
-    mask outside = lanes_select(leaves, ray->leaves_outward, point.distance > (real)(0));
-    mask known = fabs(point.distance) > point.place;
-    known = lanes_select(leaves, known & (departure > (real)(0)) & (outside == (point.distance > (real)(0))),
-                         known);
-    mask enters = !leaves & (from > ray->tmin);
+    mask outside = lanes_select(leaves, ray->leaves_outward, point.outside),
+         known = point.known & (!leaves | ((departure > (real)(0)) & (outside == point.outside))),
+         enters = !leaves & (bounded.part.near > ray->tmin);
     outside = outside | enters;
     known = known | enters;
 
     CertainHit hit = certain_miss();
-    real before = start;
-    mask open = lanes;
+    mask open = bounded.lanes;
     for (uint i = 1; i < TORUS_BREAKS; i++) {
         bool is_last = i + 1 == TORUS_BREAKS;
-        real after = is_last ? to : real_min(real_fma(breaks[i], inverse_length, bounding.middle_t), to);
+        real after = is_last ? bounded.part.far : real_min(torus_line_t(&line, breaks[i]), bounded.part.far);
         after = real_max(after, before);
         point = torus_point(&certain, ray, after);
-        mask after_outside = point.distance > (real)(0),
-             after_known = fabs(point.distance) > margin * point.place;
+        mask after_outside = point.outside, after_known = fabs(point.distance.value) > margin * point.place;
         if (is_last) after_outside = after_known = mask_all();
         mask same_place = after == before; // before the start
         after_outside = lanes_select(same_place, outside, after_outside);
@@ -388,7 +344,7 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
             CertainHit crossing = torus_crossing(&certain, ray, (Interval){before, after}, crosses, outside);
             hit = certain_select(crosses, crossing, hit);
         }
-        CertainHit perhaps = certain_crossing(ray, mask_none(), uncertain, before, to);
+        CertainHit perhaps = certain_crossing(ray, mask_none(), uncertain, before, bounded.part.far);
         hit = certain_select(uncertain, perhaps, hit);
         open = open & !uncertain & !crosses;
         if (!lanes_any(open)) break;
@@ -404,7 +360,7 @@ static inline mask torus_set_errors(const Torus *torus, const Ray *ray, real t, 
 {
     const CertainTorus certain = certain_torus(torus, ray);
     const TorusPoint at = torus_point(&certain, ray, t);
-    point->curvature = torus_curvature(&certain, at.rho);
+    point->curvature = torus_curvature(&certain, at.distance.rho);
     point->normal_error = (real)(4) * at.rounding * point->curvature;
     return mask_none();
 }

@@ -12,27 +12,76 @@
 #ifndef TORUS_LINE_H
 #define TORUS_LINE_H
 
-#include "numerics/vector.h"
+#include "shapes/interval.h"
 #include "traversal/ray.h"
 
 // The line s -> closest + s direction, |direction| = 1, in the torus' frame.
 typedef struct {
     Vector closest_cross_axis, direction_cross_axis; // the first plus s times the second has the length rho
     real height, rise;                               // z = height + s rise
+    real squared_distance;                           // |closest|^2
     real major, minor;
+    real closest_t, t_per_s; // t = closest_t + s t_per_s
 } TorusLine;
 
-// Returns the signed distance to the tube's surface, negative inside, and its derivative along the line.
-static inline real torus_distance(const TorusLine *line, real s, real *slope)
+static inline real torus_line_t(const TorusLine *line, real s)
 {
-    Vector radial = vector_fma(line->direction_cross_axis, s, line->closest_cross_axis);
-    real rho = vector_norm(radial);
-    real z = real_fma(line->rise, s, line->height);
-    real radial_offset = rho - line->major;
-    real from_circle = real_sqrt(real_fma(radial_offset, radial_offset, z * z));
-    real rho_slope = vector_dot(radial, line->direction_cross_axis) * real_inverse_or_zero(rho);
-    *slope = real_fma(radial_offset, rho_slope, z * line->rise) * real_inverse_or_zero(from_circle);
-    return from_circle - line->minor;
+    return real_fma(s, line->t_per_s, line->closest_t);
+}
+
+// Returns half of the squared chord of the bounding sphere, whose squared radius is enlarged so that the ends
+// of the line in it lie outside the torus however numbers are rounded.
+static inline real torus_half_chord_squared(real major, real minor, real squared_distance)
+{
+    const real radius = major + minor;
+    return real_fma(radius * (real)(1.001f), radius, -squared_distance);
+}
+
+// Returns the ray's line, whose closest point to the center is given relative to that. All its lengths are
+// multiplied by `unit`, a power of two, so that nothing overflows.
+static inline TorusLine torus_line(const Torus *torus, const Ray *ray, Vector closest, real closest_t,
+                                   real unit)
+{
+    const Vector axis = vector_of(torus->axis_minor);
+    const real inverse_length = real_sqrt(ray->inverse_squared);
+    const Vector direction = vector_scale(ray->direction, inverse_length);
+    closest = vector_scale(closest, unit);
+    return (TorusLine){vector_cross(closest, axis),
+                       vector_cross(direction, axis),
+                       vector_dot(closest, axis),
+                       vector_dot(direction, axis),
+                       vector_dot(closest, closest),
+                       (real)(torus->center_major.w) * unit,
+                       (real)(torus->axis_minor.w) * unit,
+                       closest_t,
+                       inverse_length * real_inverse_power_of_two(unit)};
+}
+
+// The signed distance to the tube's surface, negative inside, its derivative along a line, and the distance
+// from the axis.
+typedef struct {
+    real value, slope, rho;
+} TorusDistance;
+
+// Returns the distance of a point with the part `radial` across the axis and z along it. `direction` and
+// `rise` are those parts of the line's direction.
+static inline TorusDistance torus_distance(Vector radial, Vector direction, real z, real rise, real major,
+                                           real minor)
+{
+    TorusDistance distance;
+    distance.rho = vector_norm(radial);
+    real off = distance.rho - major, from_circle = real_sqrt(real_fma(off, off, z * z));
+    real rho_slope = vector_dot(radial, direction) * real_inverse_or_zero(distance.rho);
+    distance.slope = real_fma(off, rho_slope, z * rise) * real_inverse_or_zero(from_circle);
+    distance.value = from_circle - minor;
+    return distance;
+}
+
+static inline TorusDistance torus_line_distance(const TorusLine *line, real s)
+{
+    return torus_distance(vector_fma(line->direction_cross_axis, s, line->closest_cross_axis),
+                          line->direction_cross_axis, real_fma(line->rise, s, line->height), line->rise,
+                          line->major, line->minor);
 }
 
 // Returns the quartic's derivative, 4 s^3 + 2 p s + q.
@@ -42,22 +91,21 @@ static inline real torus_cubic(real p, real q, real s, real *slope)
     return real_fma(real_fma((real)(4) * s, s, p + p), s, q);
 }
 
-// Returns the next iterate within a bracket: Newton's step if it lies inside, else the middle.
-static inline real bracket_next(real low, real high, real s, real value, real slope)
+// Narrows a bracket to a side of s: the far one in the lanes where s lies `before` the zero. Returns the next
+// iterate: Newton's step if it lies inside, else the middle.
+static inline real bracket_narrow(Interval *bracket, mask before, real s, real value, real slope)
 {
+    bracket->near = lanes_select(before, s, bracket->near);
+    bracket->far = lanes_select(before, bracket->far, s);
     mask usable = quotient_is_bounded(value, slope);
     real newton = s - real_divide(value, lanes_select(usable, slope, (real)(1)));
-    mask inside = usable & (newton > low) & (newton < high);
-    return lanes_select(inside, newton, (real)(0.5f) * (low + high));
+    mask inside = usable & (newton > bracket->near) & (newton < bracket->far);
+    return lanes_select(inside, newton, interval_middle(*bracket));
 }
 
 // There are enough steps to find all bits if Newton's method fails and the bracket is halved. Turning points
 // need fewer, since they only have to separate the distance's zeros.
 enum { TORUS_ZERO_STEPS = IS_DOUBLE ? 60 : 30, TORUS_TURNING_STEPS = IS_DOUBLE ? 40 : 20 };
-
-// The bounding sphere's squared radius is enlarged by this factor, so that the ends of the line in it lie
-// outside the torus however numbers are rounded.
-#define TORUS_ENLARGEMENT 1.001f
 
 // Returns the cubic's zero between low and high if its signs differ there, else the end where it is nearer to
 // 0.
@@ -68,28 +116,23 @@ static inline real torus_turning_point(real p, real q, real low, real high)
     mask crosses = (at_low < (real)(0)) != (at_high < (real)(0));
     mask rising = at_low < (real)(0);
     real end = lanes_select(fabs(at_low) < fabs(at_high), low, high);
-    real s = (real)(0.5f) * (low + high);
+    Interval bracket = {low, high};
+    real s = interval_middle(bracket);
     for (uint i = 0; i < TORUS_TURNING_STEPS; i++) {
         real value = torus_cubic(p, q, s, &slope);
-        mask before = (value < (real)(0)) == rising;
-        low = lanes_select(before, s, low);
-        high = lanes_select(before, high, s);
-        s = bracket_next(low, high, s, value, slope);
+        s = bracket_narrow(&bracket, (value < (real)(0)) == rising, s, value, slope);
     }
     return lanes_select(crosses, s, end);
 }
 
 // Returns the zero of the distance in a bracket where its signs differ.
-static inline real torus_zero(const TorusLine *line, real low, real high, mask entering)
+static inline real torus_zero(const TorusLine *line, Interval bracket, mask entering)
 {
-    real s = (real)(0.5f) * (low + high);
+    real s = interval_middle(bracket);
     for (uint i = 0; i < TORUS_ZERO_STEPS; i++) {
-        real slope;
-        real value = torus_distance(line, s, &slope);
-        mask before = (value > (real)(0)) == entering;
-        low = lanes_select(before, s, low);
-        high = lanes_select(before, high, s);
-        real next = bracket_next(low, high, s, value, slope);
+        const TorusDistance distance = torus_line_distance(line, s);
+        mask before = (distance.value > (real)(0)) == entering;
+        real next = bracket_narrow(&bracket, before, s, distance.value, distance.slope);
         if (lanes_all(next == s)) break;
         s = next;
     }
@@ -117,10 +160,12 @@ static inline Vector torus_closest(const Torus *torus, const Ray *ray, real *clo
 // separate its zeros.
 enum { TORUS_BREAKS = 5 };
 
-static inline void torus_breaks(const TorusLine *line, real squared_distance, real span,
-                                real breaks[TORUS_BREAKS])
+static inline void torus_breaks(const TorusLine *line, real breaks[TORUS_BREAKS])
 {
-    real k = real_fma(line->major, line->major, squared_distance) - line->minor * line->minor;
+    const real half_chord_squared =
+        torus_half_chord_squared(line->major, line->minor, line->squared_distance);
+    const real span = real_sqrt(real_max(half_chord_squared, (real)(0)));
+    real k = real_fma(line->major, line->major, line->squared_distance) - line->minor * line->minor;
     real squared_major = line->major * line->major;
     real p = real_fma((real)(-4) * squared_major,
                       vector_dot(line->direction_cross_axis, line->direction_cross_axis), k + k);
