@@ -36,12 +36,20 @@ static inline Tangents shape_tangents(const Scene *scene, uint type, uint index,
     return (Tangents){vector_of(axes.u), vector_of(axes.v)};
 }
 
+// The place of a material's images at a surface point.
+typedef struct {
+    TextureCoordinates coordinates;
+    Tangents tangents; // with HAS_NORMAL_MAPS
+    Footprint footprint;
+} ImagePlace;
+
 // Returns the unit shading normal tilted by the material's normal map, for the lanes in `wanted`. A map that
 // is mirrored on the surface has its v on the other side of the normal and u.
-static inline Vector normal_tilted(const Scene *scene, uint type, const Material *material, Tangents tangents,
-                                   TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
-                                   real travelled, mask wanted)
+static inline Vector normal_tilted(const Scene *scene, const Material *material, uint type,
+                                   const ImagePlace *place, Vector normal, mask wanted)
 {
+    const TextureCoordinates coordinates = place->coordinates;
+    const Tangents tangents = place->tangents;
     const scalar4 row_u = material->normal_u, row_v = material->normal_v;
     const real zero = (real)(0), one = (real)(1), two = (real)(2), strength = (real)(row_u.w);
     const scalar side = row_u.x * row_v.y < row_u.y * row_v.x ? -1 : 1;
@@ -55,10 +63,10 @@ static inline Vector normal_tilted(const Scene *scene, uint type, const Material
         vector_fma(tangents.u, (real)(side * row_v.y), vector_scale(tangents.v, (real)(-side * row_v.x)));
     Vector along_v =
         vector_fma(tangents.v, (real)(side * row_u.x), vector_scale(tangents.u, (real)(-side * row_u.y)));
-    Vector texel = texture_color(scene, type, material->normal_map, mapped, point, ray, travelled, wanted);
+    Vector texel =
+        texture_color(scene, image_on(type, material->normal_map), mapped, place->footprint, wanted);
     real x = strength * real_fma(two, texel.x, -one), y = strength * real_fma(two, texel.y, -one),
          z = real_fma(two, texel.z, -one);
-    Vector normal = point->shading_normal;
     Vector across = vector_fma(normal, -vector_dot(normal, along_u), along_u);
     mask tilts = (vector_dot(across, across) > zero) & ((x != zero) | (y != zero));
     across = vector_normalize(across);

@@ -76,28 +76,28 @@ static inline SurfacePoint shape_surface_point(const Scene *scene, uint type, ui
     return surface_point_make(ray->origin, ray->direction, (real)(0));
 }
 
-#if IS_CERTIFIED
-// Sets the errors of a point that a shape returned. Returns the lanes that may be at an edge.
-static inline mask shape_set_errors(const Scene *scene, uint type, uint index, const Ray *ray, real t,
-                                    real place_error, SurfacePoint *point)
-{
-#define SHAPE_SET_ERRORS(feature, Type, name, names)                                                         \
-    if (HAS_##feature && type == TYPE_##feature) {                                                           \
-        Type shape = scene->names[index];                                                                    \
-        return name##_set_errors(&shape, ray, t, place_error, point);                                        \
-    }
-    SHAPE_LIST(SHAPE_SET_ERRORS)
-    return mask_none();
-}
-#endif
-
 // The surface points of the lanes that hit the same object, or triangles of the same material.
 typedef struct {
     mask lanes;
+    uint4 entry; // the object's type_index_material
     SurfacePoint point;
-    TextureCoordinates coordinates; // only for triangles
-    Tangents tangents;              // with HAS_NORMAL_MAPS, only for triangles
+    ImagePlace images; // with HAS_IMAGES, if the material has any
+    mask uncertain;    // at `certified`
 } LaneSurfacePoints;
+
+#if IS_CERTIFIED
+// Sets the errors of the point and the lanes that may be at an edge.
+static inline void shape_set_errors(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, real t,
+                                    real place_error)
+{
+#define SHAPE_SET_ERRORS(feature, Type, name, names)                                                         \
+    if (HAS_##feature && hit->entry.x == TYPE_##feature) {                                                   \
+        Type shape = scene->names[hit->entry.y];                                                             \
+        hit->uncertain = name##_set_errors(&shape, ray, t, place_error, &hit->point);                        \
+    }
+    SHAPE_LIST(SHAPE_SET_ERRORS)
+}
+#endif
 
 // Sets the chord's end where rays hit a sphere.
 static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere, const Ray *ray,
@@ -213,8 +213,8 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
 #endif
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, uvs);
-        hit.coordinates = (TextureCoordinates){uv.x, uv.y, density};
-        if (HAS_NORMAL_MAPS) hit.tangents = triangle_tangents(corners, uvs);
+        hit.images.coordinates = (TextureCoordinates){uv.x, uv.y, density};
+        if (HAS_NORMAL_MAPS) hit.images.tangents = triangle_tangents(corners, uvs);
     }
     return hit;
 }
@@ -259,19 +259,22 @@ static inline mask floor_is_uncertain(real a, real error)
     return !(real_floor(a - error) == real_floor(a + error));
 }
 
-// Returns the lanes where the checker has its second color. On planes and discs squares lie in the surface.
-// Elsewhere they are cubes in space, looked up a 1024th of a cube behind the surface, so that a face on the
-// border between cubes has one color.
-static inline mask checker_odd(const Scene *scene, uint type, uint index, const SurfacePoint *point,
-                               const Ray *ray, scalar4 grid, real place_error, mask *uncertain)
+// Returns the lanes where the checker has its second color. Adds to the hit those where that is uncertain. On
+// planes and discs squares lie in the surface. Elsewhere they are cubes in space, looked up a 1024th of a
+// cube behind the surface, so that a face on the border between cubes has one color.
+static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, scalar4 grid,
+                               real place_error)
 {
+    const SurfacePoint *point = &hit->point;
+    const uint type = hit->entry.x, index = hit->entry.y;
+    mask uncertain = mask_none();
     real cells;
     if (type_has_grid(type)) {
         GridCoordinates square = grid_coordinates(scene, type, index, point->position);
         cells = real_floor(square.u) + real_floor(square.v);
         if (IS_CERTIFIED) {
             real error = grid_error(scene, type, index, point->position, place_error);
-            *uncertain = floor_is_uncertain(square.u, error) | floor_is_uncertain(square.v, error);
+            uncertain = floor_is_uncertain(square.u, error) | floor_is_uncertain(square.v, error);
         }
     } else {
         mask along = vector_dot(point->normal, ray->direction) > (real)(0);
@@ -285,53 +288,40 @@ static inline mask checker_odd(const Scene *scene, uint type, uint index, const 
                          (real)(0x1p-9f) * point_normal_error(point, place_error) +
                          (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
                                                       vector_norm1(vector_of(grid)) + (real)(1));
-            *uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |
-                         floor_is_uncertain(cell.z, error);
+            uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |
+                        floor_is_uncertain(cell.z, error);
         }
     }
+    if (IS_CERTIFIED) hit->uncertain = hit->uncertain | uncertain;
     real halved = cells * (real)(0.5f);
     return real_floor(halved) != halved;
 }
 
-static inline TextureCoordinates hit_coordinates(const Scene *scene, uint4 entry, const Material *material,
-                                                 const LaneSurfacePoints *hit)
+// Completes the place of a material's images. That of triangles has the coordinates and tangents.
+static inline void hit_set_images(LaneSurfacePoints *hit, const Scene *scene, const Material *material,
+                                  const Ray *ray, real travelled)
 {
-    if (entry.x == TYPE_TRIANGLES) return hit->coordinates;
-    return texture_coordinates(scene, entry.x, entry.y, material, &hit->point);
+    const uint type = hit->entry.x, index = hit->entry.y;
+    const Vector normal = hit->point.normal;
+    hit->images.footprint = ray_footprint(scene, ray, normal, travelled);
+    if (type == TYPE_TRIANGLES) return;
+    hit->images.coordinates = texture_coordinates(scene, type, index, material, &hit->point);
+    if (HAS_NORMAL_MAPS) hit->images.tangents = shape_tangents(scene, type, index, normal);
 }
 
-// Returns the object's color at the hit: plain, checkered or textured. `entry` is the object's
-// type_index_material.
-static inline Color3 object_color(const Scene *scene, uint4 entry, const Material *material,
-                                  const LaneSurfacePoints *hit, const Ray *ray, real travelled,
-                                  real place_error, mask *uncertain)
+// Returns the object's color at the hit: plain, checkered or textured.
+static inline Color3 object_color(const Scene *scene, const Material *material, LaneSurfacePoints *hit,
+                                  const Ray *ray, real place_error)
 {
-    *uncertain = mask_none();
     Color3 color = vector_of(material->color);
     if (HAS_CHECKERS && material->grid.w != 0) {
-        mask odd =
-            checker_odd(scene, entry.x, entry.y, &hit->point, ray, material->grid, place_error, uncertain);
+        mask odd = checker_odd(scene, hit, ray, material->grid, place_error);
         color = vector_select(odd, vector_of(material->other_color), color);
     }
-    if (HAS_IMAGES && material->texture.x > 0) {
-        TextureCoordinates coordinates = hit_coordinates(scene, entry, material, hit);
-        color = texture_color(scene, entry.x, material->texture, coordinates, &hit->point, ray, travelled,
-                              hit->lanes);
-    }
+    if (HAS_IMAGES && material->texture.x > 0)
+        color = texture_color(scene, image_on(hit->entry.x, material->texture), hit->images.coordinates,
+                              hit->images.footprint, hit->lanes);
     return color;
-}
-
-// Tilts the shading normals of the hit by the material's normal map.
-static inline void hit_tilt_normals(const Scene *scene, uint4 entry, const Material *material,
-                                    LaneSurfacePoints *hit, const Ray *ray, real travelled)
-{
-    if (material->normal_map.x == 0) return;
-    TextureCoordinates coordinates = hit_coordinates(scene, entry, material, hit);
-    Tangents tangents = entry.x == TYPE_TRIANGLES
-                            ? hit->tangents
-                            : shape_tangents(scene, entry.x, entry.y, hit->point.normal);
-    hit->point.shading_normal = normal_tilted(scene, entry.x, material, tangents, coordinates, &hit->point,
-                                              ray, travelled, hit->lanes);
 }
 
 static inline void surface_set_material(Surface *surface, const Scene *scene, mask lanes,
@@ -467,29 +457,32 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
             found.lanes = pending == (integer)(object);
             found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
         }
+        found.entry = entry;
+        found.uncertain = mask_none();
         pending = lanes_select(found.lanes, NO_OBJECT, pending);
         // the exact hit lies as near to the ray's own point as place_error says
         if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
-        mask at_edge = mask_none();
 #if IS_CERTIFIED
         if (HAS_CHORDS && entry.x == TYPE_SPHERES) {
             Sphere sphere = scene->spheres[entry.y];
             surface_set_chord_end(&surface, &sphere, ray, hit, &found);
         }
-        at_edge = shape_set_errors(scene, entry.x, entry.y, ray, hit->t, surface.place_error, &found.point);
+        shape_set_errors(scene, &found, ray, hit->t, surface.place_error);
         if (!HAS_TRIANGLES || entry.x != TYPE_TRIANGLES)
             surface_narrow_place(&surface, found.lanes & (found.point.height < NEVER), found.point.height,
                                  least_cosine(found.point.normal, ray));
 #endif
         Material material = scene->materials[entry.z];
-        if (HAS_NORMAL_MAPS) hit_tilt_normals(scene, entry, &material, &found, ray, surface.travelled);
+        if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
+            hit_set_images(&found, scene, &material, ray, surface.travelled);
+        if (HAS_NORMAL_MAPS && material.normal_map.x > 0)
+            found.point.shading_normal = normal_tilted(scene, &material, entry.x, &found.images,
+                                                       found.point.shading_normal, found.lanes);
         surface_point_replace(&point, found.lanes, &found.point);
-        mask uncertain;
-        // storing the zeros in every surface would cost 2 % of a frame's time
+        // storing the zero in every surface would cost 2 % of a frame's time
         Color3 color =
-            object_color(scene, entry, &material, &found, ray, HAS_IMAGES ? surface.travelled : (real)(0),
-                         IS_CERTIFIED ? surface.place_error : (real)(0), &uncertain);
-        if (IS_CERTIFIED) surface.uncertain = surface.uncertain | (found.lanes & (uncertain | at_edge));
+            object_color(scene, &material, &found, ray, IS_CERTIFIED ? surface.place_error : (real)(0));
+        if (IS_CERTIFIED) surface.uncertain = surface.uncertain | (found.lanes & found.uncertain);
         surface_set_material(&surface, scene, found.lanes, &material, color);
     }
     surface_set_point(&surface, &point, ray);

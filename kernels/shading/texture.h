@@ -118,11 +118,19 @@ static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
     return fma(b - a, (scalar4)(part), a);
 }
 
-// Returns the color of a level, bilinear between texel centers. x of `level` is its first texel, y its width,
-// z its height.
-static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, scalar v, uint wrap_u,
-                                  uint wrap_v)
+// Returns one of a material's images, which wraps by z and w, as it lies on shapes of a type. On a sphere it
+// does not wrap across the poles.
+static inline uint4 image_on(uint type, uint4 image)
 {
+    if (type == TYPE_SPHERES) image.w = WRAP_CLAMPED;
+    return image;
+}
+
+// Returns the color of an image's level, bilinear between texel centers. x of `level` is its first texel, y
+// its width, z its height.
+static inline scalar4 level_color(const Scene *scene, uint4 image, uint4 level, scalar u, scalar v)
+{
+    const uint wrap_u = image.z, wrap_v = image.w;
     scalar x = fma(u, (scalar)level.y, (scalar)(-0.5f)), y = fma(1 - v, (scalar)level.z, (scalar)(-0.5f));
     scalar left = floor(x), top = floor(y);
     uint column_0 = texel_wrapped(left, level.y, wrap_u), column_1 = texel_wrapped(left + 1, level.y, wrap_u);
@@ -137,35 +145,33 @@ static inline scalar4 level_color(const Scene *scene, uint4 level, scalar u, sca
 
 // Returns the color filtered over `footprint`, the pixel's width in texels of the full texture. Colors are
 // linear in it between the levels for 2^n and 2^(n + 1) texels.
-static inline scalar4 texture_filtered(const Scene *scene, uint4 texture, scalar u, scalar v,
-                                       scalar footprint, uint wrap_v)
+static inline scalar4 image_filtered(const Scene *scene, uint4 image, scalar u, scalar v, scalar footprint)
 {
-    uint level = texture.x - 1, last = level + texture.y - 1;
+    uint level = image.x - 1, last = level + image.y - 1;
     scalar part = 0;
     if (footprint > 1) {
         int exponent;
         part = 2 * frexp(min(footprint, (scalar)0x1p30f), &exponent) - 1;
         level += (uint)(exponent - 1);
     }
-    uint wrap_u = texture.z;
-    if (level >= last) return level_color(scene, scene->texture_levels[last].place, u, v, wrap_u, wrap_v);
-    scalar4 color = level_color(scene, scene->texture_levels[level].place, u, v, wrap_u, wrap_v);
+    if (level >= last) return level_color(scene, image, scene->texture_levels[last].place, u, v);
+    scalar4 color = level_color(scene, image, scene->texture_levels[level].place, u, v);
     if (part == 0) return color;
-    scalar4 coarser = level_color(scene, scene->texture_levels[level + 1].place, u, v, wrap_u, wrap_v);
+    scalar4 coarser = level_color(scene, image, scene->texture_levels[level + 1].place, u, v);
     return scalar4_between(color, coarser, part);
 }
 
 // Returns the filtered color of each lane in `wanted`.
-static inline Vector texture_lookup(const Scene *scene, uint4 texture, real along, real across, real width,
-                                    uint wrap_v, mask wanted)
+static inline Vector image_color(const Scene *scene, uint4 image, real along, real across, real width,
+                                 mask wanted)
 {
     RealLanes u = {along}, v = {across}, footprint = {width};
     RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
     IntegerLanes lanes = {wanted};
     for (uint lane = 0; lane < LANES; lane++) {
         if (lanes.each[lane] == 0) continue;
-        scalar4 color = texture_filtered(scene, texture, wrap_unit(u.each[lane], texture.z),
-                                         wrap_unit(v.each[lane], wrap_v), footprint.each[lane], wrap_v);
+        scalar4 color = image_filtered(scene, image, wrap_unit(u.each[lane], image.z),
+                                       wrap_unit(v.each[lane], image.w), footprint.each[lane]);
         red.each[lane] = color.x;
         green.each[lane] = color.y;
         blue.each[lane] = color.z;
@@ -215,9 +221,9 @@ static inline Vector sky_image_color(const Scene *scene, Vector direction, mask 
     real z = vector_dot(direction, vector_of(header->sky_forward));
     real across = real_sqrt(real_fma(x, x, z * z));
     scalar texels = max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
-    Vector color = texture_lookup(scene, header->sky_texture, one_half + real_turns(z, x),
-                                  real_fma(two, real_turns(across, y), one_half),
-                                  (real)(header->sample.x * texels), WRAP_CLAMPED, wanted);
+    Vector color = image_color(scene, image_on(TYPE_SPHERES, header->sky_texture),
+                               one_half + real_turns(z, x), real_fma(two, real_turns(across, y), one_half),
+                               (real)(header->sample.x * texels), wanted);
     return vector_scale(color, (real)(header->sky_forward.w));
 }
 
@@ -232,18 +238,29 @@ static inline Vector background_color(const Scene *scene, Vector direction, mask
     return sky_blended_color(header, vector_dot(direction, vector_of(header->sky_up)));
 }
 
-// Returns the texture's color for the lanes in `wanted`, along a ray of unit direction, at the distance
-// `travelled` from the eye. At a grazing angle the footprint grows by at most 2^10.
-static inline Vector texture_color(const Scene *scene, uint type, uint4 texture,
-                                   TextureCoordinates coordinates, const SurfacePoint *point, const Ray *ray,
-                                   real travelled, mask wanted)
+// The part of a surface that a pixel sees: its width across the ray, and the cosine of incidence, by which it
+// is wider along the surface.
+typedef struct {
+    real width, cosine;
+} Footprint;
+
+// Returns the footprint of a ray of unit direction, at the distance `travelled` from the eye. At a grazing
+// angle it grows by at most 2^10.
+static inline Footprint ray_footprint(const Scene *scene, const Ray *ray, Vector normal, real travelled)
 {
-    real cosine = real_max(fabs(vector_dot(point->normal, ray->direction)), (real)(0x1p-10f));
-    real width = travelled * (real)(scene->header->sample.x);
-    if (HAS_ORTHOGRAPHIC && scene->header->sample.z > 0) width = (real)(scene->header->sample.z);
-    return texture_lookup(scene, texture, coordinates.u, coordinates.v,
-                          real_divide(width * coordinates.density, cosine),
-                          type == TYPE_SPHERES ? WRAP_CLAMPED : texture.w, wanted);
+    Footprint footprint;
+    footprint.cosine = real_max(fabs(vector_dot(normal, ray->direction)), (real)(0x1p-10f));
+    footprint.width = travelled * (real)(scene->header->sample.x);
+    if (HAS_ORTHOGRAPHIC && scene->header->sample.z > 0) footprint.width = (real)(scene->header->sample.z);
+    return footprint;
+}
+
+// Returns the texture's color for the lanes in `wanted`.
+static inline Vector texture_color(const Scene *scene, uint4 texture, TextureCoordinates coordinates,
+                                   Footprint footprint, mask wanted)
+{
+    return image_color(scene, texture, coordinates.u, coordinates.v,
+                       real_divide(footprint.width * coordinates.density, footprint.cosine), wanted);
 }
 
 #endif

@@ -96,14 +96,16 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     CertainSphere bounding = certain_sphere(center, radius, ray, RAY_ACTIVE(ray));
     mask lanes = bounding.perhaps & !ray_cannot_rehit(ray, disc->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
-    real low, high;
-    mask crosses = certain_plane_of(disc_foot(disc), disc->normal, ray, &low, &high);
+    Interval crossing;
+    mask crosses = certain_plane_of(disc_foot(disc), disc->normal, ray, &crossing);
     // nearly parallel to it, the hit is not nearer than the sphere
     if (!lanes_all(crosses)) {
-        low = lanes_select(crosses, low, real_max(low, sphere_near(&bounding, ray) - bounding.t_error));
-        high = lanes_select(crosses, high, sphere_far(&bounding, ray) + bounding.t_error);
+        real near = real_max(crossing.near, sphere_near(&bounding, ray) - bounding.t_error),
+             far = sphere_far(&bounding, ray) + bounding.t_error;
+        crossing.near = lanes_select(crosses, crossing.near, near);
+        crossing.far = lanes_select(crosses, crossing.far, far);
     }
-    CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, low, high);
+    CertainHit hit = certain_crossing(ray, lanes & crosses, lanes, crossing.near, crossing.far);
     Vector f = vector_subtract(ray->origin, center);
     Vector across = vector_fma(ray->direction, hit.t, f);
     real moved = ray->length, path = moved * fabs(hit.t);

@@ -53,11 +53,11 @@ static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ra
     return plane_crossing_point(vector_of(plane->point), plane->normal, ray, t);
 }
 
-// Returns the lanes where the line crosses a plane, at n . (p - o) / n . d, with *low <= t <= *high. In other
-// lanes it may cross it at or beyond *low. `size` is at least |n|. Components of n are rounded; n is also off
-// by up to `normal_error`, an absolute error.
+// Returns the lanes where the line crosses a plane, at n . (p - o) / n . d, with t in *crossing. In other
+// lanes it may cross it at or beyond crossing->near. `size` is at least |n|. Components of n are rounded; n
+// is also off by up to `normal_error`, an absolute error.
 static inline mask certain_plane(Vector point, Vector normal, real size, scalar normal_error, const Ray *ray,
-                                 real *low, real *high)
+                                 Interval *crossing)
 {
     Vector to_point = vector_subtract(point, ray->origin);
     real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
@@ -77,33 +77,31 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     // the exact n . d is at least 7/8 of this one, and 8/7 < 1.2
     real t_error = (real)(1.2f) * real_fma(fabs(t), along_error, height_error) * fabs(inverse) +
                    (real)(8 * UNIT_ROUNDOFF) * fabs(t);
-    *low = t - t_error;
-    *high = t + t_error;
+    *crossing = (Interval){t - t_error, t + t_error};
     if (lanes_all(crosses)) return crosses;
     // nearly parallel, it crosses beyond the least distance over the greatest approach
     real least = real_max(fabs(height) - height_error, (real)(0));
     real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
     real parallel_low = divide_or(least, greatest, (real)(LARGEST)) * (real)(1 - 16 * UNIT_ROUNDOFF);
-    *low = lanes_select(crosses, *low, parallel_low);
-    *high = lanes_select(crosses, *high, (real)(LARGEST));
+    crossing->near = lanes_select(crosses, crossing->near, parallel_low);
+    crossing->far = lanes_select(crosses, crossing->far, (real)(LARGEST));
     return crosses;
 }
 
-// Returns the lanes where the line crosses a plane, with *low <= t <= *high. In other lanes it may cross it
-// at or beyond *low. The normal is exact except for its rounding, and its w is one over its length.
-static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, real *low, real *high)
+// Does the same for a normal that is exact except for its rounding, and whose w is one over its length.
+static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, Interval *crossing)
 {
     real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal.w));
-    return certain_plane(point, vector_of(normal), size, 0, ray, low, high);
+    return certain_plane(point, vector_of(normal), size, 0, ray, crossing);
 }
 
 static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
 {
     mask lanes = RAY_ACTIVE(ray) & !ray_cannot_rehit(ray, plane->id.x, true);
     if (!lanes_any(lanes)) return certain_miss();
-    real low, high;
-    mask crosses = certain_plane_of(vector_of(plane->point), plane->normal, ray, &low, &high);
-    return certain_crossing(ray, lanes & crosses, lanes, low, high);
+    Interval crossing;
+    mask crosses = certain_plane_of(vector_of(plane->point), plane->normal, ray, &crossing);
+    return certain_crossing(ray, lanes & crosses, lanes, crossing.near, crossing.far);
 }
 
 // Returns a bound on the height of a point over a plane, times the length of the normal, which is rounded and

@@ -330,7 +330,7 @@ static inline TriangleSizes triangle_sizes(const Triangle *triangle)
 // off by that times the coordinates that they are made of.
 typedef struct {
     mask perhaps, certain;
-    real coordinates; // the error of all three together, divided by `error`
+    real error, coordinates; // coordinates: the error of all three together, divided by `error`
 } TriangleSigns;
 
 static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real error)
@@ -345,6 +345,7 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
     mask misses = (real_max(real_max(u_low, v_low), w_low) > zero) &
                   (real_min(real_min(u_high, v_high), w_high) < zero);
     TriangleSigns signs;
+    signs.error = error;
     signs.perhaps = !misses;
     signs.certain = ((u_low > zero) & (v_low > zero) & (w_low > zero)) |
                     ((u_high < zero) & (v_high < zero) & (w_high < zero));
@@ -373,18 +374,17 @@ static inline real triangle_frame_error(const TriangleEdges *edges, const Ray *r
 
 // Narrows the bounds on the t of a triangle that is hit, by where its plane is crossed. They are wide where
 // the triangle is slim, as its weights are then sensitive to errors.
-static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray *ray, mask lanes, real *low,
-                                            real *high, real *t)
+static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray *ray, mask lanes,
+                                            Interval *bounds, real *t)
 {
-    real plane_low, plane_high;
+    Interval plane;
     lanes = lanes & certain_plane(vector_of(triangle->a), triangle_normal(triangle), (real)(1.7321f),
-                                  TRIANGLE_NORMAL_ERROR, ray, &plane_low, &plane_high);
-    plane_low = real_max(*low, plane_low);
-    plane_high = real_min(*high, plane_high);
-    lanes = lanes & (plane_low <= plane_high);
-    *low = lanes_select(lanes, plane_low, *low);
-    *high = lanes_select(lanes, plane_high, *high);
-    *t = lanes_select(lanes, (real)(0.5f) * (plane_low + plane_high), *t);
+                                  TRIANGLE_NORMAL_ERROR, ray, &plane);
+    plane = intervals_common(*bounds, plane);
+    lanes = lanes & (plane.near <= plane.far);
+    bounds->near = lanes_select(lanes, plane.near, bounds->near);
+    bounds->far = lanes_select(lanes, plane.far, bounds->far);
+    *t = lanes_select(lanes, interval_middle(plane), *t);
 }
 
 // Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
@@ -392,10 +392,11 @@ static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray 
 // `sinks` marks the lanes whose ray leaves this triangle into its plane, which certainly lies ahead.
 static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle *triangle,
                                                                  const TriangleEdges *edges, const Ray *ray,
-                                                                 mask lanes, mask sinks, TriangleSigns signs,
-                                                                 TriangleSizes sizes, real error)
+                                                                 mask sinks, TriangleSigns signs,
+                                                                 TriangleSizes sizes)
 {
-    mask perhaps = lanes & signs.perhaps, certain = perhaps & signs.certain;
+    const real error = signs.error;
+    mask perhaps = signs.perhaps;
     const Vector along = ray_along(ray);
     real a_t = vector_dot(edges->a, along), b_t = vector_dot(edges->b, along),
          c_t = vector_dot(edges->c, along);
@@ -417,15 +418,15 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
                    real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
     low = low - vertex_error;
     high = high + vertex_error;
-    low = lanes_select(narrows, real_max(low, t - t_error), low);
-    high = lanes_select(narrows, real_min(high, t + t_error), high);
+    Interval bounds = {lanes_select(narrows, real_max(low, t - t_error), low),
+                       lanes_select(narrows, real_min(high, t + t_error), high)};
     mask slim = perhaps & !(narrows & (t_error <= (real)(4) * vertex_error));
-    if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &low, &high, &t);
+    if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &bounds, &t);
     if (HAS_SMOOTH_NORMALS) {
-        low = lanes_select(sinks, real_max(low, (real)(SMALLEST_RATIO)), low);
-        high = real_max(low, high);
+        bounds.near = lanes_select(sinks, real_max(bounds.near, (real)(SMALLEST_RATIO)), bounds.near);
+        bounds.far = real_max(bounds.near, bounds.far);
     }
-    CertainHit hit = certain_crossing(ray, certain, perhaps, low, high);
+    CertainHit hit = certain_crossing(ray, signs.certain, perhaps, bounds.near, bounds.far);
     return certain_select(narrows, certain_at(hit, t), hit);
 }
 
@@ -452,9 +453,9 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     TriangleSigns signs = triangle_signs(&edges, error);
     mask leaves = ray_cannot_rehit(ray, triangle->id.x, true), sinks = mask_none();
     if (HAS_SMOOTH_NORMALS) sinks = leaves & ray->sinks;
-    lanes = lanes & signs.perhaps & (!leaves | sinks);
-    if (!lanes_any(lanes)) return certain_miss();
-    CertainHit hit = triangle_certain_crossing(triangle, &edges, ray, lanes, sinks, signs, sizes, error);
+    signs.perhaps = lanes & signs.perhaps & (!leaves | sinks);
+    if (!lanes_any(signs.perhaps)) return certain_miss();
+    CertainHit hit = triangle_certain_crossing(triangle, &edges, ray, sinks, signs, sizes);
     if (RARELY(lanes_any(hit.uncertain))) hit.uncertain = hit.uncertain & !triangle_is_passed(&edges, error);
     return hit;
 }

@@ -49,16 +49,15 @@ static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 en
 }
 
 // Returns the lanes in `wanted` where the alpha is too low for a hit.
-static inline mask alpha_is_low(const Scene *scene, uint4 cutout, uint wrap_v, TextureCoordinates coordinates,
-                                mask wanted)
+static inline mask alpha_is_low(const Scene *scene, uint4 cutout, TextureCoordinates coordinates, mask wanted)
 {
     const uint4 level = scene->texture_levels[cutout.x - 1].place;
     RealLanes u = {coordinates.u}, v = {coordinates.v};
     IntegerLanes lanes = {wanted}, low = {(integer)(0)};
     for (uint lane = 0; lane < LANES; lane++) {
         if (lanes.each[lane] == 0) continue;
-        scalar4 texel = level_color(scene, level, wrap_unit(u.each[lane], cutout.z),
-                                    wrap_unit(v.each[lane], wrap_v), cutout.z, wrap_v);
+        scalar4 texel = level_color(scene, cutout, level, wrap_unit(u.each[lane], cutout.z),
+                                    wrap_unit(v.each[lane], cutout.w));
         low.each[lane] = texel.w < (scalar)as_float(cutout.y);
     }
     return low.all != (integer)(0);
@@ -71,8 +70,7 @@ static OUT_OF_LINE mask object_hole_lanes(const Traversal *traversal, const Scen
     const uint4 entry = object_entry(traversal, scene, id);
     const uint4 cutout = scene->materials[entry.z].cutout;
     if (cutout.x == 0) return mask_none();
-    return alpha_is_low(scene, cutout, entry.x == TYPE_SPHERES ? WRAP_CLAMPED : cutout.w,
-                        cutout_coordinates(scene, entry, ray, t), wanted);
+    return alpha_is_low(scene, image_on(entry.x, cutout), cutout_coordinates(scene, entry, ray, t), wanted);
 }
 
 // Removes from `found` the crossings that would not be recorded and those in holes. Returns the lanes whose

@@ -37,9 +37,8 @@ static inline void mesh_traverse_group(Traversal *traversal, const Scene *scene,
     StackEntry entries[STACK_CAPACITY], next = {root, group->active, -LARGEST};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
-        uint lanes = next.lanes & lanes_bits((real)(next.entry) <= group->tmax);
-        if (lanes != 0)
-            visit_node(traversal, &stack, scene, ray, &scene->nodes[next.child_index], group, lanes);
+        next.lanes &= lanes_bits((real)(next.entry) <= group->tmax);
+        if (next.lanes != 0) visit_node(traversal, &stack, scene, ray, group, next);
         if (stack.count == 0 || group->active == 0) return;
     }
 }

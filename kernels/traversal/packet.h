@@ -234,13 +234,14 @@ static inline uint node_leaves(global const BvhNode *node)
     return lanes_bits(types != (integer)(BVH_NODE));
 }
 
-// Intersects the leaves among the children of a node that any of the lanes hits, and pushes the others. A
-// leaf on the stack costs more than the tests that visiting it in order saves.
+// Intersects the leaves among the children of the next node that any of its lanes hits, and pushes the
+// others. A leaf on the stack costs more than the tests that visiting it in order saves.
 static inline void visit_node(Traversal *traversal, TraversalStack *stack, const Scene *scene, const Ray *ray,
-                              global const BvhNode *node, RayGroup *group, uint lanes)
+                              RayGroup *group, StackEntry next)
 {
+    global const BvhNode *node = &scene->nodes[next.child_index];
     global const scalar *boxes = (global const scalar *)node->planes;
-    HitChildren met = group_hits_children(group, lanes, boxes);
+    HitChildren met = group_hits_children(group, next.lanes, boxes);
     const uint leaves = met.children & node_leaves(node), bottom = stack->count;
     for (uint left = leaves; left != 0; left &= left - 1) {
         uint leaf = lowest_bit(left);
@@ -291,12 +292,12 @@ static inline void traverse_group(Traversal *traversal, const Scene *scene, cons
     StackEntry entries[STACK_CAPACITY], next = {0, group->active, -LARGEST};
     TraversalStack stack = {entries, 0, traversal->query == OCCLUSION};
     for (;; next = entries[--stack.count]) {
-        uint lanes = next.lanes & lanes_bits((real)(next.entry) <= group->tmax);
-        if (HAS_INSTANCES && lanes != 0 && (next.child_index & INSTANCE_LEAF) != 0) {
-            if (instance_traverse(traversal, scene, ray, next.child_index & ~INSTANCE_LEAF, lanes))
+        next.lanes &= lanes_bits((real)(next.entry) <= group->tmax);
+        if (HAS_INSTANCES && next.lanes != 0 && (next.child_index & INSTANCE_LEAF) != 0) {
+            if (instance_traverse(traversal, scene, ray, next.child_index & ~INSTANCE_LEAF, next.lanes))
                 group_shrink(group, traversal);
-        } else if (lanes != 0) {
-            visit_node(traversal, &stack, scene, ray, &scene->nodes[next.child_index], group, lanes);
+        } else if (next.lanes != 0) {
+            visit_node(traversal, &stack, scene, ray, group, next);
         }
         if (stack.count == 0 || group->active == 0) return;
     }

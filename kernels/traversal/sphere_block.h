@@ -113,16 +113,16 @@ static inline ALWAYS_INLINE uint spheres_test_each(const MacroTile *tile, const 
     return remaining;
 }
 
-// Intersects the spheres of a block with packets, given as bits.
+// Intersects the spheres of a block with the entry's packets.
 static inline ALWAYS_INLINE void tile_visit_spheres(MacroTile *tile, const Scene *scene,
-                                                    const TileEntry *leaf, uint packets, bool is_shadow)
+                                                    const TileEntry *leaf, bool is_shadow)
 {
     if (tile->has_shrunk) tile_bound_reach(tile);
     SphereView view;
     global const SphereBlock *block = &scene->sphere_blocks[leaf->index];
     const uint spheres = spheres_see(&view, tile, block, leaf->type >> 8);
     if (spheres == 0) return;
-    for (; packets != 0; packets &= packets - 1) {
+    for (uint packets = leaf->packets; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
         const uint near = spheres & lanes_bits(packet_sees(tile, packet, &view.seen));
         if (near == 0) continue;

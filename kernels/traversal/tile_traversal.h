@@ -95,10 +95,10 @@ static inline void entry_prefetch(const Scene *scene, uint type, uint index)
         memory_prefetch((global const char *)&scene->instances[index], sizeof(Instance));
 }
 
-// Intersects the primitives of a leaf with the rays of packets.
-static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const TileEntry *leaf, uint packets)
+// Intersects the primitives of a leaf with the rays of the entry's packets.
+static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const TileEntry *leaf)
 {
-    for (; packets != 0; packets &= packets - 1) {
+    for (uint packets = leaf->packets; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
         if (HAS_INSTANCES && (leaf->type & 0xff) == TYPE_INSTANCES) {
             const uint rays = rays_within(tile, packet, &leaf->seen);
@@ -123,13 +123,13 @@ static inline bool child_waits(uint type, bool is_shadow)
            (!is_shadow && (type & 0xff) == TYPE_SPHERES);
 }
 
-// Visits the children of a node that the packets may hit, or pushes those that wait, the nearest to the
+// Visits the children of a node that its packets may hit, or pushes those that wait, the nearest to the
 // common origin last. Returns the number of entries.
-static inline ALWAYS_INLINE uint tile_visit_node(MacroTile *tile, const Scene *scene,
-                                                 global const BvhNode *node, uint packets, TileEntry *entries,
-                                                 uint count, bool is_shadow)
+static inline ALWAYS_INLINE uint tile_visit_node(MacroTile *tile, const Scene *scene, const TileEntry *parent,
+                                                 TileEntry *entries, uint count, bool is_shadow)
 {
-    const uint bottom = count;
+    global const BvhNode *node = &scene->nodes[parent->index];
+    const uint packets = parent->packets, bottom = count;
     if (tile->has_shrunk) tile_bound_reach(tile);
     SeenRectangles boxes;
     uint children = boxes_view(&boxes, tile, (global const scalar *)node->planes);
@@ -152,9 +152,9 @@ static inline ALWAYS_INLINE uint tile_visit_node(MacroTile *tile, const Scene *s
         entry.index = ((global const uint *)node->child_index)[child];
         if (!child_waits(entry.type, is_shadow)) {
             if (HAS_SPHERES && is_shadow && (entry.type & 0xff) == TYPE_SPHERES)
-                tile_visit_spheres(tile, scene, &entry, entry.packets, true);
+                tile_visit_spheres(tile, scene, &entry, true);
             else
-                tile_visit_leaf(tile, scene, &entry, entry.packets);
+                tile_visit_leaf(tile, scene, &entry);
             continue;
         }
         entry_prefetch(scene, entry.type, entry.index);
@@ -175,19 +175,17 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
                              .packets = tile->active};
     uint count = 1;
     while (count > 0 && tile->active != 0) {
-        const TileEntry entry = entries[--count];
-        const uint packets =
-            entry.packets & tile->active & lanes_bits((real)(entry.seen.w) <= tile->reach_max.all);
-        if (packets == 0) continue;
+        TileEntry entry = entries[--count];
+        entry.packets &= tile->active & lanes_bits((real)(entry.seen.w) <= tile->reach_max.all);
+        if (entry.packets == 0) continue;
         if (entry.type == BVH_NODE)
-            count =
-                tile_visit_node(tile, scene, &scene->nodes[entry.index], packets, entries, count, is_shadow);
+            count = tile_visit_node(tile, scene, &entry, entries, count, is_shadow);
         else if (HAS_TRIANGLES && (entry.type & 0xff) == TYPE_TRIANGLES)
-            tile_visit_triangles(tile, scene, &entry, packets, is_shadow);
+            tile_visit_triangles(tile, scene, &entry, is_shadow);
         else if (HAS_INSTANCES && (entry.type & 0xff) == TYPE_INSTANCES)
-            tile_visit_leaf(tile, scene, &entry, packets);
+            tile_visit_leaf(tile, scene, &entry);
         else if (HAS_SPHERES && !is_shadow)
-            tile_visit_spheres(tile, scene, &entry, packets, false);
+            tile_visit_spheres(tile, scene, &entry, false);
     }
 }
 

@@ -282,10 +282,10 @@ static inline void triangles_prefetch(const Scene *scene, uint first, uint trian
                         sizeof(Triangle));
 }
 
-// Intersects the triangles of a block with packets, given as bits. The full tests come last, when what they
-// read has been prefetched.
+// Intersects the triangles of a block with the entry's packets. The full tests come last, when what they read
+// has been prefetched.
 static inline ALWAYS_INLINE void tile_visit_triangles(MacroTile *tile, const Scene *scene,
-                                                      const TileEntry *leaf, uint packets, bool is_shadow)
+                                                      const TileEntry *leaf, bool is_shadow)
 {
     if (tile->has_shrunk) tile_bound_reach(tile);
     BlockView view;
@@ -298,7 +298,7 @@ static inline ALWAYS_INLINE void tile_visit_triangles(MacroTile *tile, const Sce
     triangles_prefetch(scene, first, prefetched);
     ushort remaining[LANES];
     uint tested = 0;
-    for (; packets != 0; packets &= packets - 1) {
+    for (uint packets = leaf->packets; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets), rays = rays_within(tile, packet, &leaf->seen);
         if (rays == 0) continue;
         const uint near = triangles & lanes_bits(packet_sees(tile, packet, &view.seen));
