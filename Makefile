@@ -63,6 +63,8 @@ $(error TEXTBOOK=1 needs another BUILD than build, since it is never installed)
 endif
 kernels := $(patsubst kernels/traversal/primitives.h,$(BUILD)/primitives.h,$(kernels))
 endif
+shapes  := $(filter kernels/shapes/%,$(kernels))
+kernels += $(BUILD)/shapes.h
 window_sources := $(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c
 sources := $(filter-out $(if $(has_window),,$(window_sources) host/cli/view_start.c), \
            $(filter-out host/mpi/%,$(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))))
@@ -119,6 +121,11 @@ $(mpi_objects): OURS += $(mpi_flags)
 
 $(BUILD)/glint-mpi: $(mpi_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs ompi-c) -o $@
+
+# Includes every file of kernels/shapes/.
+$(BUILD)/shapes.h: $(shapes) kernels/shapes
+	@mkdir -p $(@D)
+	printf '#include "%s"\n' $(shapes:kernels/%=%) > $@
 
 # With the formulas of tools/numerics/textbook.h.
 $(BUILD)/primitives.h: kernels/traversal/primitives.h tools/numerics/textbook.h

@@ -12,7 +12,7 @@ OLDEST_CLANG, NEWEST_CLANG = 15, 40
 FIRST_FILE = '#line 1 "render.cl"'  # follows the scene's definitions
 # Drivers define __OPENCL_VERSION__ themselves.
 OPTIONS = ["-x", "cl", "-cl-std=CL1.2", "-D__OPENCL_VERSION__=120", "-Xclang", "-finclude-default-header", "-w",
-           "-I", ROOT / "kernels"]
+           "-I", ROOT / "kernels", "-I", BUILD]  # for all_shapes.h
 
 
 def fail(message, status=1):

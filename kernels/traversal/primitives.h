@@ -2,14 +2,7 @@
 #ifndef PRIMITIVES_H
 #define PRIMITIVES_H
 
-#include "shapes/disc.h"
-#include "shapes/oval.h"
-#include "shapes/paraboloid.h"
-#include "shapes/plane.h"
-#include "shapes/revolution.h"
-#include "shapes/sphere.h"
-#include "shapes/torus.h"
-#include "shapes/triangle.h"
+#include "shapes.h" // of the Makefile: every file of shapes/
 #include "traversal/cull_sphere.h"
 #include "traversal/cutout.h"
 
