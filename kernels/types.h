@@ -63,7 +63,7 @@ typedef struct {
 // slope (p . axis), for an axis of any length.
 //
 // With HAS_POWER the base is the point of the axis nearest to the eye, heights along the axis are measured
-// from the eye's height, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution.h).
+// from the eye's height, and the power is |m|^2 - R^2 at the eye (kernels/shapes/revolution_quadric.h).
 typedef struct {
     scalar4 base_radius; // xyz base (an infinite cone's apex), w radius at the base times |axis|
     scalar4 axis_slope;  // xyz axis, w slope: the tangent of the half-angle, 0 for a cylinder

@@ -203,8 +203,8 @@ static MeshTriangle triangle_at(const Triangles *triangles, size_t index)
     return triangle;
 }
 
-// Returns whether triangle_lift (kernels/shapes/triangle.h) moves points of the neighbor, seen from its
-// front, away from the plane of this triangle on a side of it, 1 in front or -1 behind: whether the
+// Returns whether triangle_lift (kernels/shapes/triangle_normals.h) moves points of the neighbor, seen from
+// its front, away from the plane of this triangle on a side of it, 1 in front or -1 behind: whether the
 // neighbor's normals, turned to its front, point there by more than roundings.
 static bool lifts_away(const Triangles *triangles, size_t this, size_t neighbor, double side)
 {

@@ -61,7 +61,8 @@ void bvh_refit(CompiledScene *compiled);
 void culling_fill(CompiledScene *compiled, const CompileSettings *settings);
 
 // contact.c: Returns a box around all places where a transparent primitive may touch an opaque one, or an
-// empty box. Only hits in it are tested for an opaque surface in the same place (kernels/shading/surface.h).
+// empty box. Only hits in it are tested for an opaque surface in the same place
+// (kernels/shading/visible_surface.h).
 Bounds contact_find(const CompiledScene *compiled);
 
 // certified_range.c: Returns whether no error bound of `certified` underflows or overflows, by the sizes of

@@ -90,7 +90,8 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
 }
 
 // Sets the start of shadow rays above a smooth triangle whose normals are all on one side. The point moves,
-// by each vertex's weight, along that vertex's normal up to its tangent plane (kernels/shapes/triangle.h).
+// by each vertex's weight, along that vertex's normal up to its tangent plane
+// (kernels/shapes/triangle_normals.h).
 static void surface_lift(ShadedPoint *surface)
 {
     const Object *object = surface->object;

@@ -3,6 +3,7 @@
 #ifndef PATH_H
 #define PATH_H
 
+#include "shading/certain_bounce.h"
 #include "shading/medium.h"
 #include "shading/phong.h"
 

@@ -2,7 +2,7 @@
 #ifndef PHONG_H
 #define PHONG_H
 
-#include "shading/surface.h"
+#include "shading/visible_surface.h"
 
 typedef struct {
     Vector direction; // from the surface to the light, unit

@@ -3,22 +3,8 @@
 #define SURFACE_H
 
 #include "shading/chords.h"
-#include "shading/normal_map.h"
-#include "shading/texture.h"
+#include "shading/lane_points.h"
 #include "traversal/traversal.h"
-
-typedef Vector Color3;
-
-static inline Color3 color_multiply(Color3 a, Color3 b)
-{
-    return (Color3){a.x * b.x, a.y * b.y, a.z * b.z};
-}
-
-static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
-{
-    return (Color3){real_fma(weight.x, color.x, sum.x), real_fma(weight.y, color.y, sum.y),
-                    real_fma(weight.z, color.z, sum.z)};
-}
 
 // Members that only reflection, transmission or images need are set only with them. For an explicit ray,
 // whose direction may have any length, colors and `travelled` are not used.
@@ -64,41 +50,6 @@ static inline Vector surface_normal(const Surface *surface)
     return HAS_SHADING_NORMALS ? surface->normal : surface->shading_normal;
 }
 
-static inline SurfacePoint shape_surface_point(const Scene *scene, uint type, uint index, const Ray *ray,
-                                               real t)
-{
-#define SHAPE_SURFACE_POINT(feature, Type, name, names)                                                      \
-    if (HAS_##feature && type == TYPE_##feature) {                                                           \
-        Type shape = scene->names[index];                                                                    \
-        return name##_surface_point(&shape, ray, t);                                                         \
-    }
-    SHAPE_LIST(SHAPE_SURFACE_POINT)
-    return surface_point_make(ray->origin, ray->direction, (real)(0));
-}
-
-// The surface points of the lanes that hit the same object, or triangles of the same material.
-typedef struct {
-    mask lanes;
-    uint4 entry; // the object's type_index_material
-    SurfacePoint point;
-    ImagePlace images; // with HAS_IMAGES, if the material has any
-    mask uncertain;    // at `certified`
-} LaneSurfacePoints;
-
-#if IS_CERTIFIED
-// Sets the errors of the point and the lanes that may be at an edge.
-static inline void shape_set_errors(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, real t,
-                                    real place_error)
-{
-#define SHAPE_SET_ERRORS(feature, Type, name, names)                                                         \
-    if (HAS_##feature && hit->entry.x == TYPE_##feature) {                                                   \
-        Type shape = scene->names[hit->entry.y];                                                             \
-        hit->uncertain = name##_set_errors(&shape, ray, t, place_error, &hit->point);                        \
-    }
-    SHAPE_LIST(SHAPE_SET_ERRORS)
-}
-#endif
-
 // Sets the chord's end where rays hit a sphere.
 static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere, const Ray *ray,
                                          const Hit *hit, const LaneSurfacePoints *found)
@@ -119,6 +70,12 @@ static inline real least_cosine(Vector normal, const Ray *ray)
     return real_max(fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) - error, (real)(0));
 }
 
+// Returns an upper bound on the root of a^2 + b^2, for a, b >= 0.
+static inline real hypotenuse_above(real a, real b)
+{
+    return real_fma((real)(0.4143f), real_min(a, b), real_max(a, b));
+}
+
 // Lowers the bound on the position's error where the surface is flat. The exact hit is where the exact ray,
 // line_error off, crosses a plane that the position is `height` above; `cosine` is its least_cosine.
 static inline void surface_narrow_place(Surface *surface, mask lanes, real height, real cosine)
@@ -128,8 +85,7 @@ static inline void surface_narrow_place(Surface *surface, mask lanes, real heigh
     const real sine =
         real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) + (real)(16 * UNIT_ROUNDOFF));
     const real along = real_divide(real_fma(across, sine, height), lanes_select(lanes, cosine, one));
-    // not less than the root of the sum of squares
-    const real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
+    const real both = hypotenuse_above(across, along);
     surface->place_error =
         lanes_select(lanes, real_min(surface->place_error, (real)(1.01f) * both), surface->place_error);
 }
@@ -228,9 +184,7 @@ static inline void surface_set_place_error(Surface *surface, const Ray *ray, con
         (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
     real across = ray_place_error(ray, length * t),
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
-    // not less than the root of the sum of squares
-    real both = real_fma((real)(0.4143f), real_min(across, along), real_max(across, along));
-    surface->place_error = real_fma((real)(1.04f), both, rounding);
+    surface->place_error = real_fma((real)(1.04f), hypotenuse_above(across, along), rounding);
     surface->line_error = across * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding; // excludes the surface
     surface->start_error = along * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
 }
@@ -244,84 +198,6 @@ static inline void surface_set_line_error(Surface *surface, const SurfacePoint *
     mask flat = line_error < surface->place_error;
     surface->line_error = lanes_select(flat, line_error, surface->place_error);
     surface->start_error = lanes_select(flat, surface->start_error, (real)(0));
-}
-
-// Bounds the error of the shading normal.
-static inline real point_normal_error(const SurfacePoint *point, real place_error)
-{
-    real turned = point->curvature * place_error; // to first order
-    return real_fma(turned, real_fma((real)(4), turned, (real)(1)), point->normal_error) +
-           (real)(16 * UNIT_ROUNDOFF);
-}
-
-static inline mask floor_is_uncertain(real a, real error)
-{
-    return !(real_floor(a - error) == real_floor(a + error));
-}
-
-// Returns the lanes where the checker has its second color. Adds to the hit those where that is uncertain. On
-// planes and discs squares lie in the surface. Elsewhere they are cubes in space, looked up a 1024th of a
-// cube behind the surface, so that a face on the border between cubes has one color.
-static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, scalar4 grid,
-                               real place_error)
-{
-    const SurfacePoint *point = &hit->point;
-    const uint type = hit->entry.x, index = hit->entry.y;
-    mask uncertain = mask_none();
-    real cells;
-    if (type_has_grid(type)) {
-        GridCoordinates square = grid_coordinates(scene, type, index, point->position);
-        cells = real_floor(square.u) + real_floor(square.v);
-        if (IS_CERTIFIED) {
-            real error = grid_error(scene, type, index, point->position, place_error);
-            uncertain = floor_is_uncertain(square.u, error) | floor_is_uncertain(square.v, error);
-        }
-    } else {
-        mask along = vector_dot(point->normal, ray->direction) > (real)(0);
-        Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
-        Vector cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
-        cell = vector_fma(inward, (real)(0x1p-10f), cell);
-        cells = real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z);
-        if (IS_CERTIFIED) {
-            const scalar cells_per_unit = fabs(grid.w);
-            real error = (real)(cells_per_unit)*place_error +
-                         (real)(0x1p-9f) * point_normal_error(point, place_error) +
-                         (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
-                                                      vector_norm1(vector_of(grid)) + (real)(1));
-            uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |
-                        floor_is_uncertain(cell.z, error);
-        }
-    }
-    if (IS_CERTIFIED) hit->uncertain = hit->uncertain | uncertain;
-    real halved = cells * (real)(0.5f);
-    return real_floor(halved) != halved;
-}
-
-// Completes the place of a material's images. That of triangles has the coordinates and tangents.
-static inline void hit_set_images(LaneSurfacePoints *hit, const Scene *scene, const Material *material,
-                                  const Ray *ray, real travelled)
-{
-    const uint type = hit->entry.x, index = hit->entry.y;
-    const Vector normal = hit->point.normal;
-    hit->images.footprint = ray_footprint(scene, ray, normal, travelled);
-    if (type == TYPE_TRIANGLES) return;
-    hit->images.coordinates = texture_coordinates(scene, type, index, material, &hit->point);
-    if (HAS_NORMAL_MAPS) hit->images.tangents = shape_tangents(scene, type, index, normal);
-}
-
-// Returns the object's color at the hit: plain, checkered or textured.
-static inline Color3 object_color(const Scene *scene, const Material *material, LaneSurfacePoints *hit,
-                                  const Ray *ray, real place_error)
-{
-    Color3 color = vector_of(material->color);
-    if (HAS_CHECKERS && material->grid.w != 0) {
-        mask odd = checker_odd(scene, hit, ray, material->grid, place_error);
-        color = vector_select(odd, vector_of(material->other_color), color);
-    }
-    if (HAS_IMAGES && material->texture.x > 0)
-        color = texture_color(scene, image_on(hit->entry.x, material->texture), hit->images.coordinates,
-                              hit->images.footprint, hit->lanes);
-    return color;
 }
 
 static inline void surface_set_material(Surface *surface, const Scene *scene, mask lanes,
@@ -487,97 +363,6 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     }
     surface_set_point(&surface, &point, ray);
     return surface;
-}
-
-// Returns the origin of a secondary ray, on the side that the ray came from or, if `through`, on the other.
-// It lies off the surface by twice the bound on the position's error: once for that error and once for the
-// new ray's test of the surface.
-static inline Vector secondary_ray_origin(const Surface *surface, bool through)
-{
-    if (IS_CERTIFIED) return surface->position; // the ray knows which object it leaves
-    return vector_fma(surface_normal(surface),
-                      through ? -surface->refracted_offset : surface->error + surface->error,
-                      surface->position);
-}
-
-// Returns the origin of a ray to a light.
-static inline Vector shadow_ray_origin(const Surface *surface)
-{
-    Vector origin = secondary_ray_origin(surface, false);
-    return HAS_SMOOTH_NORMALS ? vector_add(origin, surface->lift) : origin;
-}
-
-// Returns the lanes where a transparent object may touch an opaque one.
-static inline mask may_be_in_contact(const Scene *scene, Vector position)
-{
-    Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
-    return (position.x >= low.x) & (position.x <= high.x) & (position.y >= low.y) & (position.y <= high.y) &
-           (position.z >= low.z) & (position.z <= high.z);
-}
-
-// Returns the lanes of a transparent surface that an opaque one may touch. An opaque surface that lies in it
-// would be crossed by a short line along the normal.
-static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
-{
-    mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
-    real reach = (real)(16) * surface->place_error;
-    Vector low = vector_of(scene->header->contact_low), high = vector_of(scene->header->contact_high);
-    Vector p = surface->position;
-    transparent = transparent & (p.x >= low.x - reach) & (p.x <= high.x + reach) & (p.y >= low.y - reach) &
-                  (p.y <= high.y + reach) & (p.z >= low.z - reach) & (p.z <= high.z + reach);
-    if (!lanes_any(transparent)) return mask_none();
-    Ray inward = ray_make_unit(vector_fma(surface_normal(surface), reach, p),
-                               vector_negate(surface_normal(surface)), transparent);
-    inward.tmax = reach + reach;
-    inward.origin_error = surface->place_error * (real)(1.5f);
-    Hit opaque = closest_opaque_hit(scene, &inward);
-    return transparent & (hit_found(&opaque) | opaque.uncertain);
-}
-
-// Searches for opaque surfaces just behind transparent ones, from one error before them up to a gap of 3
-// errors, since a refracted ray starts 2 behind and t is off by up to 1. An opaque surface within the error
-// coincides with the transparent one and becomes the hit of the lanes returned. If it is farther, the
-// refracted ray starts halfway to it.
-static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
-{
-    mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
-    transparent = transparent & may_be_in_contact(scene, surface->position);
-    if (!lanes_any(transparent)) return mask_none();
-    real error = surface->error, offset = error + error;
-    Ray inward = ray_make_unit(secondary_ray_origin(surface, false), vector_negate(surface_normal(surface)),
-                               transparent);
-    inward.tmin = error;
-    inward.tmax = offset + (real)(3) * error;
-    Hit opaque = closest_opaque_hit(scene, &inward);
-    mask found = hit_found(&opaque);
-    real gap = opaque.t - offset;
-    mask touches = found & (gap <= error);
-    surface->refracted_offset = lanes_select(found & !touches, (real)(0.5f) * gap, surface->refracted_offset);
-    hit->object = lanes_select(touches, opaque.object, hit->object);
-    return touches;
-}
-
-// Returns the visible surface. Where a transparent and an opaque one coincide, it is the opaque one, so that
-// glass on a floor shows the floor. Secondary rays start beyond both. A second round treats the lanes whose
-// hit was replaced. It is a loop, since compilers would inline surface_interaction twice.
-static inline Surface visible_surface(const Scene *scene, const Ray *ray, Hit *hit)
-{
-    real transparent_error = (real)(0), transparent_offset = (real)(LARGEST);
-    for (bool replaced = false;; replaced = true) {
-        Surface surface = surface_interaction(scene, ray, hit);
-        if (!HAS_TRANSMISSION) return surface;
-        if (IS_CERTIFIED) {
-            surface.uncertain = surface.uncertain | surface_may_touch_opaque(scene, &surface);
-            return surface;
-        }
-        surface.error = real_max(surface.error, transparent_error);
-        surface.refracted_offset = real_min(surface.refracted_offset, transparent_offset);
-        if (replaced) return surface;
-        mask touches = surface_find_opaque(scene, &surface, hit);
-        if (!lanes_any(touches)) return surface;
-        transparent_error = lanes_select(touches, surface.error, (real)(0));
-        transparent_offset = surface.refracted_offset;
-    }
 }
 
 #endif

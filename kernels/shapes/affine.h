@@ -2,7 +2,7 @@
 #ifndef AFFINE_H
 #define AFFINE_H
 
-#include "numerics/vector.h"
+#include "shapes/surface_point.h"
 
 static inline real affine_row(scalar4 row, Vector v)
 {
@@ -46,6 +46,21 @@ static inline Vector affine_normal(const scalar4 inverses[3], Vector n)
 // Bounds the error that mapping adds to a point and to the next ray's test, in units of 16 u of the map's
 // condition times the shape's largest coordinate from the image of 0.
 #define MAPPED_POINT_ERROR ((real)(1.5f))
+
+// Returns the image of a surface point p. `normal` is the mapped normal, of any length, `largest` the largest
+// coordinates of p's shape, and rounding_scale that before mapping.
+static inline SurfacePoint affine_surface_point(const scalar4 rows[3], scalar condition, Vector p,
+                                                Vector normal, Vector largest, real rounding_scale)
+{
+    const real norm = vector_norm(normal);
+    const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
+    const Vector reach = affine_reach(rows, largest);
+    const real mapping_scale = real_max(real_max(reach.x, reach.y), reach.z);
+    rounding_scale = real_fma((real)(0.25f), vector_norm1(p), rounding_scale) * inverse;
+    return surface_point_make(
+        affine_point(rows, p), vector_scale(normal, inverse),
+        real_fma(MAPPED_POINT_ERROR * (real)(condition), mapping_scale, rounding_scale));
+}
 
 // Returns the image of 0.
 static inline Vector affine_place(const scalar4 rows[3])

@@ -55,17 +55,9 @@ static inline Corners instance_corners(const Instance *instance, Corners corners
 static inline SurfacePoint instance_surface_point(const Instance *instance, Corners corners, Vector normal,
                                                   TriangleWeights weights)
 {
-    const Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners),
-                 p = triangle_blend(weights, corners), mapped = instance_normal(instance, unit);
-    const real norm = vector_norm(mapped);
-    const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
-    const real rounding_scale =
-        real_fma((real)(0.25f), vector_norm1(p), vector_norm1_along(unit, max_abs)) * inverse;
-    const Vector reach = affine_reach(instance->rows, max_abs);
-    const real largest = real_max(real_max(reach.x, reach.y), reach.z);
-    return surface_point_make(
-        instance_point(instance, p), vector_scale(mapped, inverse),
-        real_fma(MAPPED_POINT_ERROR * (real)(instance->extent.w), largest, rounding_scale));
+    const Vector unit = vector_normalize(normal), max_abs = corners_max_abs(corners);
+    return affine_surface_point(instance->rows, instance->extent.w, triangle_blend(weights, corners),
+                                instance_normal(instance, unit), max_abs, vector_norm1_along(unit, max_abs));
 }
 
 #endif

@@ -140,15 +140,9 @@ static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, 
         unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
     }
     OVAL_LIST(OVAL_SURFACE_POINT)
-    const Vector mapped = affine_normal(oval->inverses, unit.normal),
-                 reach = affine_reach(oval->rows, unit.position);
-    const real norm = vector_norm(mapped);
-    const real inverse = real_divide((real)(1), lanes_select(norm > (real)(0), norm, (real)(1)));
-    const real rounding_scale =
-        real_fma((real)(0.25f), vector_norm1(unit.position), unit.rounding_scale) * inverse;
-    const real largest = real_max(real_max(reach.x, reach.y), reach.z);
-    return surface_point_make(affine_point(oval->rows, unit.position), vector_scale(mapped, inverse),
-                              real_fma(MAPPED_POINT_ERROR * (real)(oval->extent.w), largest, rounding_scale));
+    return affine_surface_point(oval->rows, oval->extent.w, unit.position,
+                                affine_normal(oval->inverses, unit.normal), unit.position,
+                                unit.rounding_scale);
 }
 
 static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)

@@ -17,7 +17,7 @@ typedef struct {
     real rounding_scale;
     Vector lift; // with HAS_SMOOTH_NORMALS, from the position to where rays to lights start
     // At `certified`, the rate at which the shading normal turns along the surface, and a bound on its error
-    // except for that from the position's error (shading/surface.h). For a flat surface, a bound on the
+    // except for that from the position's error (shading/lane_points.h). For a flat surface, a bound on the
     // position's height over the exact surface, else NEVER.
     real curvature, normal_error, height;
     real lift_error; // at `certified`, a bound on the error of `lift`, 0 where nothing lifts

@@ -37,9 +37,9 @@ static Vector3 needle_normal(Vector3 a, Vector3 b, Vector3 c, double least_sine)
 }
 
 // Returns the normal of the corners before they are rounded, within TRIANGLE_NORMAL_ERROR of
-// kernels/shapes/triangle.h, or 0, with which every hit is uncertain. If s is the sine of the angle at `a`,
-// its direction is off by less than (3 + 3 / s) 2^-53: by 27 of these down to 1/8, and by a 2^-9th of a
-// float's roundoff down to 2^-18. In quadruple precision the roundoff is 2^-QUAD_BITS.
+// kernels/shapes/certain_triangle.h, or 0, with which every hit is uncertain. If s is the sine of the angle
+// at `a`, its direction is off by less than (3 + 3 / s) 2^-53: by 27 of these down to 1/8, and by a 2^-9th of
+// a float's roundoff down to 2^-18. In quadruple precision the roundoff is 2^-QUAD_BITS.
 static Vector3 certified_normal(const Rounding *rounding, Vector3 a, Vector3 b, Vector3 c)
 {
     const double least_sine = rounding->is_double ? 0x1p-3 : 0x1p-18;

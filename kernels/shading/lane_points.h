@@ -1,0 +1,134 @@
+// Computes the point and the color of a surface for the lanes that hit it.
+#ifndef LANE_POINTS_H
+#define LANE_POINTS_H
+
+#include "shading/normal_map.h"
+#include "traversal/traversal.h"
+
+typedef Vector Color3;
+
+static inline Color3 color_multiply(Color3 a, Color3 b)
+{
+    return (Color3){a.x * b.x, a.y * b.y, a.z * b.z};
+}
+
+static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
+{
+    return (Color3){real_fma(weight.x, color.x, sum.x), real_fma(weight.y, color.y, sum.y),
+                    real_fma(weight.z, color.z, sum.z)};
+}
+
+static inline SurfacePoint shape_surface_point(const Scene *scene, uint type, uint index, const Ray *ray,
+                                               real t)
+{
+#define SHAPE_SURFACE_POINT(feature, Type, name, names)                                                      \
+    if (HAS_##feature && type == TYPE_##feature) {                                                           \
+        Type shape = scene->names[index];                                                                    \
+        return name##_surface_point(&shape, ray, t);                                                         \
+    }
+    SHAPE_LIST(SHAPE_SURFACE_POINT)
+    return surface_point_make(ray->origin, ray->direction, (real)(0));
+}
+
+// The surface points of the lanes that hit the same object, or triangles of the same material.
+typedef struct {
+    mask lanes;
+    uint4 entry; // the object's type_index_material
+    SurfacePoint point;
+    ImagePlace images; // with HAS_IMAGES, if the material has any
+    mask uncertain;    // at `certified`
+} LaneSurfacePoints;
+
+#if IS_CERTIFIED
+// Sets the errors of the point and the lanes that may be at an edge.
+static inline void shape_set_errors(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, real t,
+                                    real place_error)
+{
+#define SHAPE_SET_ERRORS(feature, Type, name, names)                                                         \
+    if (HAS_##feature && hit->entry.x == TYPE_##feature) {                                                   \
+        Type shape = scene->names[hit->entry.y];                                                             \
+        hit->uncertain = name##_set_errors(&shape, ray, t, place_error, &hit->point);                        \
+    }
+    SHAPE_LIST(SHAPE_SET_ERRORS)
+}
+#endif
+
+// Bounds the error of the shading normal.
+static inline real point_normal_error(const SurfacePoint *point, real place_error)
+{
+    real turned = point->curvature * place_error; // to first order
+    return real_fma(turned, real_fma((real)(4), turned, (real)(1)), point->normal_error) +
+           (real)(16 * UNIT_ROUNDOFF);
+}
+
+static inline mask floor_is_uncertain(real a, real error)
+{
+    return !(real_floor(a - error) == real_floor(a + error));
+}
+
+// Returns the lanes where the checker has its second color. Adds to the hit those where that is uncertain. On
+// planes and discs squares lie in the surface. Elsewhere they are cubes in space, looked up a 1024th of a
+// cube behind the surface, so that a face on the border between cubes has one color.
+static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, scalar4 grid,
+                               real place_error)
+{
+    const SurfacePoint *point = &hit->point;
+    const uint type = hit->entry.x, index = hit->entry.y;
+    mask uncertain = mask_none();
+    real cells;
+    if (type_has_grid(type)) {
+        GridCoordinates square = grid_coordinates(scene, type, index, point->position);
+        cells = real_floor(square.u) + real_floor(square.v);
+        if (IS_CERTIFIED) {
+            real error = grid_error(scene, type, index, point->position, place_error);
+            uncertain = floor_is_uncertain(square.u, error) | floor_is_uncertain(square.v, error);
+        }
+    } else {
+        mask along = vector_dot(point->normal, ray->direction) > (real)(0);
+        Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
+        Vector cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
+        cell = vector_fma(inward, (real)(0x1p-10f), cell);
+        cells = real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z);
+        if (IS_CERTIFIED) {
+            const scalar cells_per_unit = fabs(grid.w);
+            real error = (real)(cells_per_unit)*place_error +
+                         (real)(0x1p-9f) * point_normal_error(point, place_error) +
+                         (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
+                                                      vector_norm1(vector_of(grid)) + (real)(1));
+            uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |
+                        floor_is_uncertain(cell.z, error);
+        }
+    }
+    if (IS_CERTIFIED) hit->uncertain = hit->uncertain | uncertain;
+    real halved = cells * (real)(0.5f);
+    return real_floor(halved) != halved;
+}
+
+// Completes the place of a material's images. That of triangles has the coordinates and tangents.
+static inline void hit_set_images(LaneSurfacePoints *hit, const Scene *scene, const Material *material,
+                                  const Ray *ray, real travelled)
+{
+    const uint type = hit->entry.x, index = hit->entry.y;
+    const Vector normal = hit->point.normal;
+    hit->images.footprint = ray_footprint(scene, ray, normal, travelled);
+    if (type == TYPE_TRIANGLES) return;
+    hit->images.coordinates = texture_coordinates(scene, type, index, material, &hit->point);
+    if (HAS_NORMAL_MAPS) hit->images.tangents = shape_tangents(scene, type, index, normal);
+}
+
+// Returns the object's color at the hit: plain, checkered or textured.
+static inline Color3 object_color(const Scene *scene, const Material *material, LaneSurfacePoints *hit,
+                                  const Ray *ray, real place_error)
+{
+    Color3 color = vector_of(material->color);
+    if (HAS_CHECKERS && material->grid.w != 0) {
+        mask odd = checker_odd(scene, hit, ray, material->grid, place_error);
+        color = vector_select(odd, vector_of(material->other_color), color);
+    }
+    if (HAS_IMAGES && material->texture.x > 0)
+        color = texture_color(scene, image_on(hit->entry.x, material->texture), hit->images.coordinates,
+                              hit->images.footprint, hit->lanes);
+    return color;
+}
+
+#endif
