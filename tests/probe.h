@@ -138,9 +138,8 @@ static inline bool probe_trace(const Scene *scene, Precision precision, uint32_t
     return traced;
 }
 
-static inline bool probe_keep_band(void *context, const Film *band, double fraction_done)
+static inline bool probe_keep_band(void *context, const Film *band)
 {
-    (void)fraction_done;
     float *colors = context;
     memcpy(colors + 3 * (size_t)band->first_row * band->width, band->color,
            film_layer_size(band, LAYER_COLOR));

@@ -334,9 +334,8 @@ typedef struct {
     bool is_right;
 } Sink;
 
-static bool band_sink(void *context, const Film *band, double fraction_done)
+static bool band_sink(void *context, const Film *band)
 {
-    (void)fraction_done;
     Sink *sink = context;
     const float *color = band->layers[LAYER_COLOR];
     sink->is_right = sink->is_right && band->first_row == sink->rows;

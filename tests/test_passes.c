@@ -17,8 +17,9 @@ typedef struct {
     unsigned color_bands, aov_bands;
 } Taken;
 
-static bool take(void *context, const Film *band, uint32_t samples)
+static bool take(void *context, const Film *band)
 {
+    const uint32_t samples = band->samples;
     Taken *taken = context;
     film_copy_band(&taken->film, band);
     if (!band->color) {

@@ -27,7 +27,7 @@ double __wrap_clock_seconds(void)
 }
 
 // Checks that bands arrive in order and that each of their values is its row.
-static bool band_sink(void *context, const Film *band, double fraction_done)
+static bool band_sink(void *context, const Film *band)
 {
     Sink *sink = context;
     const float *values = band->layers[LAYER_COLOR];
@@ -37,7 +37,6 @@ static bool band_sink(void *context, const Film *band, double fraction_done)
             sink->is_right =
                 sink->is_right && values[row * WIDTH * COMPONENTS + i] == (float)(sink->rows + row);
     sink->rows += band->height;
-    sink->is_right = sink->is_right && fraction_done == (double)sink->rows / ROWS;
     sink->bands++;
     return sink->bands != sink->bands_max;
 }

@@ -29,11 +29,10 @@ static const struct {
     {"tree", {169836, 0, 0, 1097419}},
 };
 
-static bool take_band(void *context, const Film *band, double fraction_done)
+static bool take_band(void *context, const Film *band)
 {
     (void)context;
     (void)band;
-    (void)fraction_done;
     return true;
 }
 

@@ -42,9 +42,9 @@ static double processor_seconds(void)
     return seconds;
 }
 
-static bool band_drop(void *context, const Film *band, double fraction_done)
+static bool band_drop(void *context, const Film *band)
 {
-    (void)context, (void)band, (void)fraction_done;
+    (void)context, (void)band;
     return true;
 }
 

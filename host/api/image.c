@@ -40,11 +40,12 @@ static void positions_move(const Rendering *rendering, const Film *band)
     }
 }
 
-static bool band_receive(void *context, const Film *band, double fraction_done)
+static bool band_receive(void *context, const Film *band)
 {
     Rendering *rendering = context;
     film_copy_band(&rendering->film, band);
     positions_move(rendering, band);
+    const double fraction_done = (double)(band->first_row + band->height) / rendering->film.height;
     rendering->is_stopped =
         rendering->progress && rendering->progress(rendering->context, fraction_done) != 0;
     return !rendering->is_stopped;

@@ -7,9 +7,9 @@
 
 enum { BUILD_TEST_SIDE = 64 };
 
-static bool band_skip(void *context, const Film *band, double fraction_done)
+static bool band_skip(void *context, const Film *band)
 {
-    (void)context, (void)band, (void)fraction_done;
+    (void)context, (void)band;
     return true;
 }
 
@@ -130,9 +130,8 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
 enum { PAGE_BYTES = 4096 };
 
 // Reads one value per memory page, since a driver may leave a mapped page on the device until it is read.
-static bool band_read(void *context, const Film *band, double fraction_done)
+static bool band_read(void *context, const Film *band)
 {
-    (void)fraction_done;
     double *end_seconds = context;
     const volatile unsigned char *bytes = band->layers[LAYER_COLOR];
     const size_t size = film_layer_size(band, LAYER_COLOR);

@@ -39,7 +39,7 @@ static void estimate_print(ImageRender *render, double fraction_done)
             bytes > 0 ? text_size(bytes).text : "");
 }
 
-static bool band_receive(void *context, const Film *band, double fraction_done)
+static bool band_receive(void *context, const Film *band)
 {
     ImageRender *render = context;
     Shutter *shutter = &render->shutter;
@@ -54,7 +54,8 @@ static bool band_receive(void *context, const Film *band, double fraction_done)
     } else {
         shutter_add(shutter, band);
     }
-    fraction_done = shutter_fraction(shutter, fraction_done);
+    const double fraction_done =
+        shutter_fraction(shutter, (double)(band->first_row + band->height) / render->settings.region_height);
     if (is_taken) estimate_print(render, fraction_done);
     progress_show(&shutter->progress, fraction_done);
     return is_taken;

@@ -85,9 +85,8 @@ typedef struct {
     double first_seconds, last_seconds;
 } SampleFilm;
 
-static bool sample_receive(void *context, const Film *band, double fraction_done)
+static bool sample_receive(void *context, const Film *band)
 {
-    (void)fraction_done;
     SampleFilm *sample = context;
     sample->last_seconds = clock_seconds();
     sample->pixels += film_pixel_count(band);

@@ -33,24 +33,12 @@ static void *lengths_restored(const Renderer *renderer, void *lengths, size_t co
     return restored;
 }
 
-// The destination of a band: the queue that handed out its rows, or a PassSink with its number of samples.
-typedef struct {
-    const BandQueue *queue;
-    PassSink pass_sink;
-    uint32_t samples;
-    void *context;
-} Delivery;
-
-static bool deliver(const Delivery *delivery, const Film *band)
-{
-    return delivery->queue ? delivery->queue->deliver(delivery->queue->context, band)
-                           : delivery->pass_sink(delivery->context, band, delivery->samples);
-}
-
+// Delivers layers of a band whose color has `samples` samples.
 static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned layers, BandRows rows,
-                         const Delivery *delivery)
+                         uint32_t samples, const BandQueue *queue)
 {
     Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
+    band.samples = samples;
     band.rerenders = buffers->rerenders;
     buffers->rerenders = (RerenderCounts){0};
     void *mapped[LAYER_COUNT] = {NULL};
@@ -61,7 +49,7 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
             band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
     }
-    bool continues = compute_ok(renderer->compute) && deliver(delivery, &band);
+    bool continues = compute_ok(renderer->compute) && queue->deliver(queue->context, &band);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
         renderer_unmap(renderer, buffers->film, mapped[layer]);
@@ -111,14 +99,14 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
 
-static bool has_ended(const Delivery *delivery)
+static bool has_ended(const BandQueue *queue)
 {
-    return delivery->queue && delivery->queue->has_ended(delivery->queue->context);
+    return queue->has_ended && queue->has_ended(queue->context);
 }
 
 // Renders samples first..end-1 of a band. Returns false if the device failed or the render is stopped.
 static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows, uint32_t first, uint32_t end,
-                        const Delivery *delivery)
+                        const BandQueue *queue)
 {
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
     const Place place = band_place(renderer, rows);
@@ -127,7 +115,7 @@ static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows,
     if (first == renderer->settings.first_sample) band_clear_flags(renderer, buffers, rows);
     while (continues && first < end) {
         const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
-        continues = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(delivery);
+        continues = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(queue);
         first += samples;
     }
     if (continues && renderer->next_pass && end == samples_end(&renderer->settings))
@@ -157,7 +145,6 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
 {
     const RenderSettings *settings = &renderer->settings;
     const Compute *compute = renderer->compute;
-    const Delivery delivery = {.queue = queue};
     const uint32_t step = settings->band_rows > 0 ? settings->band_rows : group_shape(renderer).height;
     const uint32_t end = samples_end(settings);
     BandBuffers buffers = {0};
@@ -171,9 +158,9 @@ bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
         BandRows rows = queue->acquire(queue->context, wanted, step);
         if (rows.row_count == 0) break;
         const double start = clock_seconds();
-        continues = band_sample(renderer, &buffers, rows, settings->first_sample, end, &delivery) &&
+        continues = band_sample(renderer, &buffers, rows, settings->first_sample, end, queue) &&
                     band_fill_aovs(renderer, &buffers, aovs, rows) &&
-                    band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, &delivery);
+                    band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, end, queue);
         array_push(renderer->report.bands, ((HostSpan){"band", start, clock_seconds()}));
     }
     band_buffers_close(&buffers, renderer);
@@ -191,57 +178,54 @@ typedef struct {
 } PassBands;
 
 // Renders the first pass, which divides the image into bands, each with separate buffers.
-static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, Delivery *delivery)
+static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, const BandQueue *queue)
 {
     Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
     pace_begin_band(pace);
     const uint32_t height = renderer->settings.region_height;
     const uint32_t most = rows_max(renderer, aovs);
     bool continues = compute_ok(renderer->compute);
-    delivery->samples = 1;
     for (uint32_t row = 0; continues && row < height;) {
         uint32_t left = height - row;
         PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
         band_buffers_open(&band.buffers, renderer, aovs, film_of_rows(renderer, 0, band.rows.row_count));
         array_push(*bands, band);
-        continues = band_sample(renderer, &band.buffers, band.rows, 0, 1, delivery) &&
-                    band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, delivery);
+        continues = band_sample(renderer, &band.buffers, band.rows, 0, 1, queue) &&
+                    band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, 1, queue);
         row += band.rows.row_count;
     }
     return continues;
 }
 
-static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, const Delivery *delivery)
+static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, const BandQueue *queue)
 {
     bool continues = true;
     for (size_t i = 0; continues && i < bands->count; i++) {
         PassBand *band = &bands->items[i];
         continues = band_fill_aovs(renderer, &band->buffers, aovs, band->rows) &&
-                    band_deliver(renderer, &band->buffers, aovs, band->rows, delivery);
+                    band_deliver(renderer, &band->buffers, aovs, band->rows, 1, queue);
     }
     return continues;
 }
 
-bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void *context)
+bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
 {
     const uint32_t count = renderer->settings.sample_count;
-    Delivery delivery = {.pass_sink = sink, .context = context};
+    const BandQueue queue = {.deliver = sink, .context = context};
     PassBands bands = {0};
     double start = clock_seconds(), seconds_of_sample;
-    bool continues = first_pass(renderer, &bands, aovs, &delivery);
+    bool continues = first_pass(renderer, &bands, aovs, &queue);
     seconds_of_sample = clock_seconds() - start;
-    if (continues && aovs) continues = aov_pass(renderer, &bands, aovs, &delivery);
-    while (continues && delivery.samples < count) {
-        uint32_t first = delivery.samples;
-        delivery.samples += (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
+    if (continues && aovs) continues = aov_pass(renderer, &bands, aovs, &queue);
+    for (uint32_t first = 1, end; continues && first < count; first = end) {
+        end = first + (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
         start = clock_seconds();
         for (size_t i = 0; continues && i < bands.count; i++) {
             PassBand *band = &bands.items[i];
-            continues =
-                band_sample(renderer, &band->buffers, band->rows, first, delivery.samples, &delivery) &&
-                band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, &delivery);
+            continues = band_sample(renderer, &band->buffers, band->rows, first, end, &queue) &&
+                        band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, end, &queue);
         }
-        seconds_of_sample = (clock_seconds() - start) / (delivery.samples - first);
+        seconds_of_sample = (clock_seconds() - start) / (end - first);
     }
     for (size_t i = 0; i < bands.count; i++)
         band_buffers_close(&bands.items[i].buffers, renderer);
@@ -249,9 +233,8 @@ bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void 
     return continues && compute_ok(renderer->compute);
 }
 
-static bool film_receive_band(void *film, const Film *band, double fraction_done)
+static bool film_receive_band(void *film, const Film *band)
 {
-    (void)fraction_done;
     film_copy_band(film, band);
     return true;
 }

@@ -5,7 +5,7 @@
 #include "host/compile/compiled_scene.h"
 #include "host/compile/settings.h"
 #include "host/opencl/compute.h"
-#include "host/render/film.h"
+#include "host/render/band_queue.h"
 #include "host/render/scheduler.h"
 #include "host/render/trace.h"
 #include "host/scene/scene.h"
@@ -141,15 +141,6 @@ FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs);
 // device delivers no further bands.
 bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
-// The source of a renderer's rows and the destination of their bands. The functions have the contracts of
-// scheduler_acquire, scheduler_deliver and scheduler_has_ended.
-typedef struct {
-    BandRows (*acquire)(void *context, uint32_t rows_max, uint32_t step);
-    bool (*deliver)(void *context, const Film *band);
-    bool (*has_ended)(void *context);
-    void *context;
-} BandQueue;
-
 // Renders the rows of the queue until none are left. Returns false if the device failed, or if settings.stop
 // or the queue ended the render.
 bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue);
@@ -179,15 +170,11 @@ typedef struct {
 // cannot be written or read, or if settings.stop or the sink ended the render.
 bool render_job_run(const RenderJob *job);
 
-// Called for each band of a pass. The band's color is the sum of `samples` samples, or their mean once it has
-// all samples. A band of AOVs has no color.
-typedef bool (*PassSink)(void *context, const Film *band, uint32_t samples);
-
 // Renders the image in passes over all of its pixels, so that a preview sharpens. After the first pass every
 // pixel has one sample, and after the last it has all. The AOVs of the set follow the first pass. The final
-// image equals renderer_render's bit for bit. Returns false if the device failed, or if settings.stop or the
-// sink ended the render.
-bool renderer_accumulate(Renderer *renderer, unsigned aovs, PassSink sink, void *context);
+// image equals renderer_render's bit for bit. A band of AOVs has no color. Returns false if the device
+// failed, or if settings.stop or the sink ended the render.
+bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void *context);
 
 // Renders the color and the AOVs of the set into one film in double, which film_free frees. Returns false,
 // with nothing to free, if the device failed or settings.stop ended the render.

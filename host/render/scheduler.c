@@ -218,8 +218,7 @@ static void band_pass(Scheduler *scheduler, const Film *band)
     const uint32_t end = band->first_row + band->height;
     scheduler->is_delivering = true;
     pthread_mutex_unlock(&scheduler->mutex);
-    bool continues = scheduler->settings.sink(scheduler->settings.context, band,
-                                              (double)end / scheduler->settings.row_count);
+    bool continues = scheduler->settings.sink(scheduler->settings.context, band);
     pthread_mutex_lock(&scheduler->mutex);
     scheduler->is_delivering = false;
     if (continues)

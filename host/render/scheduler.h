@@ -6,22 +6,19 @@
 // at the same time. A worker's first band has one step of rows.
 #pragma once
 
+#include "host/render/band_queue.h"
 #include "host/render/checkpoint.h"
-#include "host/render/film.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-// Called for each band in order from the top. The band's layers are valid until the sink returns. A sink that
-// returns false stops the render.
-typedef bool (*BandSink)(void *context, const Film *band, double fraction_done);
 // Called when a worker was dropped and others continue.
 typedef void (*WorkerDropped)(void *context, size_t worker);
 
 typedef struct {
     uint32_t row_count;
     size_t worker_count;
-    BandSink sink;          // called by the workers' threads, one at a time
+    BandSink sink;          // called by the workers' threads, for one band at a time in order from the top
     WorkerDropped dropped;  // called by the workers' threads, never while the sink runs; may be NULL
     void *context;          // passed to both
     Checkpoint *checkpoint; // provides finished bands and receives all others; may be NULL

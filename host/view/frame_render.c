@@ -32,15 +32,15 @@ static void rendering_show(FrameLoop *loop, const Film *band)
     stage_set(loop->stage, band->first_row + band->height);
 }
 
-static bool preview_receive(void *context, const Film *band, double fraction_done)
+static bool preview_receive(void *context, const Film *band)
 {
-    (void)fraction_done;
     film_copy_band(context, band);
     return true;
 }
 
-static bool pass_receive(void *context, const Film *band, uint32_t samples)
+static bool pass_receive(void *context, const Film *band)
 {
+    const uint32_t samples = band->samples;
     FrameLoop *loop = context;
     film_copy_band(&loop->film, band);
     if (!atomic_load(&loop->first_is_due)) probe_answer(loop);
@@ -163,9 +163,8 @@ typedef struct {
     Film film;
 } Reference;
 
-static bool reference_receive(void *context, const Film *band, double fraction_done)
+static bool reference_receive(void *context, const Film *band)
 {
-    (void)fraction_done;
     Reference *reference = context;
     film_copy_band(&reference->film, band);
     rendering_show(reference->loop, band);

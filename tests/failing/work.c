@@ -13,9 +13,8 @@ const Device *work_device;
 Scene work_scene;
 Answer right;
 
-bool work_receive_band(void *context, const Film *band, double fraction_done)
+bool work_receive_band(void *context, const Film *band)
 {
-    (void)fraction_done;
     Answer *answer = context;
     memcpy(answer->colors + (size_t)band->first_row * SIDE * 3, band->layers[LAYER_COLOR],
            (size_t)band->height * SIDE * 3 * sizeof *answer->colors);

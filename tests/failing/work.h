@@ -22,7 +22,7 @@ int work_set_up(void **state);
 int work_tear_down(void **state);
 
 // Adds a band to an Answer. This is a BandSink.
-bool work_receive_band(void *answer, const Film *band, double fraction_done);
+bool work_receive_band(void *answer, const Film *band);
 // Returns true if all was done. The compute is left open.
 bool work(Compute *compute, Answer *answer);
 // Closes the compute. Fails the test if an object was not released.
