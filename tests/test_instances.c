@@ -313,6 +313,21 @@ TEST(the_feature_alone_and_all_together_agree)
     scene_free(&scene);
 }
 
+TEST(renderers_share_a_compiled_scene)
+{
+    enum { COUNT = 2 };
+    Scene scene = many_make(3);
+    RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+    settings.instances = INSTANCES_SHARED;
+    Renderer *renderers[COUNT] = {NULL};
+    Compute *const computes[COUNT] = {&probe_compute, &probe_compute};
+    MessageList messages = {0}, of_each[COUNT] = {0};
+    assert_true(renderers_open(renderers, computes, COUNT, &scene, &settings, NULL, &messages, of_each));
+    for (size_t i = 0; i < COUNT; i++)
+        renderer_close(renderers[i]);
+    scene_free(&scene);
+}
+
 TEST(a_moved_camera_sees_what_a_new_one_sees)
 {
     for (int few = 0; few < 2; few++) {
@@ -484,6 +499,7 @@ int main(void)
         cmocka_unit_test(lanes_agree),
         cmocka_unit_test(many_instances_look_as_copies),
         cmocka_unit_test(the_feature_alone_and_all_together_agree),
+        cmocka_unit_test(renderers_share_a_compiled_scene),
         cmocka_unit_test(a_moved_camera_sees_what_a_new_one_sees),
         cmocka_unit_test(meshes_are_shared_where_copies_are_large),
         cmocka_unit_test(an_uneven_transform_makes_a_copy),

@@ -298,7 +298,8 @@ static void scene_upload(Renderer *const *renderers, size_t count, CompiledScene
     if (count == 0) compiled_scene_free(compiled);
     for (size_t i = 0; i < count; i++) {
         renderers[i]->compiled = *compiled;
-        compiled->textures = NULL;
+        compiled->textures = NULL; // only a renderer that moves reads these two
+        compiled->instances = NULL;
         scene_changed(renderers[i]);
     }
 }
