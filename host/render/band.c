@@ -38,7 +38,7 @@ Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_cou
 {
     return (Film){.width = renderer->settings.region_width,
                   .height = row_count,
-                  .light_count = (uint32_t)renderer->light_count,
+                  .light_count = renderer_light_count(renderer),
                   .first_row = first_row,
                   .is_double = renderer->report.is_double,
                   .real_size = renderer_scalar_size(renderer)};
@@ -281,7 +281,7 @@ bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, 
     const bool is_list = renderer->pass != PASS_ALL;
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3,
                   is_list ? buffers->flags : buffers->center_flags);
-    const cl_uint shadow_count = aovs & AOV_SHADOW ? (cl_uint)renderer->light_count : 0;
+    const cl_uint shadow_count = aovs & AOV_SHADOW ? renderer_light_count(renderer) : 0;
     if (type == KERNEL_AOV)
         kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
     if (type == KERNEL_COVERAGE)

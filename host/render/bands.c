@@ -26,10 +26,10 @@ FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
 // `double`, else a float copy, which the caller frees.
 static void *lengths_restored(const Renderer *renderer, void *lengths, size_t count)
 {
-    if (renderer->compiled.unit == 1) return lengths;
+    if (renderer->scene.compiled.unit == 1) return lengths;
     float *restored = memory_allocate(count, sizeof *restored);
     for (size_t i = 0; i < count; i++)
-        restored[i] = ((const float *)lengths)[i] * (float)renderer->compiled.unit;
+        restored[i] = ((const float *)lengths)[i] * (float)renderer->scene.compiled.unit;
     return restored;
 }
 
@@ -243,7 +243,7 @@ bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
 {
     const RenderSettings *settings = &renderer->settings;
     *film =
-        film_allocate(settings->region_width, settings->region_height, (uint32_t)renderer->light_count, aovs);
+        film_allocate(settings->region_width, settings->region_height, renderer_light_count(renderer), aovs);
     film->is_double = renderer->report.is_double;
     bool whole = renderer_render(renderer, aovs, film_receive_band, film);
     if (!whole) film_free(film);

@@ -47,139 +47,12 @@ static bool settings_fit(const RenderSettings *settings, const Compute *compute,
     return true;
 }
 
-static SceneBuffer buffer_of(size_t type)
-{
-    return type < FLAT_NODES ? BUFFER_ARENA : type == FLAT_NODES ? BUFFER_NODES : BUFFER_TEXELS;
-}
-
-// Returns the layout of the scene's buffers once the arrays that have changed are uploaded.
-static SceneLayout scene_layout(const CompiledScene *compiled, const Renderer *renderer)
-{
-    SceneLayout layout = {.begins = {0}};
-    for (size_t type = 0; type < FLAT_COUNT; type++) {
-        uint64_t *end = &layout.buffer_sizes[buffer_of(type)];
-        layout.array_sizes[type] = compiled->changed[type]
-                                       ? flat_array_size(&compiled->arrays[type], renderer->report.is_double)
-                                       : renderer->layout.array_sizes[type];
-        layout.begins[type] = *end;
-        *end += padded_size(layout.array_sizes[type]);
-    }
-    return layout;
-}
-
-// The size of the largest buffer that the host and the arena's offsets can address.
-static const uint64_t BUFFER_BYTES_MAX =
-    SIZE_MAX / ARENA_UNIT < UINT32_MAX ? SIZE_MAX : (uint64_t)UINT32_MAX * ARENA_UNIT;
-
-// Returns false with a message if a buffer exceeds BUFFER_BYTES_MAX, or if the buffers exceed the memory that
-// the device reports. If the device reports none, creating the buffers may fail.
-static bool device_has_room(const CompiledScene *compiled, const Renderer *renderer, MessageList *messages)
-{
-    const Device *device = renderer->compute->device;
-    const SceneLayout layout = scene_layout(compiled, renderer);
-    const bool is_known = device->memory_bytes > 0 && device->largest_buffer_bytes > 0;
-    const uint64_t memory = is_known ? device->memory_bytes : UINT64_MAX,
-                   reported = is_known ? device->largest_buffer_bytes : UINT64_MAX,
-                   most = reported < BUFFER_BYTES_MAX ? reported : BUFFER_BYTES_MAX;
-    uint64_t sum = 0, largest = 0;
-    for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
-        sum += layout.buffer_sizes[i];
-        if (layout.buffer_sizes[i] > largest) largest = layout.buffer_sizes[i];
-    }
-    if (sum <= memory && largest <= most) return true;
-    const ShortText sum_text = text_size((double)sum), largest_text = text_size((double)largest),
-                    most_text = text_size((double)most);
-    if (!is_known)
-        return message_error(messages, "the scene needs a buffer of %s; at most %s are addressed",
-                             largest_text.text, most_text.text);
-    return message_error(messages,
-                         "the scene needs %s on the device, %s of it in one buffer; the device \"%s\" has "
-                         "%s, and at most %s in "
-                         "one buffer",
-                         sum_text.text, largest_text.text, device->name, text_size((double)memory).text,
-                         most_text.text);
-}
-
-// Returns whether scene_move neither reads nor changes an array.
-static bool is_without_eye(size_t type)
-{
-    return type == FLAT_TRIANGLE_NORMALS || type == FLAT_TRIANGLE_UVS || type == FLAT_TRIANGLE_NEIGHBORS ||
-           type == FLAT_SKY_CELLS || type == FLAT_TEXTURE_LEVELS || type == FLAT_TEXELS;
-}
-
-// Stages the buffers whose size differs. Then all arrays in them have changed: only scene_compile changes the
-// size of an array, and it writes all but the texels, which have a separate buffer.
-static void buffers_stage(Renderer *renderer, const CompiledScene *compiled)
-{
-    const SceneLayout layout = scene_layout(compiled, renderer);
-    for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
-        if (renderer->buffers[i] && renderer->layout.buffer_sizes[i] == layout.buffer_sizes[i]) continue;
-        buffer_release(renderer->buffers[i]);
-        renderer->buffers[i] = NULL;
-        renderer->staged[i] = memory_allocate_large((size_t)layout.buffer_sizes[i], 1);
-    }
-    renderer->layout = layout;
-}
-
-// Writes an array to its staged buffer, or to its place in the buffer on the device.
-static void array_upload(Renderer *renderer, size_t type, const FlatArray *array)
-{
-    const SceneBuffer buffer = buffer_of(type);
-    char *staged = renderer->staged[buffer];
-    const size_t begin = (size_t)renderer->layout.begins[type],
-                 size = (size_t)renderer->layout.array_sizes[type];
-    if (size == 0) return;
-    void *bytes =
-        staged ? staged + begin : buffer_map(renderer->compute, renderer->buffers[buffer], begin, size);
-    if (!bytes) return;
-    flat_array_write(array, renderer->report.is_double, bytes);
-    if (renderer->settings.hashes_scene && !is_ordered_by_bvh(type))
-        renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, bytes, size);
-    if (!staged) buffer_write_mapped(renderer->compute, renderer->buffers[buffer], bytes);
-}
-
-static void staged_upload(Renderer *renderer)
-{
-    for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
-        if (!renderer->staged[i]) continue;
-        renderer->buffers[i] =
-            buffer_adopt(renderer->compute, (size_t)renderer->layout.buffer_sizes[i], renderer->staged[i]);
-        renderer->staged[i] = NULL;
-    }
-}
-
-// Uploads the arrays that have changed to each renderer. Frees each array once all have it, unless the
-// renderer moves, so that at most one array is in memory twice.
-static void arrays_upload(Renderer *const *renderers, size_t count, CompiledScene *compiled)
-{
-    if (count > 0) stage_begin(renderers[0]->settings.stage, "uploading the scene", NULL, 0);
-    for (size_t i = 0; i < count; i++)
-        buffers_stage(renderers[i], compiled);
-    for (size_t type = 0; type < FLAT_COUNT; type++) {
-        for (size_t i = 0; i < count && compiled->changed[type]; i++) {
-            const double start = clock_seconds();
-            array_upload(renderers[i], type, &compiled->arrays[type]);
-            renderers[i]->report.upload_seconds += clock_seconds() - start;
-        }
-        compiled->changed[type] = false;
-        if (count > 0 && renderers[0]->settings.moves && !is_without_eye(type)) continue;
-        free(compiled->arrays[type].items);
-        compiled->arrays[type].items = NULL;
-    }
-    for (size_t i = 0; i < count; i++) {
-        const double start = clock_seconds();
-        staged_upload(renderers[i]);
-        renderers[i]->report.upload_seconds += clock_seconds() - start;
-    }
-}
-
 static void sample_offsets_upload(Renderer *renderer)
 {
     const uint32_t count = renderer->settings.sample_count;
     const size_t size = 2 * count * renderer_scalar_size(renderer);
     void *offsets = sample_pattern(count, renderer->report.is_double);
-    if (renderer->settings.hashes_scene)
-        renderer->report.scene_hash = hash_bytes(renderer->report.scene_hash, offsets, size);
+    if (renderer->scene.hashes) renderer->scene.hash = hash_bytes(renderer->scene.hash, offsets, size);
     buffer_release(renderer->sample_offsets);
     renderer->sample_offsets = buffer_create(renderer->compute, size, offsets, CL_MEM_READ_ONLY);
     free(offsets);
@@ -235,9 +108,13 @@ static Renderer *prepare(Compute *compute, const RenderSettings *settings, Pixel
     }
     report->device = compute->device;
     report->reference_device = compute->reference ? compute->reference->device : NULL;
-    report->scene_hash = HASH_START;
     report->is_double = renderer->settings.precision == PRECISION_DOUBLE;
     report->lanes = device_lanes(compute->device, report->is_double, settings->lanes);
+    renderer->scene = (DeviceScene){.compute = compute,
+                                    .is_double = report->is_double,
+                                    .moves = settings->moves,
+                                    .hashes = settings->hashes_scene,
+                                    .hash = HASH_START};
     renderer->passport =
         arithmetic_passport(compute, renderer->settings.precision, report->lanes, settings->no_cache);
     if (earlier) renderer_kernels_adopt(renderer, earlier);
@@ -276,39 +153,33 @@ uint32_t renderer_lanes(Renderer *renderer, PixelPass pass)
 // Updates everything that depends on the compiled scene.
 static void scene_changed(Renderer *renderer)
 {
-    const CompiledScene *compiled = &renderer->compiled;
-    renderer->light_count = compiled->arrays[FLAT_LIGHTS].count;
+    const CompiledScene *compiled = &renderer->scene.compiled;
     renderer->report.features = compiled->features;
     renderer->report.flatten_seconds += compiled->flatten_seconds;
     renderer->report.bvh_seconds += compiled->bvh_seconds;
-    if (renderer->settings.hashes_scene) { // lengths are restored with the unit
-        uint64_t hash = renderer->report.scene_hash;
-        hash = hash_bytes(hash, &compiled->primitives_hash, sizeof compiled->primitives_hash);
-        renderer->report.scene_hash = hash_bytes(hash, &compiled->unit, sizeof compiled->unit);
-    }
+    renderer->report.upload_seconds += renderer->scene.upload_seconds;
     sample_offsets_upload(renderer);
     renderer_kernels_choose(renderer);
 }
 
-// Uploads the scene to renderers of the same variant, on whose devices it fits, and takes ownership of it. A
-// renderer that moves is alone and keeps the arrays.
+// Uploads the scene to the renderers of its variant, on whose devices it fits, and takes ownership of it.
 static void scene_upload(Renderer *const *renderers, size_t count, CompiledScene *compiled)
 {
-    arrays_upload(renderers, count, compiled);
-    if (count == 0) compiled_scene_free(compiled);
-    for (size_t i = 0; i < count; i++) {
-        renderers[i]->compiled = *compiled;
-        compiled->textures = NULL; // only a renderer that moves reads these two
-        compiled->instances = NULL;
+    DeviceScene **scenes = memory_allocate(count, sizeof *scenes);
+    for (size_t i = 0; i < count; i++)
+        scenes[i] = &renderers[i]->scene;
+    if (count > 0) stage_begin(renderers[0]->settings.stage, "uploading the scene", NULL, 0);
+    device_scenes_receive(scenes, count, compiled);
+    for (size_t i = 0; i < count; i++)
         scene_changed(renderers[i]);
-    }
+    free(scenes);
 }
 
 bool renderer_receive_scene(Renderer *renderer, PixelPass pass, CompiledScene *compiled,
                             MessageList *messages)
 {
     Renderer *receiver = of_pass(renderer, pass);
-    const bool has_room = device_has_room(compiled, receiver, messages);
+    const bool has_room = device_scene_has_room(&receiver->scene, compiled, messages);
     scene_upload(&receiver, has_room, compiled);
     return has_room && compute_check_reference(renderer->compute);
 }
@@ -321,7 +192,7 @@ static size_t receivers_find(Renderer **receivers, Renderer **renderers, size_t 
     for (size_t i = 0; i < count; i++) {
         if (renderer_lanes(renderers[i], variant.pass) != variant.lanes) continue;
         receivers[taker_count] = of_pass(renderers[i], variant.pass);
-        if (device_has_room(compiled, receivers[taker_count], &of_each[i])) {
+        if (device_scene_has_room(&receivers[taker_count]->scene, compiled, &of_each[i])) {
             taker_count++;
         } else {
             renderer_close(renderers[i]);
@@ -395,13 +266,13 @@ Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettin
 static bool scene_assign(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                          MessageList *messages)
 {
-    CompiledScene *compiled = &renderer->compiled, fresh;
+    CompiledScene *compiled = &renderer->scene.compiled, fresh;
     CompileSettings compiling =
         compile_settings(settings, (SceneVariant){renderer->pass, renderer->report.lanes});
     compiling.textures = compiled->textures;
     if (renderer->settings.moves) return scene_move(compiled, scene, &compiling, messages);
     if (!scene_compile(&fresh, scene, &compiling, messages)) return false;
-    const bool has_room = device_has_room(&fresh, renderer, messages);
+    const bool has_room = device_scene_has_room(&renderer->scene, &fresh, messages);
     compiled_scene_free(has_room ? compiled : &fresh);
     if (has_room) *compiled = fresh;
     return has_room;
@@ -417,7 +288,8 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
     RenderReport *report = &renderer->report;
     renderer->settings = of_pass;
     report->upload_seconds = report->flatten_seconds = report->bvh_seconds = 0;
-    arrays_upload(&renderer, 1, &renderer->compiled);
+    stage_begin(of_pass.stage, "uploading the scene", NULL, 0);
+    device_scene_update(&renderer->scene);
     scene_changed(renderer); // another eye may need another feature, or a deeper stack
     return compute_ok(renderer->compute) &&
            (!renderer->next_pass || renderer_move(renderer->next_pass, scene, settings, messages)) &&
@@ -428,22 +300,18 @@ uint64_t renderer_scene_hash(const Renderer *renderer)
 {
     uint64_t hash = HASH_START;
     for (; renderer; renderer = renderer->next_pass)
-        hash = hash_bytes(hash, &renderer->report.scene_hash, sizeof renderer->report.scene_hash);
+        hash = hash_bytes(hash, &renderer->scene.hash, sizeof renderer->scene.hash);
     return hash;
 }
 
 void renderer_release_scene(Renderer *renderer)
 {
     for (; renderer; renderer = renderer->next_pass) {
-        for (SceneBuffer i = 0; i < SCENE_BUFFER_COUNT; i++) {
-            buffer_release(renderer->buffers[i]);
-            renderer->buffers[i] = NULL;
-        }
+        device_scene_release(&renderer->scene);
         buffer_release(renderer->sample_offsets);
         renderer->sample_offsets = NULL;
         while (renderer->spares.count > 0)
             buffer_release(renderer->spares.items[--renderer->spares.count]);
-        compiled_scene_free(&renderer->compiled);
     }
 }
 
@@ -463,7 +331,7 @@ void renderer_close(Renderer *renderer)
 
 double renderer_color_max(const Renderer *renderer, const Scene *scene)
 {
-    return scene_color_max(&renderer->compiled, scene, renderer->settings.bounce_count);
+    return scene_color_max(&renderer->scene.compiled, scene, renderer->settings.bounce_count);
 }
 
 size_t renderer_scalar_size(const Renderer *renderer)

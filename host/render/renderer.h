@@ -45,7 +45,7 @@ typedef struct {
     double band_seconds;         // the target duration of a launch; 0 means 0.1
     bool (*stop)(void *context); // called between launches, ends the render by returning true; may be NULL
     void *stop_context;
-    bool hashes_scene;  // computes the report's scene_hash
+    bool hashes_scene;  // computes renderer_scene_hash
     uint32_t band_rows; // a fixed number of rows per band, for tests; 0 sizes bands by time
     Stage *stage;       // shows the progress before the first launch; may be NULL
 } RenderSettings;
@@ -201,7 +201,6 @@ typedef struct {
     uint32_t lanes;
     bool is_double; // whether the structs are in double
     uint64_t kernel_hash;
-    uint64_t scene_hash; // the contribution of this pass to renderer_scene_hash
     double flatten_seconds, bvh_seconds, build_seconds, upload_seconds;
     bool build_from_cache;     // whether every program came from the cache
     const char *build_options; // the kernels' options, before those of the device

@@ -18,18 +18,6 @@ static const struct {
     [KERNEL_CLOSEST] = {"closest.cl", "closest"}, [KERNEL_COVERAGE] = {"coverage.cl", "coverage"},
 };
 
-static void scene_arguments_set(const Renderer *renderer, cl_kernel kernel)
-{
-    Compute *compute = renderer->compute;
-    const cl_mem *buffers = renderer->buffers;
-#define OFFSET_VALUE(NAME, Type, name, names) (unsigned)(renderer->layout.begins[FLAT_##NAME] / ARENA_UNIT),
-    const ArenaOffsets offsets = {ARENA_LIST(OFFSET_VALUE)};
-    kernel_buffer(compute, kernel, ARGUMENT_ARENA, buffers[BUFFER_ARENA]);
-    kernel_argument(compute, kernel, ARGUMENT_OFFSETS, sizeof offsets, &offsets);
-    kernel_buffer(compute, kernel, ARGUMENT_NODES, buffers[BUFFER_NODES]);
-    kernel_buffer(compute, kernel, ARGUMENT_TEXELS, buffers[BUFFER_TEXELS]);
-}
-
 // Returns a capacity of at least `count`. There are few different capacities, so that few kernels are built:
 // most scenes get `usual`, which is doubled for the others. A kernel with features that its scene does not
 // need serves many scenes and gets twice as much from the start.
@@ -102,7 +90,7 @@ static void prelude_write(Text *text, const Renderer *renderer, bool is_out_of_l
     text_appendf(text, "#define PENDING_MAX %u\n", pending_max(renderer));
     // a million primitives in nodes of four children need 34, which a GPU may keep for each of its threads
     text_appendf(text, "#define STACK_CAPACITY %u\n",
-                 capacity_for(renderer, renderer->compiled.pending_children_max, 40));
+                 capacity_for(renderer, renderer->scene.compiled.pending_children_max, 40));
     text_appendf(text, "#define IS_COUNTING %d\n", settings->counting);
     text_appendf(text, "#define PERTURB %d\n", settings->perturb_seed != 0);
     text_appendf(text, "#define PERTURB_SEED %uu\n", settings->perturb_seed);
@@ -153,7 +141,7 @@ void renderer_kernels_choose(Renderer *renderer)
     renderer->report.build_options = renderer->variant.options;
     for (size_t type = 0; type < KERNEL_COUNT; type++)
         if (renderer->variant.kernels[type].kernel)
-            scene_arguments_set(renderer, renderer->variant.kernels[type].kernel);
+            device_scene_set_arguments(&renderer->scene, renderer->variant.kernels[type].kernel);
 }
 
 char *renderer_kernel_text(const Renderer *renderer)
@@ -200,7 +188,7 @@ cl_kernel renderer_kernel(Renderer *renderer, KernelType type)
     renderer->report.is_out_of_line |= slot->program.is_easy;
     slot->kernel = slot->program.kernel;
     slot->program.kernel = NULL;
-    scene_arguments_set(renderer, slot->kernel);
+    device_scene_set_arguments(&renderer->scene, slot->kernel);
     return slot->kernel;
 }
 

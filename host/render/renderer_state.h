@@ -1,8 +1,8 @@
 // Defines the members of a Renderer for the files of this room.
 #pragma once
 
-#include "host/compile/compiled_scene.h"
 #include "host/opencl/passport.h"
+#include "host/render/device_scene.h"
 #include "host/render/pace.h"
 #include "host/render/renderer.h"
 #include "host/render/spare_buffers.h"
@@ -31,32 +31,14 @@ typedef struct {
     KernelSlot kernels[KERNEL_COUNT];
 } KernelVariant;
 
-// The buffers of the scene on the device: the arena (kernels/types.h), and one for each array outside it.
-typedef enum { BUFFER_ARENA, BUFFER_NODES, BUFFER_TEXELS, SCENE_BUFFER_COUNT } SceneBuffer;
-
-// Returns the size of an array with the padding up to the next one in its buffer.
-static inline uint64_t padded_size(uint64_t size)
-{
-    return (size + ARENA_UNIT - 1) / ARENA_UNIT * ARENA_UNIT;
-}
-
-// The offset of each array in its buffer and the sizes of both, in bytes.
-typedef struct {
-    uint64_t begins[FLAT_COUNT], array_sizes[FLAT_COUNT], buffer_sizes[SCENE_BUFFER_COUNT];
-} SceneLayout;
-
 struct Renderer {
     Compute *compute;
     RenderSettings settings;
     PixelPass pass;
     const Passport *passport; // of the renderer's kernels
     RenderReport report;
-    CompiledScene compiled; // lacks arrays that are only on the device
-    cl_mem buffers[SCENE_BUFFER_COUNT];
-    void *staged[SCENE_BUFFER_COUNT]; // each buffer's contents until it is created
-    SceneLayout layout;
+    DeviceScene scene;
     cl_mem sample_offsets; // positions in the pixel
-    size_t light_count;
     SpareBuffers spares;
     // The variant in use and the one before it. Near a shape a moving camera alternates between two variants.
     KernelVariant variant, other_variant;
@@ -68,6 +50,11 @@ struct Renderer {
 static inline uint32_t samples_end(const RenderSettings *settings)
 {
     return settings->end_sample > 0 ? settings->end_sample : settings->sample_count;
+}
+
+static inline uint32_t renderer_light_count(const Renderer *renderer)
+{
+    return (uint32_t)renderer->scene.compiled.arrays[FLAT_LIGHTS].count;
 }
 
 size_t renderer_scalar_size(const Renderer *renderer);
@@ -83,9 +70,6 @@ void renderer_kernels_choose(Renderer *renderer);
 // renderer has none afterwards.
 void renderer_kernels_adopt(Renderer *renderer, Renderer *earlier);
 void renderer_kernels_close(Renderer *renderer);
-
-// The indices of SCENE_ARGUMENTS (kernels/scene.h). A kernel's other arguments follow them.
-enum { ARGUMENT_ARENA, ARGUMENT_OFFSETS, ARGUMENT_NODES, ARGUMENT_TEXELS, SCENE_ARGUMENT_COUNT };
 
 // Returns the kernel with the scene's arguments set, and builds it when first requested. Returns NULL if the
 // device failed.

@@ -58,8 +58,8 @@ static void layer_merge(Renderer *renderer, Layer layer, const BandBuffers *list
             if (layer_types[layer] == LAYER_TYPE_INTEGER)
                 ((uint32_t *)values)[to] = ((const uint32_t *)rerendered)[from];
             else
-                ((float *)values)[to] =
-                    (float)(((const double *)rerendered)[from] / (is_length ? renderer->compiled.unit : 1));
+                ((float *)values)[to] = (float)(((const double *)rerendered)[from] /
+                                                (is_length ? renderer->scene.compiled.unit : 1));
         }
     free(rerendered);
     renderer_unmap(renderer, band_buffers->film, values);

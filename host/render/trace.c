@@ -65,7 +65,7 @@ static void hits_read(void *context, size_t begin, size_t end)
     const Renderer *renderer = batch->renderer;
     const void *scalars = batch->result_scalars;
     const bool is_double = renderer->report.is_double, certifies = renderer_certifies(renderer);
-    const double unit = renderer->compiled.unit;
+    const double unit = renderer->scene.compiled.unit;
     const TraceCertainty certainty = renderer->pass == PASS_ALL ? TRACE_CERTAIN : TRACE_CERTAIN_IN_DOUBLE;
     for (size_t i = begin; i < end; i++) {
         const size_t index = i * result_scalars(batch->type);
@@ -89,7 +89,8 @@ static void rays_write(void *context, size_t begin, size_t end)
 {
     const TraceBatch *batch = context;
     const bool is_double = batch->renderer->report.is_double, certifies = renderer_certifies(batch->renderer);
-    const double unit = batch->renderer->compiled.unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
+    const double unit = batch->renderer->scene.compiled.unit,
+                 farthest = is_double ? DBL_MAX : (double)FLT_MAX;
     void *scalars = batch->ray_scalars;
     for (size_t i = begin; i < end; i++) {
         const double *origin = batch->rays[i].origin, *direction = batch->rays[i].direction;
