@@ -24,9 +24,8 @@ static Renderer *painters[PRECISION_COUNT];
 static inline Film image_render(const Scene *scene, const RenderSettings *settings)
 {
     Renderer **painter = &painters[settings->precision];
-    Compute *compute = &probe_compute;
     MessageList messages = {0};
-    renderers_open(painter, &compute, 1, scene, settings, NULL, &messages, &messages);
+    *painter = renderer_reopen(*painter, &probe_compute, scene, settings, &messages);
     message_list_print(&messages, stderr);
     message_list_free(&messages);
     assert_non_null(*painter);

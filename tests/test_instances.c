@@ -4,6 +4,7 @@
 #include "host/base/array.h"
 #include "host/compile/compile.h"
 #include "host/compile/instances.h"
+#include "host/render/render_job.h"
 #include "tests/check.h"
 #include "tests/files.h"
 #include "tests/film.h"
@@ -315,15 +316,14 @@ TEST(the_feature_alone_and_all_together_agree)
 
 TEST(renderers_share_a_compiled_scene)
 {
-    enum { COUNT = 2 };
     Scene scene = many_make(3);
     RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
     settings.instances = INSTANCES_SHARED;
-    Renderer *renderers[COUNT] = {NULL};
-    Compute *const computes[COUNT] = {&probe_compute, &probe_compute};
-    MessageList messages = {0}, of_each[COUNT] = {0};
-    assert_true(renderers_open(renderers, computes, COUNT, &scene, &settings, NULL, &messages, of_each));
-    for (size_t i = 0; i < COUNT; i++)
+    Renderer *renderers[2] = {NULL};
+    MessageList messages[3] = {0};
+    const RendererSet set = {renderers, (Compute *[]){&probe_compute, &probe_compute}, messages, 2};
+    assert_true(renderers_open(&set, &scene, &settings, NULL, &messages[2]));
+    for (size_t i = 0; i < 2; i++)
         renderer_close(renderers[i]);
     scene_free(&scene);
 }

@@ -33,7 +33,7 @@ static void devices_append(Text *key, Renderer *const *renderers, size_t count, 
         rank_set_device(&own, reference);
         model_append(key, &own, device_lanes(reference, true, 0));
     }
-    for (size_t i = 0; ranks && i < ranks->count; i++)
+    for (size_t i = 0; ranks && i < ranks->remote.count; i++)
         if (ranks->items[i].lanes[PASS_ALL] > 0) // otherwise it cannot render
             model_append(key, &ranks->items[i], ranks->items[i].lanes[PASS_ALL]);
 }

@@ -82,7 +82,7 @@ static bool is_mixed(const ImageOutput *output)
         differs =
             differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
     }
-    for (size_t i = 0; output->origin.ranks && i < output->origin.ranks->count; i++) {
+    for (size_t i = 0; output->origin.ranks && i < output->origin.ranks->remote.count; i++) {
         const Rank *rank = &output->origin.ranks->items[i];
         differs = differs || strcmp(rank->device, own.device) != 0 || strcmp(rank->driver, own.driver) != 0;
     }
@@ -174,7 +174,7 @@ static void notes_write(Notes *notes, const ImageOutput *output)
     if (output->options->dither) NOTE("Dither", "ordered");
     if (output->options->alpha) NOTE("Alpha", "%s", is_exr(output) ? "premultiplied" : "straight");
     NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
-    if (output->origin.ranks) NOTE("Ranks", "%zu", output->origin.ranks->count + 1);
+    if (output->origin.ranks) NOTE("Ranks", "%zu", output->origin.ranks->remote.count + 1);
     if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
 #undef NOTE
 #undef NOTE_EACH

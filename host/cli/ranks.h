@@ -1,7 +1,7 @@
 // Other machines that render bands of the same image as processes of one MPI job. host/mpi implements them.
 #pragma once
 
-#include "host/render/renderer.h"
+#include "host/render/render_job.h"
 #include <stdio.h>
 
 // One process, and the device that it renders on.
@@ -19,19 +19,15 @@ static inline void rank_set_device(Rank *rank, const Device *device)
     snprintf(rank->driver, sizeof rank->driver, "%s, %s", device->platform_name, device->driver);
 }
 
-// The ranks. The functions are called in this order.
+// The ranks. `begin` is called before the functions of `remote`, and `start` before its last.
 typedef struct Ranks {
-    size_t count; // excludes the first rank, which is this process
-    Rank *items;
-    WorkerShare *shares;
-    FilmHeader film; // describes the image once it is rendered
+    RemoteWorkers remote; // excludes the first rank, which is this process
+    Rank *items;          // one per remote worker
+    FilmHeader film;      // describes the image once it is rendered
     // Asks all ranks for their devices. Returns false with a message if one of them has none; all ranks then
     // stop.
     bool (*begin)(struct Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);
-    SceneReceivers receivers; // send them the compiled scene
     // Starts serving the ranks if they `can_start`, else ends their job.
     void (*start)(bool can_start);
-    // Hands out rows until the image is complete or the render has ended; the `serve` of RemoteWorkers.
-    void (*serve)(void *ranks, Scheduler *scheduler, size_t first_worker);
 } Ranks;

@@ -51,8 +51,8 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
             return false;
         }
     }
-    bool is_done = renderers_open(renderers, computes, count, scene, settings,
-                                  ranks ? &ranks->receivers : NULL, messages, of_each);
+    const RendererSet set = {renderers, computes, of_each, count};
+    bool is_done = renderers_open(&set, scene, settings, ranks ? &ranks->remote : NULL, messages);
     for (size_t i = 0, kept = 0; i < count; i++) {
         Renderer *renderer = renderers[i];
         const bool fits = message_count(&of_each[i], MESSAGE_ERROR) == 0;

@@ -149,10 +149,6 @@ static int image_render(ImageRender *render)
                                                           renderers, devices->count, ranks});
     const unsigned aovs = is_last ? image_output_aovs(&options->output) : 0;
     if (ranks) ranks->film = renderer_film_header(renderers[0], aovs);
-    const RemoteWorkers remote = {.count = ranks ? ranks->count : 0,
-                                  .serve = ranks ? ranks->serve : NULL,
-                                  .shares = ranks ? ranks->shares : NULL,
-                                  .context = ranks};
     const RenderJob job = {.renderers = renderers,
                            .count = devices->count,
                            .aovs = aovs,
@@ -160,7 +156,7 @@ static int image_render(ImageRender *render)
                            .dropped = device_drop,
                            .context = render,
                            .checkpoint = render->checkpoint,
-                           .remote = ranks ? &remote : NULL};
+                           .remote = ranks ? &ranks->remote : NULL};
     stage_begin(times->stage, "rendering", NULL, 0);
     double start = clock_seconds();
     bool whole = render_job_run(&job);

@@ -147,11 +147,11 @@ static void text_print(Renderer *const *renderers, size_t count, const Ranks *ra
         if (count > 1 || ranks) share_print(&report->share, settings);
         device_print(report);
     }
-    for (size_t i = 0; ranks && i < ranks->count; i++) {
+    for (size_t i = 0; ranks && i < ranks->remote.count; i++) {
         const Rank *rank = &ranks->items[i];
         fprintf(stderr, "rank %zu on %s: %s, %u %s\n", i + 1, rank->host, rank->device, rank->lanes[PASS_ALL],
                 rank->lanes[PASS_ALL] == 1 ? "lane" : "lanes");
-        share_print(&ranks->shares[i], settings);
+        share_print(&ranks->remote.shares[i], settings);
     }
     line_print("render", host->render_seconds, "");
     line_print("encode", host->encode_seconds, "");
@@ -189,13 +189,13 @@ static void share_json(Json *json, const WorkerShare *share, const RenderSetting
 static void ranks_json(Json *json, const Ranks *ranks, const RenderSettings *settings)
 {
     json_begin_array(json, "by_rank");
-    for (size_t i = 0; i < ranks->count; i++) {
+    for (size_t i = 0; i < ranks->remote.count; i++) {
         json_begin_object(json, NULL);
         json_text(json, "host", ranks->items[i].host);
         json_text(json, "name", ranks->items[i].device);
         json_text(json, "driver", ranks->items[i].driver);
         json_int64(json, "lanes", ranks->items[i].lanes[PASS_ALL]);
-        share_json(json, &ranks->shares[i], settings);
+        share_json(json, &ranks->remote.shares[i], settings);
         json_end(json);
     }
     json_end(json);

@@ -38,13 +38,13 @@ static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned a
     job.settings.stage = NULL;
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
-    Rank *all = memory_allocate_zeroed(ranks->count + 1, sizeof *all);
+    Rank *all = memory_allocate_zeroed(ranks->remote.count + 1, sizeof *all);
     MPI_Gather(MPI_IN_PLACE, 0, MPI_BYTE, all, sizeof *all, MPI_BYTE, 0, MPI_COMM_WORLD);
-    for (size_t i = 0; i < ranks->count; i++)
+    for (size_t i = 0; i < ranks->remote.count; i++)
         ranks->items[i] = rank_of_message(&all[i + 1]);
     free(all);
     bool all_fit = true;
-    for (size_t i = 0; i < ranks->count; i++) {
+    for (size_t i = 0; i < ranks->remote.count; i++) {
         const Rank *rank = &ranks->items[i];
         if (rank->failure[0] == '\0') continue;
         message_error(messages, "rank %zu on %s: %s", i + 1, rank->host, rank->failure);
@@ -57,7 +57,7 @@ static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned a
 static bool ranks_need(void *context, SceneVariant variant)
 {
     const Ranks *ranks = context;
-    for (size_t i = 0; i < ranks->count; i++)
+    for (size_t i = 0; i < ranks->remote.count; i++)
         if (ranks->items[i].lanes[variant.pass] == variant.lanes) return true;
     return false;
 }
@@ -200,33 +200,35 @@ static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, i
 static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker)
 {
     const Ranks *ranks = context;
-    RankState *states = memory_allocate_zeroed(ranks->count, sizeof *states);
-    for (size_t done_count = 0; done_count < ranks->count;) {
+    RankState *states = memory_allocate_zeroed(ranks->remote.count, sizeof *states);
+    for (size_t done_count = 0; done_count < ranks->remote.count;) {
         MPI_Status status;
         bool is_busy = has_message(MPI_ANY_SOURCE, MPI_ANY_TAG, &status);
         if (is_busy) message_receive(ranks, states, scheduler, first_worker, &status);
         if (progress_interrupted()) scheduler_end(scheduler);
         done_count = 0;
-        for (size_t i = 0; i < ranks->count; i++) {
+        for (size_t i = 0; i < ranks->remote.count; i++) {
             is_busy |= rank_answer(&states[i], scheduler, first_worker + i, (int)i + 1);
             done_count += states[i].is_done && states[i].end_sent;
         }
         if (!is_busy) rest();
     }
-    for (size_t i = 0; i < ranks->count; i++)
+    for (size_t i = 0; i < ranks->remote.count; i++)
         film_free(&states[i].band);
     free(states);
 }
 
 int first_rank_run(size_t other_count, int argument_count, char **arguments)
 {
-    Ranks ranks = {.count = other_count,
+    Ranks ranks = {.remote = {.count = other_count,
+                              .shares = memory_allocate_zeroed(other_count, sizeof *ranks.remote.shares),
+                              .needs_scene = ranks_need,
+                              .send_scene = scene_send,
+                              .serve = ranks_serve,
+                              .context = &ranks},
                    .items = memory_allocate_zeroed(other_count, sizeof *ranks.items),
-                   .shares = memory_allocate_zeroed(other_count, sizeof *ranks.shares),
                    .begin = ranks_begin,
-                   .receivers = {ranks_need, scene_send, &ranks},
-                   .start = ranks_start,
-                   .serve = ranks_serve};
+                   .start = ranks_start};
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
     progress_catch_signals();
@@ -251,7 +253,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
     Job none = {.type = JOB_END};
     broadcast(&none, sizeof none, MPI_COMM_WORLD);
     free(ranks.items);
-    free(ranks.shares);
+    free(ranks.remote.shares);
     if (fflush(stdout) == 0 && !ferror(stdout)) return status;
     fprintf(stderr, "glint: cannot write the standard output: %s\n", strerror(errno));
     return EXIT_MACHINE;

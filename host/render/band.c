@@ -17,31 +17,31 @@ static TileShape item_shape(uint32_t lanes)
 // coherent, since neighboring pixels hit the same objects. A work-item that renders whole tiles is alone in
 // its group, because PoCL places the private variables of a group's items next to each other. 64 sets of
 // them, each with the rays waiting behind glass, would exceed the cache.
-static TileShape group_items(const Renderer *renderer)
+static TileShape group_items(const Pass *pass)
 {
-    const Device *device = renderer->compute->device;
+    const Device *device = pass->compute->device;
     const size_t *fixed = device->work_group;
     if (fixed[0] > 0) return (TileShape){(uint32_t)fixed[0], (uint32_t)fixed[1]};
     const bool on_cpu = device->type & CL_DEVICE_TYPE_CPU;
-    const uint32_t side = renderer->report.lanes > 1 && on_cpu ? 1 : 8;
+    const uint32_t side = pass->lanes > 1 && on_cpu ? 1 : 8;
     return (TileShape){side, side};
 }
 
-TileShape group_shape(const Renderer *renderer)
+TileShape group_shape(const Pass *pass)
 {
-    const TileShape item = item_shape(renderer->report.lanes);
-    const TileShape group = group_items(renderer);
+    const TileShape item = item_shape(pass->lanes);
+    const TileShape group = group_items(pass);
     return (TileShape){item.width * group.width, item.height * group.height};
 }
 
-Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count)
+Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count)
 {
-    return (Film){.width = renderer->settings.region_width,
+    return (Film){.width = pass->settings.region_width,
                   .height = row_count,
-                  .light_count = renderer_light_count(renderer),
+                  .light_count = pass_light_count(pass),
                   .first_row = first_row,
-                  .is_double = renderer->report.is_double,
-                  .real_size = renderer_scalar_size(renderer)};
+                  .is_double = pass->scene.is_double,
+                  .real_size = pass_scalar_size(pass)};
 }
 
 static size_t divide_up(uint32_t count, uint32_t by)
@@ -54,9 +54,9 @@ static size_t words_of_items(const size_t items[2], TileShape item)
     return (items[0] * items[1] * item.width * item.height + 31) / 32;
 }
 
-size_t film_flag_words(const Renderer *renderer, const Film *film)
+size_t film_flag_words(const Pass *pass, const Film *film)
 {
-    const TileShape item = item_shape(renderer->report.lanes);
+    const TileShape item = item_shape(pass->lanes);
     const size_t items[] = {divide_up(film->width, item.width), divide_up(film->height, item.height)};
     return words_of_items(items, item);
 }
@@ -84,39 +84,39 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
     return end;
 }
 
-void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film)
+void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film)
 {
     buffers->rows = film.height;
-    buffers->film = spare_buffer_acquire(renderer, band_film_size(&film, aovs, buffers));
-    buffers->ray_counts = spare_buffer_acquire(renderer, RAYS_COUNT * sizeof(uint32_t));
-    const bool is_list = renderer->pass != PASS_ALL;
-    const size_t words = is_list               ? 4 * film_pixel_count(&film)
-                         : renderer->next_pass ? film_flag_words(renderer, &film)
-                                               : 0;
-    buffers->flags = spare_buffer_acquire(renderer, words * sizeof(uint32_t));
-    buffers->center_flags = spare_buffer_acquire(renderer, is_list ? 0 : words * sizeof(uint32_t));
+    buffers->film = spare_buffer_acquire(&pass->spares, pass->compute, band_film_size(&film, aovs, buffers));
+    buffers->ray_counts = spare_buffer_acquire(&pass->spares, pass->compute, RAYS_COUNT * sizeof(uint32_t));
+    const bool is_list = pass->type != PASS_ALL;
+    const size_t words = is_list           ? 4 * film_pixel_count(&film)
+                         : pass->certifies ? film_flag_words(pass, &film)
+                                           : 0;
+    buffers->flags = spare_buffer_acquire(&pass->spares, pass->compute, words * sizeof(uint32_t));
+    buffers->center_flags =
+        spare_buffer_acquire(&pass->spares, pass->compute, is_list ? 0 : words * sizeof(uint32_t));
 }
 
-void band_buffers_close(BandBuffers *buffers, Renderer *renderer)
+void band_buffers_close(BandBuffers *buffers, Pass *pass)
 {
-    spare_buffer_release(renderer, buffers->film);
-    spare_buffer_release(renderer, buffers->ray_counts);
-    spare_buffer_release(renderer, buffers->flags);
-    spare_buffer_release(renderer, buffers->center_flags);
+    spare_buffer_release(&pass->spares, buffers->film);
+    spare_buffer_release(&pass->spares, buffers->ray_counts);
+    spare_buffer_release(&pass->spares, buffers->flags);
+    spare_buffer_release(&pass->spares, buffers->center_flags);
     *buffers = (BandBuffers){0};
 }
 
-void *band_map(Renderer *renderer, const BandBuffers *buffers, Layer layer, cl_map_flags access)
+void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags access)
 {
-    return renderer_map(renderer, buffers->film, buffers->layer_begins[layer], buffers->layer_sizes[layer],
-                        access);
+    return pass_map(pass, buffers->film, buffers->layer_begins[layer], buffers->layer_sizes[layer], access);
 }
 
-Place band_place(const Renderer *renderer, BandRows rows)
+Place band_place(const Pass *pass, BandRows rows)
 {
-    const RenderSettings *settings = &renderer->settings;
-    const TileShape item = item_shape(renderer->report.lanes);
-    const TileShape group = group_items(renderer);
+    const RenderSettings *settings = &pass->settings;
+    const TileShape item = item_shape(pass->lanes);
+    const TileShape group = group_items(pass);
     return (Place){
         .band = {{settings->region_x, settings->region_y + rows.first_row * settings_cell(settings),
                   settings->region_width, rows.row_count}},
@@ -125,10 +125,10 @@ Place band_place(const Renderer *renderer, BandRows rows)
         .group = {group.width, group.height}};
 }
 
-Place list_place(const Renderer *renderer, uint32_t count)
+Place list_place(const Pass *pass, uint32_t count)
 {
-    const uint32_t of_item = renderer->report.lanes * renderer->report.lanes;
-    const TileShape group = group_items(renderer);
+    const uint32_t of_item = pass->lanes * pass->lanes;
+    const TileShape group = group_items(pass);
     return (Place){.band = {{0, 0, count, 1}},
                    .item = {of_item, 1},
                    .items = {divide_up(count, of_item), 1},
@@ -181,73 +181,67 @@ uint64_t place_pixels(const Place *place)
     return width * least(place->items[1] * place->item.height, place->band.s[3] - top);
 }
 
-Pace *renderer_pace(Renderer *renderer, KernelType type)
+Pace *pass_pace(Pass *pass, KernelType type)
 {
-    const RenderSettings *settings = &renderer->settings;
-    const TileShape group = group_shape(renderer);
-    Pace *pace = &renderer->paces[type];
+    const RenderSettings *settings = &pass->settings;
+    const TileShape group = group_shape(pass);
+    Pace *pace = &pass->kernels.paces[type];
     pace->target_seconds = settings->band_seconds > 0 ? settings->band_seconds : 0.1;
     pace->samples_min =
-        (double)GROUPS_OF_UNIT_MIN * renderer->compute->device->compute_units * group.width * group.height;
+        (double)GROUPS_OF_UNIT_MIN * pass->compute->device->compute_units * group.width * group.height;
     return pace;
 }
 
 // Launches the kernel over the place, part by part, with `samples` per pixel.
-static bool place_launch(Renderer *renderer, KernelType type, const Place *place, uint32_t samples)
+static bool place_launch(Pass *pass, KernelType type, const Place *place, uint32_t samples)
 {
-    Pace *pace = renderer_pace(renderer, type);
-    const RenderSettings *settings = &renderer->settings;
+    Pace *pace = pass_pace(pass, type);
+    const RenderSettings *settings = &pass->settings;
     Place part = {0};
     while (place_next(&part, place, pace_launch_samples(pace) / samples)) {
-        const double seconds = renderer_launch(renderer, type, 2, part.first, part.items, part.group);
+        const double seconds = kernels_launch(&pass->kernels, type, 2, part.first, part.items, part.group);
         pace_record_launch(pace, place_pixels(&part) * samples, seconds);
-        if (!compute_ok(renderer->compute) || (settings->stop && settings->stop(settings->stop_context)))
+        if (!compute_ok(pass->compute) || (settings->stop && settings->stop(settings->stop_context)))
             return false;
     }
     return true;
 }
 
-// Clears the flags of a band, which kernels only set.
-static void flags_clear(Renderer *renderer, cl_mem flags, const Place *place)
+static void buffer_clear(Pass *pass, cl_mem buffer, size_t size)
 {
-    if (!renderer->next_pass || renderer->pass != PASS_ALL) return;
-    const size_t word_count = words_of_items(place->items, place->item);
-    uint32_t *words = memory_allocate_zeroed(word_count, sizeof *words);
-    buffer_write(renderer->compute, flags, word_count * sizeof *words, words);
-    free(words);
-}
-
-// Sets the sums and their compensation to 0, which kernels do at sample 0 only.
-static void sums_clear(Renderer *renderer, const BandBuffers *buffers, const Place *place)
-{
-    const size_t pixels = (size_t)place->band.s[2] * place->band.s[3],
-                 size = 2 * 3 * pixels * renderer_scalar_size(renderer);
     void *zeros = memory_allocate_zeroed(size, 1);
-    buffer_write(renderer->compute, buffers->film, size, zeros);
+    buffer_write(pass->compute, buffer, size, zeros);
     free(zeros);
 }
 
-static void ray_counts_clear(Renderer *renderer, const BandBuffers *buffers)
+// Clears the flags of a band, which kernels only set.
+static void flags_clear(Pass *pass, cl_mem flags, const Place *place)
 {
-    const uint32_t zeros[RAYS_COUNT] = {0};
-    buffer_write(renderer->compute, buffers->ray_counts, sizeof zeros, zeros);
+    if (pass->certifies && pass->type == PASS_ALL)
+        buffer_clear(pass, flags, words_of_items(place->items, place->item) * sizeof(uint32_t));
 }
 
-static void ray_counts_add(Renderer *renderer, const BandBuffers *buffers)
+// Sets the sums and their compensation to 0, which kernels do at sample 0 only.
+static void sums_clear(Pass *pass, const BandBuffers *buffers, const Place *place)
+{
+    const size_t pixels = (size_t)place->band.s[2] * place->band.s[3];
+    buffer_clear(pass, buffers->film, 2 * 3 * pixels * pass_scalar_size(pass));
+}
+
+static void ray_counts_add(Pass *pass, const BandBuffers *buffers)
 {
     uint32_t counts[RAYS_COUNT] = {0};
-    buffer_read(renderer->compute, buffers->ray_counts, sizeof counts, counts);
+    buffer_read(pass->compute, buffers->ray_counts, sizeof counts, counts);
     for (size_t i = 0; i < RAYS_COUNT; i++)
-        renderer->report.rays[i] += counts[i];
+        pass->report->rays[i] += counts[i];
 }
 
-bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
-                 uint32_t last)
+bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uint32_t first, uint32_t last)
 {
-    Compute *compute = renderer->compute;
-    cl_kernel kernel = renderer_kernel(renderer, KERNEL_RENDER);
-    const uint32_t cell = settings_cell(&renderer->settings);
-    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, renderer->sample_offsets);
+    Compute *compute = pass->compute;
+    cl_kernel kernel = kernels_get(&pass->kernels, KERNEL_RENDER);
+    const uint32_t cell = settings_cell(&pass->settings);
+    kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, pass->sample_offsets);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof place->band, &place->band);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 3, sizeof first, &first);
@@ -256,21 +250,20 @@ bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *pl
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 6, sizeof cell, &cell);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 7, buffers->flags);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 8, buffers->band_film);
-    if (first == renderer->settings.first_sample) {
-        flags_clear(renderer, buffers->flags, place);
-        if (first > 0) sums_clear(renderer, buffers, place);
+    if (first == pass->settings.first_sample) {
+        flags_clear(pass, buffers->flags, place);
+        if (first > 0) sums_clear(pass, buffers, place);
     }
-    if (renderer->settings.counting) ray_counts_clear(renderer, buffers);
-    const bool continues = place_launch(renderer, KERNEL_RENDER, place, last - first);
-    if (renderer->settings.counting) ray_counts_add(renderer, buffers);
+    if (pass->settings.counting) buffer_clear(pass, buffers->ray_counts, RAYS_COUNT * sizeof(uint32_t));
+    const bool continues = place_launch(pass, KERNEL_RENDER, place, last - first);
+    if (pass->settings.counting) ray_counts_add(pass, buffers);
     return continues;
 }
 
-bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, unsigned aovs,
-               const Place *place)
+bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs, const Place *place)
 {
-    Compute *compute = renderer->compute;
-    cl_kernel kernel = renderer_kernel(renderer, type);
+    Compute *compute = pass->compute;
+    cl_kernel kernel = kernels_get(&pass->kernels, type);
     LayerOffsets offsets;
 #define OFFSET_SET(NAME, name, ...)                                                                          \
     offsets.name = (unsigned)(buffers->layer_begins[LAYER_##NAME] / ARENA_UNIT);
@@ -278,15 +271,15 @@ bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, 
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT, sizeof place->band, &place->band);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof offsets, &offsets);
-    const bool is_list = renderer->pass != PASS_ALL;
+    const bool is_list = pass->type != PASS_ALL;
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 3,
                   is_list ? buffers->flags : buffers->center_flags);
-    const cl_uint shadow_count = aovs & AOV_SHADOW ? renderer_light_count(renderer) : 0;
+    const cl_uint shadow_count = aovs & AOV_SHADOW ? pass_light_count(pass) : 0;
     if (type == KERNEL_AOV)
         kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 4, sizeof shadow_count, &shadow_count);
     if (type == KERNEL_COVERAGE)
-        kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, renderer->sample_offsets);
-    flags_clear(renderer, buffers->center_flags, place);
-    pace_begin_band(renderer_pace(renderer, type));
-    return place_launch(renderer, type, place, type == KERNEL_COVERAGE ? renderer->settings.sample_count : 1);
+        kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 4, pass->sample_offsets);
+    flags_clear(pass, buffers->center_flags, place);
+    pace_begin_band(pass_pace(pass, type));
+    return place_launch(pass, type, place, type == KERNEL_COVERAGE ? pass->settings.sample_count : 1);
 }

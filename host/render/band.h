@@ -1,7 +1,7 @@
 // Renders the pixels of one launch, a band of rows or a list, into the device's buffers.
 #pragma once
 
-#include "host/render/renderer_state.h"
+#include "host/render/pass.h"
 
 typedef struct {
     uint32_t rows;
@@ -23,18 +23,18 @@ typedef struct {
 size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers);
 
 // Provides the buffers for as many pixels as the film has. band_buffers_close keeps them for later bands.
-void band_buffers_open(BandBuffers *buffers, Renderer *renderer, unsigned aovs, Film film);
-void band_buffers_close(BandBuffers *buffers, Renderer *renderer);
+void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film);
+void band_buffers_close(BandBuffers *buffers, Pass *pass);
 
-// Maps a layer of the film, as renderer_map does: always all of its rows, however many the band has, because
+// Maps a layer of the film, as pass_map does: always all of its rows, however many the band has, because
 // NVIDIA's driver takes 1 to 2 ms to map a range whose size differs from the last one's.
-void *band_map(Renderer *renderer, const BandBuffers *buffers, Layer layer, cl_map_flags access);
+void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags access);
 
 // The size of a work-item's or a work-group's tile in pixels.
 typedef struct {
     uint32_t width, height;
 } TileShape;
-TileShape group_shape(const Renderer *renderer);
+TileShape group_shape(const Pass *pass);
 
 // The pixels that a launch renders.
 typedef struct {
@@ -43,37 +43,32 @@ typedef struct {
     size_t first[2], items[2], group[2];
 } Place;
 
-Place band_place(const Renderer *renderer, BandRows rows);
+Place band_place(const Pass *pass, BandRows rows);
 // Steps through a place in parts that consist of whole work-groups: several rows of groups, or a part of one
 // row. Each part has at most `pixels_max` pixels, or one group if that has more. `part` is all zeros before
 // the first step. Returns false after the last part.
 bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
 uint64_t place_pixels(const Place *place);
 // Returns the number of words of a band's flags.
-size_t film_flag_words(const Renderer *renderer, const Film *film);
+size_t film_flag_words(const Pass *pass, const Film *film);
 // Returns the place of a list's first `count` pixels.
-Place list_place(const Renderer *renderer, uint32_t count);
+Place list_place(const Pass *pass, uint32_t count);
 
 // Returns the description of the film of these rows, with no layers.
-Film film_of_rows(const Renderer *renderer, uint32_t first_row, uint32_t row_count);
+Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count);
 
 static inline bool layer_in(unsigned layers, Layer layer)
 {
     return layers >> layer & 1;
 }
 
-// Returns how many columns and rows of the image one rendered pixel stands for.
-static inline uint32_t settings_cell(const RenderSettings *settings)
-{
-    return settings->cell > 0 ? settings->cell : 1;
-}
+// Returns the pace of a kernel's launches, with the target of the settings.
+Pace *pass_pace(Pass *pass, KernelType type);
 
 // Renders samples first..last-1 of the place in launches whose size the kernel's pace decides. Returns false
 // if the device failed or settings.stop ended the render.
-bool band_render(Renderer *renderer, const BandBuffers *buffers, const Place *place, uint32_t first,
-                 uint32_t last);
+bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uint32_t first, uint32_t last);
 
 // Launches a kernel that fills its AOVs (kernels/aovs.h) in launches whose size the kernel's pace decides.
 // Returns false if the device failed or settings.stop ended the render.
-bool band_fill(Renderer *renderer, KernelType type, const BandBuffers *buffers, unsigned aovs,
-               const Place *place);
+bool band_fill(Pass *pass, KernelType type, const BandBuffers *buffers, unsigned aovs, const Place *place);

@@ -3,7 +3,7 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
-#include "host/render/pace.h"
+#include "host/render/renderer_state.h"
 #include "host/render/rerender.h"
 #include <math.h>
 #include <stdlib.h>
@@ -14,7 +14,8 @@ enum { BAND_BYTES_MAX = 4 << 20 }; // color and shadow, the one layer that grows
 
 FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
 {
-    const Film film = film_of_rows(renderer, 0, renderer->settings.region_height);
+    const Pass *pass = &renderer->passes[PASS_ALL];
+    const Film film = film_of_rows(pass, 0, pass->settings.region_height);
     FilmHeader header = film_header(&film);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if ((aovs | AOV_COLOR) >> layer & 1 && film_layer_size(&film, layer) > 0)
@@ -24,20 +25,20 @@ FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
 
 // Returns the device's lengths converted to the scene's unit: `lengths` itself if the unit is 1, as always at
 // `double`, else a float copy, which the caller frees.
-static void *lengths_restored(const Renderer *renderer, void *lengths, size_t count)
+static void *lengths_restored(const Pass *pass, void *lengths, size_t count)
 {
-    if (renderer->scene.compiled.unit == 1) return lengths;
+    if (pass->scene.compiled.unit == 1) return lengths;
     float *restored = memory_allocate(count, sizeof *restored);
     for (size_t i = 0; i < count; i++)
-        restored[i] = ((const float *)lengths)[i] * (float)renderer->scene.compiled.unit;
+        restored[i] = ((const float *)lengths)[i] * (float)pass->scene.compiled.unit;
     return restored;
 }
 
 // Delivers layers of a band whose color has `samples` samples.
-static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned layers, BandRows rows,
-                         uint32_t samples, const BandQueue *queue)
+static bool band_deliver(Pass *pass, BandBuffers *buffers, unsigned layers, BandRows rows, uint32_t samples,
+                         const BandQueue *queue)
 {
-    Film band = film_of_rows(renderer, rows.first_row, rows.row_count);
+    Film band = film_of_rows(pass, rows.first_row, rows.row_count);
     band.samples = samples;
     band.rerenders = buffers->rerenders;
     buffers->rerenders = (RerenderCounts){0};
@@ -45,51 +46,51 @@ static bool band_deliver(Renderer *renderer, BandBuffers *buffers, unsigned laye
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         size_t size = film_layer_size(&band, layer);
         if (!layer_in(layers, layer) || size == 0) continue;
-        band.layers[layer] = mapped[layer] = band_map(renderer, buffers, layer, CL_MAP_READ);
+        band.layers[layer] = mapped[layer] = band_map(pass, buffers, layer, CL_MAP_READ);
         if (layer_types[layer] == LAYER_TYPE_LENGTH && mapped[layer])
-            band.layers[layer] = lengths_restored(renderer, mapped[layer], size / band.real_size);
+            band.layers[layer] = lengths_restored(pass, mapped[layer], size / band.real_size);
     }
-    bool continues = compute_ok(renderer->compute) && queue->deliver(queue->context, &band);
+    bool continues = compute_ok(pass->compute) && queue->deliver(queue->context, &band);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
-        renderer_unmap(renderer, buffers->film, mapped[layer]);
+        pass_unmap(pass, buffers->film, mapped[layer]);
     }
     return continues;
 }
 
 // Returns the number of rows that keeps the device busy.
-static uint32_t rows_min(const Renderer *renderer, const Pace *pace)
+static uint32_t rows_min(const Pass *pass, const Pace *pace)
 {
-    const TileShape group = group_shape(renderer);
-    const uint32_t of_row = (renderer->settings.region_width + group.width - 1) / group.width;
+    const TileShape group = group_shape(pass);
+    const uint32_t of_row = (pass->settings.region_width + group.width - 1) / group.width;
     const uint32_t wanted = (uint32_t)(pace->samples_min / group.width / group.height);
     return (wanted + of_row - 1) / of_row * group.height;
 }
 
-static uint32_t band_rows(const Renderer *renderer, const Pace *pace, uint32_t sample_count, uint32_t most)
+static uint32_t band_rows(const Pass *pass, const Pace *pace, uint32_t sample_count, uint32_t most)
 {
-    const RenderSettings *settings = &renderer->settings;
+    const RenderSettings *settings = &pass->settings;
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
     uint64_t row_samples = (uint64_t)settings->region_width * sample_count;
     uint64_t rows = pace_band_samples(pace) / row_samples;
-    uint32_t least = rows_min(renderer, pace);
+    uint32_t least = rows_min(pass, pace);
     if (rows < least) rows = least;
-    rows -= rows % group_shape(renderer).height;
+    rows -= rows % group_shape(pass).height;
     return rows < most ? (uint32_t)rows : most;
 }
 
-static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
+static uint32_t rows_max(Pass *pass, unsigned aovs)
 {
-    const RenderSettings *settings = &renderer->settings;
+    const RenderSettings *settings = &pass->settings;
     if (settings->band_rows > 0) return settings->band_rows;
-    const Film row = film_of_rows(renderer, 0, 1);
+    const Film row = film_of_rows(pass, 0, 1);
     size_t row_bytes = film_layer_size(&row, LAYER_COLOR);
     if (aovs & AOV_SHADOW) row_bytes += film_layer_size(&row, LAYER_SHADOW);
     size_t rows = BAND_BYTES_MAX / row_bytes;
-    const size_t step = group_shape(renderer).height;
+    const size_t step = group_shape(pass).height;
     rows = rows < step ? step : rows - rows % step;
     // the film fits one buffer, even where all of its pixels are re-rendered in double precision
-    for (const Renderer *pass = renderer; pass; pass = pass->next_pass) {
+    for (; pass; pass = pass_next(pass)) {
         const uint64_t largest = pass->compute->device->largest_buffer_bytes,
                        fitting = largest / (2 * band_film_size(&row, aovs, NULL));
         if (largest > 0 && rows > fitting)
@@ -99,43 +100,38 @@ static uint32_t rows_max(const Renderer *renderer, unsigned aovs)
     return rows < settings->region_height ? (uint32_t)rows : settings->region_height;
 }
 
-static bool has_ended(const BandQueue *queue)
-{
-    return queue->has_ended && queue->has_ended(queue->context);
-}
-
 // Renders samples first..end-1 of a band. Returns false if the device failed or the render is stopped.
-static bool band_sample(Renderer *renderer, BandBuffers *buffers, BandRows rows, uint32_t first, uint32_t end,
+static bool band_sample(Pass *pass, BandBuffers *buffers, BandRows rows, uint32_t first, uint32_t end,
                         const BandQueue *queue)
 {
-    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
-    const Place place = band_place(renderer, rows);
+    Pace *pace = pass_pace(pass, KERNEL_RENDER);
+    const Place place = band_place(pass, rows);
     bool continues = true;
     pace_begin_band(pace);
-    if (first == renderer->settings.first_sample) band_clear_flags(renderer, buffers, rows);
+    if (first == pass->settings.first_sample) band_clear_flags(pass, buffers, rows);
     while (continues && first < end) {
         const uint32_t samples = pace_begin_pass(pace, place_pixels(&place), end - first);
-        continues = band_render(renderer, buffers, &place, first, first + samples) && !has_ended(queue);
+        continues = band_render(pass, buffers, &place, first, first + samples) &&
+                    !(queue->has_ended && queue->has_ended(queue->context));
         first += samples;
     }
-    if (continues && renderer->next_pass && end == samples_end(&renderer->settings))
-        continues = band_rerender(renderer, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
-    return continues && compute_ok(renderer->compute);
+    if (continues && pass->certifies && end == samples_end(&pass->settings))
+        continues = band_rerender(pass, KERNEL_RENDER, AOV_COLOR, buffers, 0, rows);
+    return continues && compute_ok(pass->compute);
 }
 
 // Traces rays for the AOVs. Returns false if the device failed or the render is stopped.
-static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned aovs, BandRows rows)
+static bool band_fill_aovs(Pass *pass, BandBuffers *buffers, unsigned aovs, BandRows rows)
 {
-    const Place place = band_place(renderer, rows);
+    const Place place = band_place(pass, rows);
     const struct {
         KernelType type;
         unsigned layers;
     } fills[] = {{KERNEL_AOV, AOVS_OF_HIT}, {KERNEL_PATH, AOVS_OF_PATH}, {KERNEL_COVERAGE, AOVS_OF_SAMPLES}};
     for (size_t i = 0; i < COUNT_OF(fills); i++) {
         if (!(aovs & fills[i].layers)) continue;
-        if (!band_fill(renderer, fills[i].type, buffers, aovs, &place)) return false;
-        if (renderer->next_pass &&
-            !band_rerender(renderer, fills[i].type, fills[i].layers, buffers, aovs, rows))
+        if (!band_fill(pass, fills[i].type, buffers, aovs, &place)) return false;
+        if (pass->certifies && !band_rerender(pass, fills[i].type, fills[i].layers, buffers, aovs, rows))
             return false;
     }
     return true;
@@ -143,27 +139,28 @@ static bool band_fill_aovs(Renderer *renderer, BandBuffers *buffers, unsigned ao
 
 bool renderer_work(Renderer *renderer, unsigned aovs, const BandQueue *queue)
 {
-    const RenderSettings *settings = &renderer->settings;
-    const Compute *compute = renderer->compute;
-    const uint32_t step = settings->band_rows > 0 ? settings->band_rows : group_shape(renderer).height;
+    Pass *pass = &renderer->passes[PASS_ALL];
+    const RenderSettings *settings = &pass->settings;
+    const Compute *compute = pass->compute;
+    const uint32_t step = settings->band_rows > 0 ? settings->band_rows : group_shape(pass).height;
     const uint32_t end = samples_end(settings);
     BandBuffers buffers = {0};
-    band_buffers_open(&buffers, renderer, aovs, film_of_rows(renderer, 0, rows_max(renderer, aovs)));
-    renderer_kernel(renderer, KERNEL_RENDER); // builds it before rows wait for it
-    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
+    band_buffers_open(&buffers, pass, aovs, film_of_rows(pass, 0, rows_max(pass, aovs)));
+    kernels_get(&pass->kernels, KERNEL_RENDER); // builds it before rows wait for it
+    Pace *pace = pass_pace(pass, KERNEL_RENDER);
     pace_begin_band(pace); // the last render's band may belong to another scene or size
     bool continues = compute_ok(compute);
     while (continues) {
-        uint32_t wanted = band_rows(renderer, pace, end - settings->first_sample, buffers.rows);
+        uint32_t wanted = band_rows(pass, pace, end - settings->first_sample, buffers.rows);
         BandRows rows = queue->acquire(queue->context, wanted, step);
         if (rows.row_count == 0) break;
         const double start = clock_seconds();
-        continues = band_sample(renderer, &buffers, rows, settings->first_sample, end, queue) &&
-                    band_fill_aovs(renderer, &buffers, aovs, rows) &&
-                    band_deliver(renderer, &buffers, aovs | AOV_COLOR, rows, end, queue);
+        continues = band_sample(pass, &buffers, rows, settings->first_sample, end, queue) &&
+                    band_fill_aovs(pass, &buffers, aovs, rows) &&
+                    band_deliver(pass, &buffers, aovs | AOV_COLOR, rows, end, queue);
         array_push(renderer->report.bands, ((HostSpan){"band", start, clock_seconds()}));
     }
-    band_buffers_close(&buffers, renderer);
+    band_buffers_close(&buffers, pass);
     return continues && compute_ok(compute);
 }
 
@@ -178,59 +175,53 @@ typedef struct {
 } PassBands;
 
 // Renders the first pass, which divides the image into bands, each with separate buffers.
-static bool first_pass(Renderer *renderer, PassBands *bands, unsigned aovs, const BandQueue *queue)
+static bool first_pass(Pass *pass, PassBands *bands, unsigned aovs, const BandQueue *queue)
 {
-    Pace *pace = renderer_pace(renderer, KERNEL_RENDER);
+    Pace *pace = pass_pace(pass, KERNEL_RENDER);
     pace_begin_band(pace);
-    const uint32_t height = renderer->settings.region_height;
-    const uint32_t most = rows_max(renderer, aovs);
-    bool continues = compute_ok(renderer->compute);
+    const uint32_t height = pass->settings.region_height;
+    const uint32_t most = rows_max(pass, aovs);
+    bool continues = compute_ok(pass->compute);
     for (uint32_t row = 0; continues && row < height;) {
         uint32_t left = height - row;
-        PassBand band = {.rows = {row, band_rows(renderer, pace, 1, left < most ? left : most)}};
-        band_buffers_open(&band.buffers, renderer, aovs, film_of_rows(renderer, 0, band.rows.row_count));
+        PassBand band = {.rows = {row, band_rows(pass, pace, 1, left < most ? left : most)}};
+        band_buffers_open(&band.buffers, pass, aovs, film_of_rows(pass, 0, band.rows.row_count));
         array_push(*bands, band);
-        continues = band_sample(renderer, &band.buffers, band.rows, 0, 1, queue) &&
-                    band_deliver(renderer, &band.buffers, AOV_COLOR, band.rows, 1, queue);
+        continues = band_sample(pass, &band.buffers, band.rows, 0, 1, queue) &&
+                    band_deliver(pass, &band.buffers, AOV_COLOR, band.rows, 1, queue);
         row += band.rows.row_count;
-    }
-    return continues;
-}
-
-static bool aov_pass(Renderer *renderer, const PassBands *bands, unsigned aovs, const BandQueue *queue)
-{
-    bool continues = true;
-    for (size_t i = 0; continues && i < bands->count; i++) {
-        PassBand *band = &bands->items[i];
-        continues = band_fill_aovs(renderer, &band->buffers, aovs, band->rows) &&
-                    band_deliver(renderer, &band->buffers, aovs, band->rows, 1, queue);
     }
     return continues;
 }
 
 bool renderer_accumulate(Renderer *renderer, unsigned aovs, BandSink sink, void *context)
 {
-    const uint32_t count = renderer->settings.sample_count;
+    Pass *pass = &renderer->passes[PASS_ALL];
+    const uint32_t count = pass->settings.sample_count;
     const BandQueue queue = {.deliver = sink, .context = context};
     PassBands bands = {0};
     double start = clock_seconds(), seconds_of_sample;
-    bool continues = first_pass(renderer, &bands, aovs, &queue);
+    bool continues = first_pass(pass, &bands, aovs, &queue);
     seconds_of_sample = clock_seconds() - start;
-    if (continues && aovs) continues = aov_pass(renderer, &bands, aovs, &queue);
+    for (size_t i = 0; continues && aovs && i < bands.count; i++) {
+        PassBand *band = &bands.items[i];
+        continues = band_fill_aovs(pass, &band->buffers, aovs, band->rows) &&
+                    band_deliver(pass, &band->buffers, aovs, band->rows, 1, &queue);
+    }
     for (uint32_t first = 1, end; continues && first < count; first = end) {
         end = first + (uint32_t)fmax(1, fmin(PASS_SECONDS / seconds_of_sample, count - first));
         start = clock_seconds();
         for (size_t i = 0; continues && i < bands.count; i++) {
             PassBand *band = &bands.items[i];
-            continues = band_sample(renderer, &band->buffers, band->rows, first, end, &queue) &&
-                        band_deliver(renderer, &band->buffers, AOV_COLOR, band->rows, end, &queue);
+            continues = band_sample(pass, &band->buffers, band->rows, first, end, &queue) &&
+                        band_deliver(pass, &band->buffers, AOV_COLOR, band->rows, end, &queue);
         }
         seconds_of_sample = (clock_seconds() - start) / (end - first);
     }
     for (size_t i = 0; i < bands.count; i++)
-        band_buffers_close(&bands.items[i].buffers, renderer);
+        band_buffers_close(&bands.items[i].buffers, pass);
     free(bands.items);
-    return continues && compute_ok(renderer->compute);
+    return continues && compute_ok(pass->compute);
 }
 
 static bool film_receive_band(void *film, const Film *band)
@@ -241,10 +232,10 @@ static bool film_receive_band(void *film, const Film *band)
 
 bool renderer_render_film(Renderer *renderer, unsigned aovs, Film *film)
 {
-    const RenderSettings *settings = &renderer->settings;
-    *film =
-        film_allocate(settings->region_width, settings->region_height, renderer_light_count(renderer), aovs);
-    film->is_double = renderer->report.is_double;
+    const Pass *pass = &renderer->passes[PASS_ALL];
+    const RenderSettings *settings = &pass->settings;
+    *film = film_allocate(settings->region_width, settings->region_height, pass_light_count(pass), aovs);
+    film->is_double = pass->scene.is_double;
     bool whole = renderer_render(renderer, aovs, film_receive_band, film);
     if (!whole) film_free(film);
     return whole;

@@ -50,8 +50,7 @@ bool device_scene_has_room(const DeviceScene *scene, const CompiledScene *compil
                              largest_text.text, most_text.text);
     return message_error(messages,
                          "the scene needs %s on the device, %s of it in one buffer; the device \"%s\" has "
-                         "%s, and at most %s in "
-                         "one buffer",
+                         "%s, and at most %s in one buffer",
                          sum_text.text, largest_text.text, device->name, text_size((double)memory).text,
                          most_text.text);
 }
@@ -104,18 +103,7 @@ static void staged_upload(DeviceScene *scene)
     scene->upload_seconds += clock_seconds() - start;
 }
 
-// Extends the hash by what the arrays leave out: the primitives in an order that no BVH changes, and the
-// unit, with which lengths are restored.
-static void hash_complete(DeviceScene *scene, const CompiledScene *compiled)
-{
-    if (!scene->hashes) return;
-    scene->hash = hash_bytes(scene->hash, &compiled->primitives_hash, sizeof compiled->primitives_hash);
-    scene->hash = hash_bytes(scene->hash, &compiled->unit, sizeof compiled->unit);
-}
-
-// Uploads the arrays that have changed to each device. Frees each array once all have it, unless the scene
-// moves, so that at most one array is in memory twice.
-static void arrays_upload(DeviceScene *const *scenes, size_t count, CompiledScene *compiled)
+void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScene *compiled)
 {
     for (size_t i = 0; i < count; i++)
         buffers_stage(scenes[i], compiled);
@@ -132,24 +120,16 @@ static void arrays_upload(DeviceScene *const *scenes, size_t count, CompiledScen
     }
     for (size_t i = 0; i < count; i++) {
         staged_upload(scenes[i]);
-        hash_complete(scenes[i], compiled);
-    }
-}
-
-void device_scenes_receive(DeviceScene *const *scenes, size_t count, CompiledScene *compiled)
-{
-    arrays_upload(scenes, count, compiled);
-    if (count == 0) compiled_scene_free(compiled);
-    for (size_t i = 0; i < count; i++) {
+        if (scenes[i]->hashes) { // lengths are restored with the unit
+            const uint64_t hash = hash_bytes(scenes[i]->hash, &compiled->primitives_hash, sizeof(uint64_t));
+            scenes[i]->hash = hash_bytes(hash, &compiled->unit, sizeof compiled->unit);
+        }
+        if (compiled == &scenes[i]->compiled) continue;
         scenes[i]->compiled = *compiled;
         compiled->textures = NULL; // only a scene that moves reads these two
         compiled->instances = NULL;
     }
-}
-
-void device_scene_update(DeviceScene *scene)
-{
-    arrays_upload(&scene, 1, &scene->compiled);
+    if (count == 0) compiled_scene_free(compiled);
 }
 
 void device_scene_release(DeviceScene *scene)

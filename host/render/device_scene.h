@@ -36,11 +36,10 @@ typedef struct {
 // arena's offsets can address, or if its buffers would exceed the memory that the device reports. If the
 // device reports none, creating the buffers may fail.
 bool device_scene_has_room(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages);
-// Uploads the compiled scene to devices that read the same arrays and have room for them. Takes ownership of
-// it. A device scene that moves is alone.
-void device_scenes_receive(DeviceScene *const *scenes, size_t count, CompiledScene *compiled);
-// Uploads the arrays of scene->compiled that have changed.
-void device_scene_update(DeviceScene *scene);
+// Uploads the arrays of the compiled scene that have changed to devices that read the same arrays and have
+// room for them. Frees each array once all have it, unless the scene moves, which is then alone, so that at
+// most one array is in memory twice. Takes ownership of the compiled scene, which may be scenes[0]->compiled.
+void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScene *compiled);
 // Frees the memory that the scene takes on the device and on the host.
 void device_scene_release(DeviceScene *scene);
 

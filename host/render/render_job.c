@@ -1,9 +1,93 @@
-// A job runs a scheduler and one worker per device or machine.
+// Renderers share the compiled scene of their variant. A job runs a scheduler and one worker per device or
+// machine.
+#include "host/render/render_job.h"
+
 #include "host/base/memory.h"
+#include "host/compile/compile.h"
 #include "host/render/renderer_state.h"
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
+
+// Finds the passes of a variant. Closes the renderers on whose devices the scene does not fit.
+static size_t receivers_find(Pass **receivers, const RendererSet *set, SceneVariant variant,
+                             const CompiledScene *compiled)
+{
+    size_t count = 0;
+    for (size_t i = 0; i < set->count; i++) {
+        Renderer **renderer = &set->renderers[i];
+        if (renderer_lanes(*renderer, variant.pass) != variant.lanes) continue;
+        receivers[count] = &(*renderer)->passes[variant.pass];
+        if (device_scene_has_room(&receivers[count]->scene, compiled, &set->messages[i])) {
+            count++;
+        } else {
+            renderer_close(*renderer);
+            *renderer = NULL;
+        }
+    }
+    return count;
+}
+
+static bool variant_is_needed(SceneVariant variant, const RendererSet *set, const RemoteWorkers *remote)
+{
+    bool is_needed = remote && remote->needs_scene(remote->context, variant);
+    for (size_t i = 0; i < set->count; i++)
+        is_needed = is_needed || renderer_lanes(set->renderers[i], variant.pass) == variant.lanes;
+    return is_needed;
+}
+
+// Compiles the scene for each variant that is needed. Returns false with a message if the scene cannot be
+// compiled.
+static bool variants_compile(const RendererSet *set, const Scene *scene, const RenderSettings *settings,
+                             const RemoteWorkers *remote, MessageList *messages)
+{
+    Pass **receivers = memory_allocate(set->count, sizeof *receivers);
+    bool compiles = true;
+    for (PixelPass pass = PASS_ALL; pass < PASS_COUNT && compiles; pass++)
+        for (uint32_t lanes = 1; lanes <= LANES_MAX && compiles; lanes *= 2) {
+            const SceneVariant variant = {pass, lanes};
+            if (!variant_is_needed(variant, set, remote)) continue;
+            const CompileSettings compiling = settings_of_variant(settings, variant);
+            CompiledScene compiled;
+            compiles = scene_compile(&compiled, scene, &compiling, messages);
+            if (!compiles) break;
+            if (remote) remote->send_scene(remote->context, variant, &compiled);
+            passes_receive_scene(receivers, receivers_find(receivers, set, variant, &compiled), &compiled);
+        }
+    free(receivers);
+    return compiles;
+}
+
+bool renderers_open(const RendererSet *set, const Scene *scene, const RenderSettings *settings,
+                    const RemoteWorkers *remote, MessageList *messages)
+{
+    RenderSettings shared = *settings;
+    shared.moves = settings->moves && set->count == 1; // several share the arrays, and none keeps them
+    for (size_t i = 0; i < set->count; i++)
+        set->renderers[i] =
+            renderer_open_empty(set->computes[i], &shared, set->renderers[i], &set->messages[i]);
+    const bool compiles = variants_compile(set, scene, &shared, remote, messages);
+    for (size_t i = 0; i < set->count; i++) {
+        if (compiles && compute_check_reference(set->computes[i])) continue;
+        renderer_close(set->renderers[i]);
+        set->renderers[i] = NULL;
+    }
+    return compiles;
+}
+
+Renderer *renderer_reopen(Renderer *earlier, Compute *compute, const Scene *scene,
+                          const RenderSettings *settings, MessageList *messages)
+{
+    const RendererSet set = {&earlier, &compute, messages, 1};
+    renderers_open(&set, scene, settings, NULL, messages);
+    return earlier;
+}
+
+Renderer *renderer_open(Compute *compute, const Scene *scene, const RenderSettings *settings,
+                        MessageList *messages)
+{
+    return renderer_reopen(NULL, compute, scene, settings, messages);
+}
 
 typedef struct {
     Renderer *renderer;
@@ -40,7 +124,7 @@ static void *worker_run(void *argument)
                              .has_ended = worker_has_ended,
                              .context = worker};
     bool is_done = renderer_work(worker->renderer, worker->aovs, &queue);
-    if (!compute_ok(worker->renderer->compute))
+    if (!compute_ok(worker->renderer->passes[PASS_ALL].compute))
         scheduler_drop(worker->scheduler, worker->number);
     else if (!is_done)
         scheduler_end(worker->scheduler);
@@ -53,7 +137,8 @@ static void thread_start(DeviceWorker *worker)
     int error = pthread_create(&worker->thread, NULL, worker_run, worker);
     worker->has_thread = error == 0;
     if (worker->has_thread) return;
-    compute_fail(worker->renderer->compute, "pthread_create", CL_OUT_OF_HOST_MEMORY, "%s", strerror(error));
+    compute_fail(worker->renderer->passes[PASS_ALL].compute, "pthread_create", CL_OUT_OF_HOST_MEMORY, "%s",
+                 strerror(error));
     scheduler_drop(worker->scheduler, worker->number);
 }
 
@@ -70,7 +155,8 @@ bool render_job_run(const RenderJob *job)
 {
     const RemoteWorkers *remote = job->remote;
     const size_t count = job->count, remote_count = remote ? remote->count : 0;
-    const SchedulerSettings settings = {.row_count = job->renderers[0]->settings.region_height,
+    const SchedulerSettings settings = {.row_count =
+                                            job->renderers[0]->passes[PASS_ALL].settings.region_height,
                                         .worker_count = count + remote_count,
                                         .sink = job->sink,
                                         .dropped = job->dropped,
@@ -94,7 +180,7 @@ bool render_job_run(const RenderJob *job)
     WorkerShare *shares = memory_allocate_zeroed(count + remote_count, sizeof *shares);
     bool whole = scheduler_close(scheduler, shares);
     // the parts of an image add up, whose first sample is 0 only in the first
-    const bool is_part = job->renderers[0]->settings.first_sample > 0;
+    const bool is_part = job->renderers[0]->passes[PASS_ALL].settings.first_sample > 0;
     for (size_t i = 0; i < count; i++)
         share_set(&job->renderers[i]->report.share, &shares[i], is_part);
     for (size_t i = 0; i < remote_count; i++)
@@ -107,5 +193,5 @@ bool renderer_render(Renderer *renderer, unsigned aovs, BandSink sink, void *con
 {
     const RenderJob job = {
         .renderers = &renderer, .count = 1, .aovs = aovs, .sink = sink, .context = context};
-    return render_job_run(&job) && compute_ok(renderer->compute);
+    return render_job_run(&job) && compute_ok(renderer->passes[PASS_ALL].compute);
 }

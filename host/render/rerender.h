@@ -4,10 +4,10 @@
 #include "host/render/band.h"
 
 // Clears the flags of a band's pixels.
-void band_clear_flags(Renderer *renderer, const BandBuffers *buffers, BandRows rows);
+void band_clear_flags(Pass *pass, const BandBuffers *buffers, BandRows rows);
 
 // Re-renders in double precision, with bounds, the pixels that a kernel flagged. Re-renders those that remain
 // uncertified as at `double`. Adds the number of both to the buffers' counts and records them in the layer
 // `flag` if the buffers have it. Returns false if the device failed or settings.stop ended the render.
-bool band_rerender(Renderer *renderer, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
+bool band_rerender(Pass *pass, KernelType type, unsigned layers, BandBuffers *buffers, unsigned aovs,
                    BandRows rows);

@@ -6,20 +6,31 @@
 // at the same time. A worker's first band has one step of rows.
 #pragma once
 
-#include "host/render/band_queue.h"
 #include "host/render/checkpoint.h"
+#include "host/render/film.h"
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
-// Called when a worker was dropped and others continue.
-typedef void (*WorkerDropped)(void *context, size_t worker);
+// Receives a band, whose layers are valid until the sink returns. A sink that returns false ends the render.
+typedef bool (*BandSink)(void *context, const Film *band);
+
+// Hands out rows to one worker and receives their bands. The functions have the contracts of
+// scheduler_acquire, scheduler_deliver and scheduler_has_ended.
+typedef struct {
+    BandRows (*acquire)(void *context, uint32_t rows_max, uint32_t step);
+    BandSink deliver;
+    bool (*has_ended)(void *context); // may be NULL
+    void *context;
+} BandQueue;
 
 typedef struct {
     uint32_t row_count;
     size_t worker_count;
-    BandSink sink;          // called by the workers' threads, for one band at a time in order from the top
-    WorkerDropped dropped;  // called by the workers' threads, never while the sink runs; may be NULL
+    BandSink sink; // called by the workers' threads, for one band at a time in order from the top
+    // Called by a worker's thread when the worker was dropped and others continue, never while the sink runs;
+    // may be NULL.
+    void (*dropped)(void *context, size_t worker);
     void *context;          // passed to both
     Checkpoint *checkpoint; // provides finished bands and receives all others; may be NULL
     // The approximate limit for bands that wait for one above them. 0 means 16 MiB per worker, at least 64

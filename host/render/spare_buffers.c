@@ -1,7 +1,7 @@
 #include "host/render/spare_buffers.h"
 
 #include "host/base/array.h"
-#include "host/render/renderer_state.h"
+#include <stdlib.h>
 
 static size_t buffer_size(cl_mem buffer)
 {
@@ -9,32 +9,34 @@ static size_t buffer_size(cl_mem buffer)
     return clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL) == CL_SUCCESS ? size : 0;
 }
 
-cl_mem spare_buffer_acquire(Renderer *renderer, size_t size)
+cl_mem spare_buffer_acquire(SpareBuffers *spares, Compute *compute, size_t size)
 {
-    SpareBuffers *spares = &renderer->spares;
-    size_t best = spares->count, best_size = SIZE_MAX, largest = 0, largest_size = 0;
-    for (size_t i = 0; i < spares->count && best_size > size; i++) {
+    size_t chosen = 0, chosen_size = 0; // the largest until one fits, then the smallest that fits
+    for (size_t i = 0; i < spares->count; i++) {
         const size_t spare = buffer_size(spares->items[i]);
-        if (spare >= size && spare < best_size) {
-            best = i;
-            best_size = spare;
-        }
-        if (spare > largest_size) {
-            largest = i;
-            largest_size = spare;
-        }
+        if (i > 0 && (chosen_size < size ? spare <= chosen_size : spare < size || spare >= chosen_size))
+            continue;
+        chosen = i;
+        chosen_size = spare;
     }
-    const size_t chosen = best < spares->count ? best : largest;
-    if (chosen < spares->count) {
+    if (spares->count > 0) {
         cl_mem buffer = spares->items[chosen];
         spares->items[chosen] = spares->items[--spares->count];
-        if (chosen == best) return buffer;
+        if (chosen_size >= size) return buffer;
         buffer_release(buffer);
     }
-    return buffer_create(renderer->compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
+    return buffer_create(compute, size, NULL, CL_MEM_READ_WRITE | CL_MEM_ALLOC_HOST_PTR);
 }
 
-void spare_buffer_release(Renderer *renderer, cl_mem buffer)
+void spare_buffer_release(SpareBuffers *spares, cl_mem buffer)
 {
-    if (buffer) array_push(renderer->spares, buffer);
+    if (buffer) array_push(*spares, buffer);
+}
+
+void spare_buffers_free(SpareBuffers *spares)
+{
+    while (spares->count > 0)
+        buffer_release(spares->items[--spares->count]);
+    free(spares->items);
+    *spares = (SpareBuffers){0};
 }

@@ -28,8 +28,7 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     if (!loop->current.follows_scene) seen.camera = loop->current.camera;
     renderer_close(loop->reference);
     loop->reference = NULL;
-    renderers_open(&loop->renderer, &(Compute *){&loop->compute}, 1, &seen, &loop->settings, NULL, messages,
-                   messages);
+    loop->renderer = renderer_reopen(loop->renderer, &loop->compute, &seen, &loop->settings, messages);
     if (loop->renderer) {
         loop->expected_move = move_guess(loop->renderer);
     } else if (compute_ok(&loop->compute)) {

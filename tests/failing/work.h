@@ -1,7 +1,7 @@
 // Uses a device once as glint does: a render with counted rays and all AOVs, a trace, and a large buffer.
 #pragma once
 
-#include "host/render/renderer.h"
+#include "host/render/render_job.h"
 
 enum { SIDE = 8, BAND_ROWS = 4, RAY_COUNT = 3 };
 
