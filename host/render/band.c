@@ -221,13 +221,6 @@ static void flags_clear(Pass *pass, cl_mem flags, const Place *place)
         buffer_clear(pass, flags, words_of_items(place->items, place->item) * sizeof(uint32_t));
 }
 
-// Sets the sums and their compensation to 0, which kernels do at sample 0 only.
-static void sums_clear(Pass *pass, const BandBuffers *buffers, const Place *place)
-{
-    const size_t pixels = (size_t)place->band.s[2] * place->band.s[3];
-    buffer_clear(pass, buffers->film, 2 * 3 * pixels * pass_scalar_size(pass));
-}
-
 static void ray_counts_add(Pass *pass, const BandBuffers *buffers)
 {
     uint32_t counts[RAYS_COUNT] = {0};
@@ -241,6 +234,7 @@ bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uin
     Compute *compute = pass->compute;
     cl_kernel kernel = kernels_get(&pass->kernels, KERNEL_RENDER);
     const uint32_t cell = settings_cell(&pass->settings);
+    const size_t sums_size = (size_t)2 * 3 * place->band.s[2] * place->band.s[3] * pass_scalar_size(pass);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT, pass->sample_offsets);
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 1, buffers->film);
     kernel_argument(compute, kernel, SCENE_ARGUMENT_COUNT + 2, sizeof place->band, &place->band);
@@ -252,7 +246,8 @@ bool band_render(Pass *pass, const BandBuffers *buffers, const Place *place, uin
     kernel_buffer(compute, kernel, SCENE_ARGUMENT_COUNT + 8, buffers->band_film);
     if (first == pass->settings.first_sample) {
         flags_clear(pass, buffers->flags, place);
-        if (first > 0) sums_clear(pass, buffers, place);
+        // kernels set the sums and their compensation to 0 at sample 0 only
+        if (first > 0) buffer_clear(pass, buffers->film, sums_size);
     }
     if (pass->settings.counting) buffer_clear(pass, buffers->ray_counts, RAYS_COUNT * sizeof(uint32_t));
     const bool continues = place_launch(pass, KERNEL_RENDER, place, last - first);

@@ -58,24 +58,18 @@ static bool band_deliver(Pass *pass, BandBuffers *buffers, unsigned layers, Band
     return continues;
 }
 
-// Returns the number of rows that keeps the device busy.
-static uint32_t rows_min(const Pass *pass, const Pace *pace)
-{
-    const TileShape group = group_shape(pass);
-    const uint32_t of_row = (pass->settings.region_width + group.width - 1) / group.width;
-    const uint32_t wanted = (uint32_t)(pace->samples_min / group.width / group.height);
-    return (wanted + of_row - 1) / of_row * group.height;
-}
-
 static uint32_t band_rows(const Pass *pass, const Pace *pace, uint32_t sample_count, uint32_t most)
 {
     const RenderSettings *settings = &pass->settings;
     if (settings->band_rows > 0) return settings->band_rows < most ? settings->band_rows : most;
-    uint64_t row_samples = (uint64_t)settings->region_width * sample_count;
-    uint64_t rows = pace_band_samples(pace) / row_samples;
-    uint32_t least = rows_min(pass, pace);
+    const TileShape group = group_shape(pass);
+    // with fewer rows the device would not be busy
+    const uint32_t row_groups = (settings->region_width + group.width - 1) / group.width,
+                   busy_groups = (uint32_t)(pace->samples_min / group.width / group.height),
+                   least = (busy_groups + row_groups - 1) / row_groups * group.height;
+    uint64_t rows = pace_band_samples(pace) / ((uint64_t)settings->region_width * sample_count);
     if (rows < least) rows = least;
-    rows -= rows % group_shape(pass).height;
+    rows -= rows % group.height;
     return rows < most ? (uint32_t)rows : most;
 }
 

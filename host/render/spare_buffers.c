@@ -3,17 +3,12 @@
 #include "host/base/array.h"
 #include <stdlib.h>
 
-static size_t buffer_size(cl_mem buffer)
-{
-    size_t size = 0;
-    return clGetMemObjectInfo(buffer, CL_MEM_SIZE, sizeof size, &size, NULL) == CL_SUCCESS ? size : 0;
-}
-
 cl_mem spare_buffer_acquire(SpareBuffers *spares, Compute *compute, size_t size)
 {
     size_t chosen = 0, chosen_size = 0; // the largest until one fits, then the smallest that fits
     for (size_t i = 0; i < spares->count; i++) {
-        const size_t spare = buffer_size(spares->items[i]);
+        size_t spare = 0;
+        clGetMemObjectInfo(spares->items[i], CL_MEM_SIZE, sizeof spare, &spare, NULL);
         if (i > 0 && (chosen_size < size ? spare <= chosen_size : spare < size || spare >= chosen_size))
             continue;
         chosen = i;
