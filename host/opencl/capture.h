@@ -7,7 +7,7 @@
 typedef struct {
     cl_kernel kernel;
     const ProgramRequest *request; // of the kernel's program
-    bool is_easy;                  // whether the program was built with the easy prelude
+    bool is_out_of_line;           // whether the program was built with the out-of-line prelude
     cl_uint dimensions;
     const size_t *first, *items, *group; // as for kernel_launch_from
 } Launch;

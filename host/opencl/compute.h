@@ -77,8 +77,8 @@ char *compute_unmap_failure_text(const Compute *compute);
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"
     const char *prelude; // definitions placed before the text (features, LANES, precision)
-    // Definitions that make the text easier to compile, for a second build if the first fails. NULL: none.
-    const char *easy_prelude;
+    // Definitions that keep functions out of line, for a second build if the first fails. NULL: none.
+    const char *out_of_line_prelude;
     const char *kernel;  // a program from which it cannot be created is not built; NULL: none is created
     const char *options; // compiler flags only
     const char *launch;  // kernel and work-group size, such as "render 8x1"; may be NULL; see program_store
@@ -87,9 +87,9 @@ typedef struct {
 
 typedef struct {
     cl_program program;
-    cl_kernel kernel;   // the request's; NULL: none, or the caller owns it
-    uint64_t text_hash; // of the composed text, prelude included
-    bool is_easy;       // built with the easy prelude
+    cl_kernel kernel;    // the request's; NULL: none, or the caller owns it
+    uint64_t text_hash;  // of the composed text, prelude included
+    bool is_out_of_line; // built with the out-of-line prelude
     double build_seconds;
     bool from_cache;
 } Program;

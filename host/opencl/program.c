@@ -258,27 +258,28 @@ bool program_build(Compute *compute, const ProgramRequest *request, Program *pro
     if (!compute_ok(compute)) return false;
     const double start = clock_seconds();
     char *text = program_text(request->root, or_empty(request->prelude)),
-         *easy_text = request->easy_prelude ? program_text(request->root, request->easy_prelude) : NULL;
+         *out_of_line_text =
+             request->out_of_line_prelude ? program_text(request->root, request->out_of_line_prelude) : NULL;
     Build build = build_from_cache(compute, request, text);
     if (!build.program) {
         // the cache has it if the normal text could not be built
-        build = build_from_cache(compute, request, easy_text);
-        program->is_easy = build.program != NULL;
+        build = build_from_cache(compute, request, out_of_line_text);
+        program->is_out_of_line = build.program != NULL;
     }
     program->from_cache = build.program != NULL;
     if (!build.program) build = build_with_retry(compute, text, request);
-    if (build.failed_call && easy_text) {
-        Build easy = build_with_retry(compute, easy_text, request);
-        program->is_easy = !easy.failed_call;
-        build_release(program->is_easy ? &build : &easy);
-        if (program->is_easy) build = easy;
+    if (build.failed_call && out_of_line_text) {
+        Build out_of_line = build_with_retry(compute, out_of_line_text, request);
+        program->is_out_of_line = !out_of_line.failed_call;
+        build_release(program->is_out_of_line ? &build : &out_of_line);
+        if (program->is_out_of_line) build = out_of_line;
     }
-    const char *built_text = program->is_easy ? easy_text : text;
+    const char *built_text = program->is_out_of_line ? out_of_line_text : text;
     program->text_hash = hash_bytes(HASH_START, built_text, strlen(built_text));
     if (build.failed_call) build_report(compute, &build, text, or_empty(request->options));
     program->program = build.program;
     program->kernel = build.kernel;
-    free(easy_text);
+    free(out_of_line_text);
     free(text);
     program->build_seconds = clock_seconds() - start;
     return compute_ok(compute);
@@ -313,7 +314,7 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
         free(bytes);
         return;
     }
-    const char *prelude = program->is_easy ? request->easy_prelude : request->prelude;
+    const char *prelude = program->is_out_of_line ? request->out_of_line_prelude : request->prelude;
     char *text = program_text(request->root, or_empty(prelude)),
          *key = request_key(compute->device, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};

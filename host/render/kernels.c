@@ -26,7 +26,7 @@ static void variant_close(KernelVariant *variant, Compute *compute)
         program_close(&slot->program);
     }
     text_free(&variant->prelude);
-    text_free(&variant->easy_prelude);
+    text_free(&variant->out_of_line_prelude);
     *variant = (KernelVariant){0};
 }
 
@@ -48,7 +48,7 @@ static bool variant_has(const KernelVariant *variant, const Text *prelude)
     return strcmp(text_c(prelude), text_c(&variant->prelude)) == 0;
 }
 
-void kernels_choose(Kernels *kernels, Text prelude, Text easy_prelude, const char *options)
+void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, const char *options)
 {
     KernelVariant *variant = &kernels->variant;
     if (!variant_has(variant, &prelude)) {
@@ -58,10 +58,10 @@ void kernels_choose(Kernels *kernels, Text prelude, Text easy_prelude, const cha
     }
     if (variant_has(variant, &prelude)) {
         text_free(&prelude);
-        text_free(&easy_prelude);
+        text_free(&out_of_line_prelude);
     } else {
         variant_close(variant, kernels->scene->compute);
-        *variant = (KernelVariant){prelude, easy_prelude, options, {{.kernel = NULL}}};
+        *variant = (KernelVariant){prelude, out_of_line_prelude, options, {{.kernel = NULL}}};
         memset(kernels->paces, 0, sizeof kernels->paces);
     }
     for (size_t type = 0; type < KERNEL_COUNT; type++)
@@ -81,7 +81,7 @@ static void slot_build(Kernels *kernels, KernelSlot *slot, KernelType type)
     slot->request = (ProgramRequest){
         .root = kernel_sources[type].file,
         .prelude = text_c(&kernels->variant.prelude),
-        .easy_prelude = kernels->variant.easy_prelude.items,
+        .out_of_line_prelude = kernels->variant.out_of_line_prelude.items,
         .kernel = kernel_sources[type].name,
         .options = kernels->variant.options,
         .no_cache = kernels->settings->no_cache,
@@ -96,7 +96,7 @@ static void slot_build(Kernels *kernels, KernelSlot *slot, KernelType type)
     stage_begin(kernels->settings->stage, "rendering", NULL, 0);
     report->build_seconds += slot->program.build_seconds;
     report->build_from_cache &= slot->program.from_cache;
-    report->is_out_of_line |= slot->program.is_easy;
+    report->is_out_of_line |= slot->program.is_out_of_line;
     slot->kernel = slot->program.kernel;
     slot->program.kernel = NULL;
     device_scene_set_arguments(kernels->scene, slot->kernel);
@@ -119,8 +119,8 @@ double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, con
     KernelSlot *slot = &kernels->variant.slots[type];
     const char *name = kernel_sources[type].name;
     fault_record_kernel(name);
-    capture_launch(compute, &(Launch){slot->kernel, &slot->request, slot->program.is_easy, dimensions, first,
-                                      items, group});
+    capture_launch(compute, &(Launch){slot->kernel, &slot->request, slot->program.is_out_of_line, dimensions,
+                                      first, items, group});
     LaunchTime time = kernel_launch_from(compute, slot->kernel, dimensions, first, items, group);
     fault_record_kernel(NULL);
     const bool is_fixed = compute->device->work_group[0] > 0;

@@ -26,7 +26,7 @@ typedef struct {
 // Kernels whose text follows the same definitions.
 typedef struct {
     Text prelude;
-    Text easy_prelude; // keeps functions out of line; empty if `prelude` does so
+    Text out_of_line_prelude; // keeps functions out of line; empty if `prelude` does so
     const char *options;
     KernelSlot slots[KERNEL_COUNT];
 } KernelVariant;
@@ -44,7 +44,7 @@ typedef struct {
 
 // Chooses the variant with these definitions, and sets the scene's arguments. If one of the last two variants
 // suits, reuses it with its kernels. Takes ownership of the texts.
-void kernels_choose(Kernels *kernels, Text prelude, Text easy_prelude, const char *options);
+void kernels_choose(Kernels *kernels, Text prelude, Text out_of_line_prelude, const char *options);
 // Moves earlier kernels of the device to these, which must have none. The earlier have none afterwards.
 void kernels_adopt(Kernels *kernels, Kernels *earlier);
 void kernels_close(Kernels *kernels);

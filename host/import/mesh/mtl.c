@@ -61,23 +61,25 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
     const double illumination = material->illumination.value, dissolve = material->dissolve.value,
                  transparency = material->transparency.value;
     const bool refracts = illumination == 6 || illumination == 7,
-               is_glass = refracts || illumination == 4 || illumination == 9;
+               is_glass = refracts || illumination == 4 || illumination == 9, has_dissolve = !isnan(dissolve),
+               has_transparency = !isnan(transparency);
     Material *look = &material->material;
     if (illumination >= 3 && illumination <= 8 && look->specular > 0 && !reader->has_reflection) {
         report_warning(&reader->report, material->illumination.offset,
                        "the reflections of illum 3 to 8 are not shown");
         reader->has_reflection = true;
     }
-    if (is_glass && isnan(dissolve) && isnan(transparency))
+    if (is_glass && !has_dissolve && !has_transparency)
         report_warning(&reader->report, material->illumination.offset,
                        "illum %g is for glass, but d and Tr are missing: opaque", illumination);
-    if (fabs(1 - transparency - dissolve) > 1e-3) // false if one is not given
-        report_warning(
-            &reader->report,
-            material->dissolve.offset > material->transparency.offset ? material->dissolve.offset
-                                                                      : material->transparency.offset,
-            "Tr %g does not fit d %g, which it subtracts from 1: d is used", transparency, dissolve);
-    const double opacity = !isnan(dissolve) ? dissolve : !isnan(transparency) ? 1 - transparency : 1;
+    const size_t last_offset = material->dissolve.offset > material->transparency.offset
+                                   ? material->dissolve.offset
+                                   : material->transparency.offset;
+    if (has_dissolve && has_transparency && fabs(1 - transparency - dissolve) > 1e-3)
+        report_warning(&reader->report, last_offset,
+                       "Tr %g does not fit d %g, which it subtracts from 1: d is used", transparency,
+                       dissolve);
+    const double opacity = has_dissolve ? dissolve : has_transparency ? 1 - transparency : 1;
     if (opacity == 1) return;
     const double specular = look->specular, ior = look->ior;
     material_set_opacity(look, opacity);
