@@ -209,14 +209,14 @@ def lanes_frame(lanes):
 NUMBER = r"([\d.,]*\d(?:e[-+]?\d+)?)"
 # Document, a pattern with a group for each number or name, and what these are by the measurements.
 CLAIMS = [  # N stands for a number
-    ("README.md", "a mesh of a million triangles takes N ms, and N ms with Embree's packets. N spheres take N ms, and with Embree N ms, "
-                  "or N ms if it calls glint's sphere test",
+    ("README.md", "glint renders a million triangles in N ms, Embree's packets in N ms. N spheres take N ms, with Embree N ms, or N ms with "
+                  "glint's sphere test",
      lambda: (frame("bunny-1000000"), frame("bunny-1000000", "Embree packets"), 16, frame("spheres-16"), frame("spheres-16", "Embree packets"),
               frame("spheres-16", "Embree packets, our spheres"))),
     ("README.md", "None of N pixels compared in N scenes",
      lambda: (certified_compared("certified")[1], len(measured("certified")["rows"]))),
     ("README.md", "`glint verify` checks N cases", lambda: (verify_counts(),)),
-    ("README.md", "glint passes N of the N that other programs can also run, POV-Ray N of N, Tachyon N of N, Embree N of N",
+    ("README.md", "glint passes N of the N that another program can run, POV-Ray N of N, Tachyon N of N, Embree N of N",
      lambda: (*glint_peer_cases(), *peer_cases("POV-Ray")[:2], *peer_cases("Tachyon")[:2], *peer_cases("Embree")[:2])),
     ("CHANGELOG.md", "a million spheres take N ms at 1920x1080 on two CPU cores, a million triangles N ms",
      lambda: (frame("spheres-1000000"), frame("bunny-1000000"))),
@@ -259,7 +259,7 @@ CLAIMS = [  # N stands for a number
 ]
 # Document, a sentence, and whether the measurements hold it up.
 FACTS = [
-    ("README.md", "has another object, shadow or path than an exact reference",
+    ("README.md", "differs in object, shadow or path from a quadruple-precision reference",
      lambda: certified_compared("certified")[0] == certified_compared("certified")[1]),
     ("docs/measurements/README.md", "Seeds 1 to 20 hold at `single`, except that R7", lambda: perturbed_others() == []),
     ("docs/measurements/README.md", "| C3, C4, C7: cones", lambda: peer_cases("Embree")[2] == ["C3", "C4", "C6", "C7", "M1", "P3", "S6"]),
