@@ -13,6 +13,7 @@ import pathlib
 import re
 import subprocess
 import sys
+import time
 import unittest
 import xml.etree.ElementTree as ElementTree
 
@@ -129,8 +130,11 @@ class Formats(TestCase):
 
     def test_benchmark(self):
         """Repetitions are as google/benchmark writes them. Names, times and their unit are what its tools read."""
+        start = time.monotonic()
         out = self.glint(f"{COMMANDS['bench'][0]} --format benchmark --output report.json").stdout
+        elapsed_us = 1e6 * (time.monotonic() - start)
         report = json.loads(read("report.json"))
+        self.assertLess(sum(entry["real_time"] for entry in report["benchmarks"]), elapsed_us)
         slowest_ms = [float(ms) for ms in re.findall(r"^  \w+ +\d+ +\w+ +[\d.]+ +[\d.]+ +([\d.]+) ", out, re.M)]
         self.assertEqual(report["context"]["executable"], "glint")
         names = {entry["name"] for entry in report["benchmarks"]}

@@ -72,7 +72,8 @@ class Images(unittest.TestCase):
         np.testing.assert_allclose(np.linalg.norm(position - [0, 0, -4], axis=1), layers["t"][hit], atol=1e-5)
 
     def test_equals_the_program(self):
-        path = ROOT / "tests/scenes/mirror-balls.yaml"
+        """The image has the bits of glint render's, in long tests that of the documents' example."""
+        path = ROOT / ("scenes/article.yaml" if IS_LONG else "tests/scenes/mirror-balls.yaml")
         scene = glint.load(path)
         image = scene.render(64, 36, samples=2, bounces=3, precision="strict")
         with tempfile.TemporaryDirectory() as folder:
