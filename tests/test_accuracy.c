@@ -256,7 +256,7 @@ TEST(test_colors_only)
 
 enum { VARIANTS = 5 };
 
-TEST(test_judgement)
+TEST(test_pareto_front_and_picks)
 {
     // time of a frame, RMSE of the shading, leaks
     static const struct {
@@ -345,7 +345,7 @@ int main(void)
         cmocka_unit_test(test_distances_and_normals),
         cmocka_unit_test(test_unsound_pixels),
         cmocka_unit_test(test_colors_only),
-        cmocka_unit_test(test_judgement),
+        cmocka_unit_test(test_pareto_front_and_picks),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

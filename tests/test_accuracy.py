@@ -129,7 +129,7 @@ def plotted(variant, kind):
             "flip": errors["image"]["flip_mean"]}[kind]
 
 
-def expected_judgement(scene):
+def expected_fronts_and_picks(scene):
     """Returns the variants on the Pareto front of each type of error and time, and the fastest within each budget."""
     variants = scene["variants"]
     times = [variant["frame_ms"]["median"] if "frame_ms" in variant else math.inf for variant in variants]
@@ -191,7 +191,7 @@ class Accuracy(TestCase):
             counts = {"silhouette": int(edges["object"].sum()), "path": int(edges["path"].sum()),
                       "shadow": [int(light.sum()) for light in lights]}
             edges["shadow"] = np.stack(lights, axis=2) | edges["object"][:, :, None]
-            self.check(scene["scene"], scene, {"edges": counts} | expected_judgement(scene))
+            self.check(scene["scene"], scene, {"edges": counts} | expected_fronts_and_picks(scene))
             for variant in scene["variants"]:
                 if variant["status"] == "measured":
                     self.check_variant(f"{scene['scene']} at {variant['precision']}", variant, reference,
@@ -208,7 +208,7 @@ class Accuracy(TestCase):
                 error = float(color_error(reference, variant)[place])
                 self.check(where, worst["error"], Approx(error, 1e-12))
 
-    def test_judgement(self):
+    def test_errors_of_each_scene(self):
         bent, spheres, far, *_ = variants = [scene["variants"] for scene in self.report["scenes"]]
         self.assertEqual([variant["status"] for variant in bent], ["measured", "reference"])
         self.assertNotIn("errors", bent[1])
@@ -288,7 +288,7 @@ class Accuracy(TestCase):
         scene = self.json(f"accuracy {self.spheres} {SMALL} --precision single,strict --budget 1e-30,1e30,0.5 --json")["scenes"][0]
         self.assertEqual([pick["budget"] for pick in scene["picks"]], [1e-30, 1e30, 0.5])
         self.assertIsNone(scene["picks"][0]["variant"])
-        self.assertEqual(expected_judgement(scene)["picks"], [{"variant": pick["variant"]} for pick in scene["picks"]])
+        self.assertEqual(expected_fronts_and_picks(scene)["picks"], [{"variant": pick["variant"]} for pick in scene["picks"]])
         for wrong in ["", "0", "-1", "1e-3,", "nan", "1;2", ",".join(["1"] * 17)]:
             self.refuses(f"accuracy {self.spheres} {SMALL} --budget={wrong}", "--budget")
 

@@ -188,9 +188,9 @@ static void rays_behind_fill(TraceRay *rays, const Scene *scene)
         bool looks_behind = random_coin(&random_state); // each of its rays, at what is there
         if (looks_behind) ahead = vector_scale(ahead, -1);
         for (size_t lane = 0; lane < PACKET; lane++) {
-            bool goes_along = packet % 3 == 0 || (packet % 3 == 1 && lane % 4 != 0);
+            bool is_near_ahead = packet % 3 == 0 || (packet % 3 == 1 && lane % 4 != 0);
             Vector3 direction = random_unit_vector(&random_state);
-            if (goes_along) direction = vector_add(ahead, vector_scale(direction, 0.03));
+            if (is_near_ahead) direction = vector_add(ahead, vector_scale(direction, 0.03));
             TraceRay *ray = &rays[packet * PACKET + lane];
             *ray = ray_of(vector_add(origin, random_cube_point(&random_state, 0.1)), direction);
             ray->tmin = nears[random_bits(&random_state) % (looks_behind ? 3 : COUNT_OF(nears))];

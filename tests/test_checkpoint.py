@@ -55,7 +55,7 @@ class Checkpoints(TestCase):
                      env=env or POCL, preexec_fn=limit)
         self.assertFalse(os.path.exists("part.png"))
 
-    def go_on(self, options="", env=None):
+    def resume(self, options="", env=None):
         """Resumes the render, and returns the share of the rows that was rendered."""
         report = self.json(f"{RENDER} {options} -o image.npy --checkpoint saved --timing=json", env=env or POCL)
         self.assertSameBytes("image.npy", "whole.npy")
@@ -66,15 +66,15 @@ class Checkpoints(TestCase):
         return checkpoint_rows("saved") / ROWS
 
     def test_undisturbed(self):
-        self.assertEqual(self.go_on(), 1)
+        self.assertEqual(self.resume(), 1)
 
     def test_full_disk(self):
         self.end_early()
-        self.assertTrue(0 < self.go_on() < 1)
+        self.assertTrue(0 < self.resume() < 1)
 
     def test_two_devices(self):
         self.end_early("--device all", TWO)
-        self.assertTrue(0 < self.go_on("--device all", TWO) < 1)
+        self.assertTrue(0 < self.resume("--device all", TWO) < 1)
 
     def test_counts_of_certified(self):
         """The pixels of saved bands that were re-rendered in double count as in an undisturbed render."""
@@ -102,19 +102,19 @@ class Checkpoints(TestCase):
             self.assertFalse(os.path.exists("image.npy"))
             saved = self.share_saved()
             self.assertTrue(0 < saved < 1)
-            self.assertAlmostEqual(self.go_on(devices, env), 1 - saved)
+            self.assertAlmostEqual(self.resume(devices, env), 1 - saved)
             os.remove("image.npy")
 
     def test_another_device(self):
         """At strict any device may resume."""
         self.end_early("--lanes 1")
-        self.assertTrue(0 < self.go_on("--lanes 16") < 1)
+        self.assertTrue(0 < self.resume("--lanes 16") < 1)
 
     def test_only_missing_bands_are_rendered(self):
         self.end_early()
         saved = self.share_saved()
         self.assertGreater(saved, 0)
-        self.assertAlmostEqual(self.go_on(), 1 - saved)
+        self.assertAlmostEqual(self.resume(), 1 - saved)
 
     def test_other_images(self):
         self.end_early()
@@ -130,7 +130,7 @@ class Checkpoints(TestCase):
         self.refuses(f"{RENDER} -o other.npy --checkpoint sphere.yaml", "'sphere.yaml' is not a checkpoint", env=POCL)
         self.assertEqual(Path("saved").read_bytes(), saved)
         self.assertEqual(Path("sphere.yaml").read_text(encoding="utf-8"), SPHERE)
-        self.assertTrue(0 < self.go_on() < 1)
+        self.assertTrue(0 < self.resume() < 1)
 
     def test_other_devices_at_single(self):
         single = RENDER.replace("strict", "single")
@@ -193,7 +193,7 @@ class Checkpoints(TestCase):
             else:
                 self.assertEqual(status, -9)
         saved = self.share_saved()
-        self.assertAlmostEqual(self.go_on("--device all --samples 3000", TWO), 1 - saved)
+        self.assertAlmostEqual(self.resume("--device all --samples 3000", TWO), 1 - saved)
         print(f"{kills} kills, {renders} images complete between them")
 
 

@@ -38,7 +38,7 @@ typedef struct {
     CompiledScene flat; // a light at the common origin, and a sphere for each line
     double *lines;      // origin and direction of each
     int *missed, *missed_by_bounds;
-    size_t met_count, missed_count, between_count, missed_by_bounds_count;
+    size_t hit_count, missed_count, between_count, missed_by_bounds_count;
 } Trial;
 
 static double trial_rounded(const Trial *trial, double value)
@@ -170,7 +170,7 @@ static void line_judge(Trial *trial, size_t index, bool from_eye)
                 reach = sqrtl(dot(v, v)) + (from_eye ? 0 : sqrtl(dot(d, d)));
     long double u = trial->unit_roundoff, radius = c.w, slack = 64 * u * reach;
     if (distance <= radius + slack) {
-        trial->met_count++;
+        trial->hit_count++;
         if (trial->missed[index])
             fail_msg("sphere %zu of radius %a: culled although a line is %La from its center", index, c.w,
                      distance);
@@ -222,7 +222,7 @@ static void culling_check(void **state)
         compiled_scene_free(&trial.flat);
     }
     // few answers are too near to call
-    assert_true(trial.met_count > SPHERE_COUNT / 4);
+    assert_true(trial.hit_count > SPHERE_COUNT / 4);
     assert_true(trial.missed_count > SPHERE_COUNT / 8);
     assert_true(trial.missed_by_bounds_count > SPHERE_COUNT / 8);
     free(trial.lines);

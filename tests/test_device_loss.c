@@ -12,7 +12,7 @@
 // Two renderers, as on two devices, of which the second renders in a thread. Each waits until the other has
 // taken a band, or the second has failed.
 static struct {
-    sem_t first_goes_on, second_goes_on;
+    sem_t first_continues, second_continues;
     bool first_has_waited, second_has_waited;
     size_t dropped_count, dropped;
 } pair;
@@ -24,8 +24,8 @@ static bool pair_wait(void *context)
     bool *has_waited = is_first ? &pair.first_has_waited : &pair.second_has_waited;
     if (*has_waited) return false;
     *has_waited = true;
-    sem_post(is_first ? &pair.second_goes_on : &pair.first_goes_on);
-    sem_wait(is_first ? &pair.first_goes_on : &pair.second_goes_on);
+    sem_post(is_first ? &pair.second_continues : &pair.first_continues);
+    sem_wait(is_first ? &pair.first_continues : &pair.second_continues);
     return false;
 }
 
@@ -34,8 +34,8 @@ static void pair_dropped(void *context, size_t index)
     (void)context;
     pair.dropped_count++;
     pair.dropped = index;
-    sem_post(&pair.first_goes_on);
-    sem_post(&pair.second_goes_on);
+    sem_post(&pair.first_continues);
+    sem_post(&pair.second_continues);
 }
 
 // Returns whether the image is whole. The computes are left open.
@@ -44,8 +44,8 @@ static bool pair_work(Compute computes[2], Answer *answer)
     call_counts_clear();
     memset(&pair, 0, sizeof pair);
     memset(answer, 0, sizeof *answer);
-    sem_init(&pair.first_goes_on, 0, 0);
-    sem_init(&pair.second_goes_on, 0, 0);
+    sem_init(&pair.first_continues, 0, 0);
+    sem_init(&pair.second_continues, 0, 0);
     Renderer *renderers[2];
     work_settings.stop = pair_wait;
     for (size_t i = 0; i < 2; i++) {
@@ -62,8 +62,8 @@ static bool pair_work(Compute computes[2], Answer *answer)
     work_settings.stop = NULL;
     for (size_t i = 0; i < 2; i++)
         renderer_close(renderers[i]);
-    sem_destroy(&pair.first_goes_on);
-    sem_destroy(&pair.second_goes_on);
+    sem_destroy(&pair.first_continues);
+    sem_destroy(&pair.second_continues);
     return whole;
 }
 

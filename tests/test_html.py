@@ -170,8 +170,8 @@ class Html(TestCase):
             self.assertEqual((found["wide"], found["hiddenBudgets"]), ([], [0]), f"{width} pixels")
             self.assertEqual([drawn["heading"] for drawn in found["scenes"]], [scene["scene"] for scene in report["scenes"]])
             for drawn, scene in zip(found["scenes"], report["scenes"], strict=True):
-                kinds = {kind for variant in scene["variants"] for kind in variant.get("pareto", {})}
-                self.assertEqual({panel["kind"] for panel in drawn["panels"]}, kinds)
+                measures = {kind for variant in scene["variants"] for kind in variant.get("pareto", {})}
+                self.assertEqual({panel["kind"] for panel in drawn["panels"]}, measures)
                 self.assertEqual(drawn["chosenWide"], [], f"{width} pixels")
                 self.check_labels(drawn["labels"], drawn["chosenLabels"])
                 for panel in [*drawn["panels"], *drawn["chosen"]]:

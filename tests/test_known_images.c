@@ -331,7 +331,7 @@ static void inside(Precision precision)
 }
 
 // Returns whether a ray from the eye at (0, 1, 0) hits the surface y = -1e6 + sqrt((1e6 + slope x)^2 - z^2).
-static bool meets_ground(const double *direction, double slope)
+static bool hits_ground(const double *direction, double slope)
 {
     const long double radius = 1e6L, above = 1e6L + 1;
     long double x = direction[0], y = direction[1], z = direction[2];
@@ -362,7 +362,7 @@ static void ground_horizon(Precision precision)
             uint32_t horizon = 0, exact = 0;
             while (horizon < side && film.object[horizon * side + column] == UINT32_MAX)
                 horizon++;
-            while (exact < side && !meets_ground(film.ray + 3 * (exact * side + column), grounds[k].slope))
+            while (exact < side && !hits_ground(film.ray + 3 * (exact * side + column), grounds[k].slope))
                 exact++;
             check(near(horizon, exact, 1));
             for (uint32_t row = horizon; row < side; row++)

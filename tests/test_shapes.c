@@ -8,7 +8,7 @@
 #include "tests/random_ray.h"
 #include <math.h>
 
-enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_BESIDE = 3, SEEDS_BESIDE = 80 };
+enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_NEXT_TO_SIDE = 3, SEEDS_NEXT_TO_SIDE = 80 };
 
 static ShapeForm forms[SHAPE_FORMS_MAX];
 static size_t form_count;
@@ -262,12 +262,12 @@ static void make_steep(RandomShape *cone)
 // There c cancels, and some rays are classified as leaving without a closer test.
 TEST(hits_from_next_to_the_side)
 {
-    const uint64_t seed_count = tests_are_long() ? SEEDS_BESIDE : 1;
+    const uint64_t seed_count = tests_are_long() ? SEEDS_NEXT_TO_SIDE : 1;
     for (uint64_t seed = 0; seed < seed_count; seed++) {
         Random random = {form_count + 2 + 1000 * seed};
         for (const ShapeForm *form = forms; form < forms + form_count; form++) {
             if (form->type != SHAPE_CYLINDER && form->type != SHAPE_CONE) continue;
-            for (int i = 0; i < SHAPES_BESIDE; i++) {
+            for (int i = 0; i < SHAPES_NEXT_TO_SIDE; i++) {
                 RandomShape shape = random_shape(form, &random);
                 if (i == 0 && form->type == SHAPE_CONE) make_steep(&shape);
                 check(&shape, 1, shape.center, shape.radius, true, form->name, &random);

@@ -76,7 +76,7 @@ class Tallies:
     def __init__(self, spoil):
         self.spoil, self.counts, self.worst, self.wrong = spoil, Counter(), {}, 0
 
-    def take(self, kind, error, bound, what):
+    def record(self, kind, error, bound, what):
         self.counts[kind] += 1
         part = float(error / bound) if bound > 0 else (float("inf") if error > 0 else 0.0)
         self.worst[kind] = max(self.worst.get(kind, 0.0), part)
@@ -95,16 +95,16 @@ def check_hit(kind, shapes, ray, given, tallies):
     hits = [(t, i) for i, t in enumerate(shape.hit(ray) for shape in shapes) if t is not None]
     size = max((shape.size for shape in shapes), default=1.0) or 1.0
     if given["margin"] > RESOLVED * size:
-        tallies.take(f"{kind}: hit or miss", int(given["found"] != bool(hits)), 0, given)
+        tallies.record(f"{kind}: hit or miss", int(given["found"] != bool(hits)), 0, given)
     if not hits or not given["found"]:
         return
     t, index = min(hits)
     shape, cosine = shapes[index], given["cosine"][0]
     spread = PART * (fraction(t) + Fraction(shape.size or shape.distance(ray)) / Fraction(max(cosine, 1e-25) * ray.scale))
-    tallies.take(f"{kind}: t", abs(tallies.spoiled(given["t"]) - fraction(t)), spread, given)
+    tallies.record(f"{kind}: t", abs(tallies.spoiled(given["t"]) - fraction(t)), spread, given)
     if len(shapes) > 1 or cosine < 1e-6:
         return  # any of the triangles that share the point may be the first
-    tallies.take(f"{kind}: cosine", abs(tallies.spoiled(given["cosine"]) - Fraction(shape.cosine(ray, t))), Fraction(1, 2**40), given)
+    tallies.record(f"{kind}: cosine", abs(tallies.spoiled(given["cosine"]) - Fraction(shape.cosine(ray, t))), Fraction(1, 2**40), given)
     outward = shape.normal([exact.middle(x) for x in ray.at(t)])
     length = (exact.dot(outward, outward) * exact.arb(1)).sqrt()
     side = -1 if fraction(exact.dot(outward, ray.direction)) > 0 else 1
@@ -113,7 +113,7 @@ def check_hit(kind, shapes, ray, given, tallies):
     bend = Fraction(shape.size / shape.radius) if shape.radius else 1
     # at an edge a box has a normal of each face
     if not isinstance(shape, exact.Box) or sum(x != 0 for x in outward) == 1:
-        tallies.take(f"{kind}: normal", off, PART * (1 + bend / Fraction(cosine)), given)
+        tallies.record(f"{kind}: normal", off, PART * (1 + bend / Fraction(cosine)), given)
 
 
 def check_margin(kind, shape, ray, given, tallies):
@@ -134,7 +134,7 @@ def check_margin(kind, shape, ray, given, tallies):
     # an edge moves by more than its faces
     within = (0.49 if isinstance(shape, (exact.Sphere, exact.Torus)) else 0.2) * min(margin, limit)
     held = all(is_found(by) == given["found"] for by in (within, -within))
-    tallies.take(f"{kind}: margin", int(not held), 0, given)
+    tallies.record(f"{kind}: margin", int(not held), 0, given)
     if margin < limit and not shape.contains(ray.origin):
         tallies.counts["narrow margins"] += 1
         tallies.counts["tight margins"] += any(is_found(by) != given["found"] for by in (2 * margin, -2 * margin))

@@ -109,7 +109,7 @@ class Tally:
         self.error = self.part = 0.0
         self.where = None
 
-    def take(self, error, bound, where):
+    def record(self, error, bound, where):
         self.count += 1
         self.error = max(self.error, error)
         if error > bound:
@@ -149,24 +149,24 @@ def compare_pixel(answer, seen, rounding, tallies, where):
         return
     found = int(seen["object"])
     expected = 4294967295 if hit is None else hit.index
-    tallies["object"].take(float(found != expected), 0.5, where)
+    tallies["object"].record(float(found != expected), 0.5, where)
     if found != expected:
         return
     if hit is not None:
         t = float(seen["t"])
         spread = max(hit.high - as_float(hit.t), as_float(hit.t) - hit.low)
-        tallies["t"].take(abs(t - as_float(hit.t)) / t, spread / t + 2 * rounding.u, where)
-        tallies["normal"].take(distance(seen["normal"], map(as_float, hit.normal)), hit.turn, where)
+        tallies["t"].record(abs(t - as_float(hit.t)) / t, spread / t + 2 * rounding.u, where)
+        tallies["normal"].record(distance(seen["normal"], map(as_float, hit.normal)), hit.turn, where)
         for light, expected in enumerate(answer.shadows):
             if expected is None:
                 tallies["shadow"].open += 1
             else:
-                tallies["shadow"].take(float(bool(seen["shadow"][light]) != expected), 0.5, where)
+                tallies["shadow"].record(float(bool(seen["shadow"][light]) != expected), 0.5, where)
     if answer.color is None:
         tallies["color"].open += 1
     else:
         error = distance(seen["color"], map(as_float, answer.color.color))
-        tallies["color"].take(error, answer.color.error + 2 * rounding.u, where)
+        tallies["color"].record(error, answer.color.error + 2 * rounding.u, where)
 
 
 def main(glint, folder, is_long):

@@ -156,7 +156,7 @@ def silhouette(program, camera, objects):
     return list(zip(directions, seen))
 
 
-def judged(is_hit, depth, band):
+def fault_of_hit(is_hit, depth, band):
     """Returns the fault of an answer, or None. `depth` is how deep the ray enters the object; within `band`, both are right."""
     if abs(depth) <= band or is_hit == (depth > 0):
         return None
@@ -181,7 +181,7 @@ def fringe(program):
         camera = Camera([0, 0, distance], [0, 0, 0], tan(1.1 / distance), (256, 256))
         for d, is_hit in silhouette(program, camera, [("sphere", {"center": [0, 0, 0], "radius": 1.0})]):
             depth = 1 - distance * distance * (d[0] ** 2 + d[1] ** 2) / dot(d, d)
-            yield judged(is_hit, depth, 4 * U * distance)
+            yield fault_of_hit(is_hit, depth, 4 * U * distance)
 
 
 def wire(program):
@@ -190,7 +190,7 @@ def wire(program):
     camera = Camera([0, 0, -10], [0, 0, 0], tan(radians(0.293 / 2)), (1024, 64))
     body = {"from": [-1e4, 0, 0], "to": [1e4, 0, 0], "radius": radius}
     for d, is_hit in silhouette(program, camera, [("cylinder", body)]):
-        yield judged(is_hit, 1 - (10 / radius * d[1]) ** 2 / (d[1] ** 2 + d[2] ** 2), 4 * U * 10 / radius)
+        yield fault_of_hit(is_hit, 1 - (10 / radius * d[1]) ** 2 / (d[1] ** 2 + d[2] ** 2), 4 * U * 10 / radius)
 
 
 def thin_ring(program):

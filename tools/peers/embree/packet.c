@@ -60,7 +60,7 @@ static void camera_rays(const Renderer *renderer, unsigned left, unsigned top, c
 }
 
 // Ends the rays where they hit a plane.
-static void planes_meet(const Description *scene, struct RTCRayHit16 *rays)
+static void planes_intersect(const Description *scene, struct RTCRayHit16 *rays)
 {
     for (size_t k = 0; k < scene->plane_count; k++) {
         const Vector point = scene->planes[k].point, normal = scene->planes[k].normal;
@@ -437,7 +437,7 @@ static void sample_add(const Renderer *renderer, unsigned x, unsigned y, const f
     struct RTCRayHit16 rays;
     alignas(64) int valid[LANES];
     camera_rays(renderer, x, y, offset, &rays, valid);
-    planes_meet(scene, &rays);
+    planes_intersect(scene, &rays);
     rays_intersect(renderer, valid, &rays);
 
     Surfaces surfaces;
