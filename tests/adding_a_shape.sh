@@ -1,6 +1,6 @@
 #!/bin/bash
-# The code that docs/adding-a-shape.md shows is that of the sources. Each of its blocks, spaces aside, is in a file named before
-# it, and every file it names exists.
+# Checks that the code that docs/adding-a-shape.md shows is that of the sources. Each of its blocks, spaces aside, must be in a
+# file named before it, and every file it names must exist.
 . "$(dirname "$0")/support.bash"
 
 command -v python3 >/dev/null || skip_all "there is no python3"

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Writes the scenes of tests/broken/FORMAT.txt as files: tests/broken_scenes.py FORMAT FOLDER. The inputs of fuzzers."""
+"""Writes the scenes of tests/broken/FORMAT.txt as files, which fuzzers begin with: tests/broken_scenes.py FORMAT FOLDER"""
 import re
 import sys
 from pathlib import Path

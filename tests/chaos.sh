@@ -1,6 +1,6 @@
 #!/bin/bash
-# The short run of tools/chaos, in which what glint relies on fails and glint keeps its promises (docs/design.md). With
-# GLINT_LONG_TESTS=1 it runs tools/chaos --long. A sanitized build replaces the allocators and handlers.
+# Runs tools/chaos for a short time. What glint relies on fails, and glint must keep its promises (docs/design.md).
+# GLINT_LONG_TESTS=1 runs tools/chaos --long. A sanitized build replaces the allocators and handlers.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 BUILD=${BUILD:-build}

@@ -1,4 +1,4 @@
-// The includes and macros that each test program of cmocka begins with.
+// Provides the includes and macros that each test program of cmocka begins with.
 #pragma once
 
 #include "host/base/array.h"

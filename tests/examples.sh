@@ -1,6 +1,6 @@
 #!/bin/bash
-# Commands print what the documents show, exactly if nothing is timed, else line for line with other numbers, hashes and device
-# names. GLINT_LONG_TESTS=1 also runs commands that measure.
+# Checks that commands print what the documents show, exactly if nothing is timed, else line for line with other numbers, hashes
+# and device names. GLINT_LONG_TESTS=1 also runs commands that measure.
 . "$(dirname "$0")/support.bash"
 
 # example DOCUMENT COMMAND: prints the lines below "$ COMMAND" in the document, without their indentation.

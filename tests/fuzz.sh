@@ -1,6 +1,6 @@
 #!/bin/bash
-# Runs libFuzzer 20,000 times on each reader, 100,000 on those of meshes, in long tests only. tools/fuzz does more. Always built
-# with clang's sanitizers, and the same whatever is under test.
+# Runs libFuzzer 20,000 times on each reader, 100,000 on those of meshes, in long tests only. tools/fuzz does more. The readers
+# are always built with clang's sanitizers, so they are the same whatever is under test.
 # run_tests: sanitize-long-only
 . "$(dirname "$0")/support.bash"
 is_long || skip_all "only with GLINT_LONG_TESTS=1"

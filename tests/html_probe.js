@@ -1,4 +1,4 @@
-// Appended to an HTML report by test_html.py: uses the page as a reader does, and leaves what it finds as JSON.
+// Uses an HTML report, to which test_html.py appends this, as a reader does, and leaves what it finds as JSON.
 "use strict";
 
 function readPanels(section) {

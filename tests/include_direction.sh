@@ -1,7 +1,7 @@
 #!/bin/sh
-# Includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene, then image;
-# opencl}, base. A room includes itself and the rooms below it. Only compile, render and opencl include the kernels' shared
-# headers, each its set, only opencl and render include OpenCL's, only view those of the window, and only mpi MPI's.
+# Checks that includes run one way: main and mpi, cli, {measure, verify, view}, api, render, compile, {import, then scene, then
+# image; opencl}, base. A room includes itself and the rooms below it. Only compile, render and opencl include the kernels'
+# shared headers, each its set, only opencl and render include OpenCL's, only view those of the window, and only mpi MPI's.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -1,4 +1,4 @@
-"""docs/glint-json.5, made of what the commands print and of the meanings below.
+"""Makes docs/glint-json.5 of what the commands print and of the meanings below.
 
 A meaning belongs to a member's path, or to the end of it; the longest that fits counts. "type; words", where the words may
 be missing. Types: text, hash, boolean, count (an integer, 0 or more), integer, number, object, figure, or several.

@@ -1,6 +1,6 @@
 #!/bin/bash
-# For rays at every shape from 1.0001 to a million radii away, t, hits and misses are within the tiers of the hard cases at
-# every precision (tools/numerics/ladder.c).
+# Checks that t, hits and misses of rays at every shape from 1.0001 to a million radii away are within the tiers of the hard
+# cases at every precision (tools/numerics/ladder.c).
 . "$(dirname "$0")/support.bash"
 is_sanitized && skip_all "the plain build measures the same kernels"
 build=${BUILD:-build}

@@ -1,5 +1,5 @@
 #!/bin/bash
-# tools/lint-words finds each pattern in prose and comments, at its line, and nothing in code.
+# Checks that tools/lint-words finds each pattern in prose and comments, at its line, and nothing in code.
 . "$(dirname "$0")/support.bash"
 
 command -v python3 >/dev/null || skip_all "there is no python3"

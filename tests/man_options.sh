@@ -1,6 +1,6 @@
 #!/bin/bash
-# The options of each command and the keys of the window are the same in its --help and in the manual pages, which
-# tools/man-options writes, and glint-scene(5) is what tools/man-scene writes. Completion offers what --help lists.
+# Checks that the options of each command and the keys of the window are the same in its --help and in the manual pages, which
+# tools/man-options writes, and that glint-scene(5) is what tools/man-scene writes. Completion must offer what --help lists.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 GLINT=${GLINT:-build/glint}

@@ -1,5 +1,6 @@
 #!/bin/bash
-# Memory is that of a band, not of the image. GLINT_LONG_TESTS=1 also renders the whole 32768x32768 (minutes).
+# Checks that a render's memory is that of a band, not of the image. GLINT_LONG_TESTS=1 also renders the whole 32768x32768
+# (minutes).
 . "$(dirname "$0")/support.bash"
 is_sanitized && skip_all 'a sanitized program needs more memory'
 cd "$scratch" || exit 1

@@ -1,4 +1,4 @@
-"""Image metrics by numpy and flip-evaluator (the authors' own FLIP), which share no code with glint."""
+"""Computes image metrics by numpy and flip-evaluator (the authors' own FLIP), which share no code with glint."""
 from glint import need_modules
 
 need_modules("numpy=numpy==2.4.6", "flip_evaluator=flip-evaluator==1.7")

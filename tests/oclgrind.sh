@@ -1,7 +1,7 @@
 #!/bin/bash
-# Images and traces of every shape under Oclgrind have no access outside a buffer, no data race, no value used before it is
-# set, and no wrong OpenCL call. Whatever it reports is a failure. Since it interprets kernels, more pixels, and each shape,
-# light and type of material alone, need GLINT_LONG_TESTS=1.
+# Runs images and traces of every shape under Oclgrind. They must have no access outside a buffer, no data race, no value used
+# before it is set, and no wrong OpenCL call. Whatever Oclgrind reports is a failure. Since it interprets kernels, more pixels,
+# and each shape, light and type of material alone, need GLINT_LONG_TESTS=1.
 . "$(dirname "$0")/support.bash"
 command -v oclgrind >/dev/null || skip_all 'Oclgrind is not here'
 is_sanitized && skip_all 'a sanitized program does not run under Oclgrind'

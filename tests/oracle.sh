@@ -1,7 +1,7 @@
 #!/bin/bash
 # Checks the reference that glint verify and the tests compare with, in quadruple precision, against exact arithmetic, for the
 # rays of the hard cases and random ones at every shape, ten times as many with GLINT_LONG_TESTS=1. Needs python-flint, from
-# PyPI. Only for the first build, since the plain build computes the same.
+# PyPI. It runs for the first build only, since the plain build computes the same.
 . "$(dirname "$0")/support.bash"
 build=${BUILD:-build}
 

@@ -1,6 +1,7 @@
 #!/bin/bash
 # Tests tools/package. Two clones of one commit in different folders, with other permissions for new files, give the same
-# packages and source package, in which lintian finds no error. Only in long tests, and the same whatever is under test.
+# packages and source package, in which lintian finds no error. It runs in long tests only, and is the same whatever is under
+# test.
 # run_tests: sanitize-long-only
 . "$(dirname "$0")/support.bash"
 is_long || skip_all "only with GLINT_LONG_TESTS=1"

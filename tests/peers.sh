@@ -1,6 +1,6 @@
 #!/bin/bash
-# tools/peers/bench at a small size reports an image that is of other work. The renderer on Embree draws what glint draws, and
-# so do Tachyon and POV-Ray for an NFF file, where they are installed. Needs libembree-dev and PyYAML.
+# Checks that tools/peers/bench at a small size reports an image of other work. The renderer on Embree must draw what glint
+# draws, and so must Tachyon and POV-Ray for an NFF file, where they are installed. Needs libembree-dev and PyYAML.
 . "$(dirname "$0")/support.bash"
 
 is_long || skip_all "only with GLINT_LONG_TESTS=1"

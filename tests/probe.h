@@ -1,4 +1,5 @@
-// The renderer as tests use it, with one device for the whole program, chosen as glint chooses its default.
+// Provides the renderer as tests use it, with one device for the whole program, chosen as glint chooses its
+// default.
 #pragma once
 
 #include "host/base/fault.h"

@@ -1,6 +1,6 @@
 #!/bin/bash
-# The measured parts of the documents are what tools/report makes of docs/measurements. If a report is missing, tools/report
-# reports it and leaves its part as it is.
+# Checks that the measured parts of the documents are what tools/report makes of docs/measurements. If a report is missing,
+# tools/report must report it and leave its part as it is.
 . "$(dirname "$0")/support.bash"
 
 command -v python3 >/dev/null || skip_all "there is no python3"

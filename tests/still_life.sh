@@ -1,6 +1,6 @@
 #!/bin/bash
-# In tools/peers/still-life at a small size errors fall with the samples, glint's image is POV-Ray's, and an image of another
-# scene is reported. Needs POV-Ray, PyYAML and NumPy.
+# Runs tools/peers/still-life at a small size. Errors must fall with the samples, glint's image must be POV-Ray's, and an image
+# of another scene must be reported. Needs POV-Ray, PyYAML and NumPy.
 # run_tests: sanitize-long-only
 . "$(dirname "$0")/support.bash"
 

@@ -1,6 +1,6 @@
-# What the shell tests share, to be sourced first. GLINT is the program under test, BUILD the folder it was built in.
-# Kernel caches, glint's own and the drivers', are those of XDG_CACHE_HOME, shared by the tests of a run; $scratch is
-# removed in the end.
+# Provides what the shell tests share, which source it first. GLINT is the program under test, BUILD the folder it was built in.
+# Kernel caches, glint's own and the drivers', are those of XDG_CACHE_HOME, shared by the tests of a run; $scratch is removed in
+# the end.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 1
 GLINT=$(realpath "${GLINT:-build/glint}") || exit 1

@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint accuracy on tiny images: its figures against those computed here by docs/accuracy.md's definitions from the saved
-arrays, a reference from a file, and what is refused. Nothing is asked of the times themselves.
+"""Compares the figures of glint accuracy on tiny images with those computed here from the saved arrays, by docs/accuracy.md's
+definitions. Also tests a reference from a file, and what is refused. Times themselves are not checked.
 
 run_tests: sanitize-long-only"""
 import json

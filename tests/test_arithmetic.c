@@ -1,6 +1,6 @@
-// The host's arithmetic gives the same bits on every processor, since doubles are rounded after each
-// operation and functions whose values reach the flat arrays are rounded correctly. A Quad has the bits it
-// claims.
+// Checks that the host's arithmetic gives the same bits on every processor, since doubles are rounded after
+// each operation and functions whose values reach the flat arrays are rounded correctly. Also checks that a
+// Quad has the bits it claims.
 #include "host/compile/random_shape.h"
 #include "host/image/srgb.h"
 #include "host/scene/portable.h"

@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint bench on two tiny images: the figures of its JSON, its counts, the comparison with an earlier report. The times
-themselves are not checked.
+"""Tests glint bench on two tiny images: the figures of its JSON, its counts, and the comparison with an earlier report. The
+times themselves are not checked.
 
 run_tests: sanitize-long-only"""
 import json

@@ -1,4 +1,4 @@
-// Reflection, refraction, total reflection and light through glass: small images against the reference.
+// Compares small images with the reference: reflection, refraction, total reflection and light through glass.
 // run_tests: sanitize-long-only
 #include "host/verify/reference_color.h"
 #include "tests/check.h"

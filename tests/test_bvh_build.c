@@ -1,4 +1,4 @@
-// The BVH's invariants, for any boxes.
+// Checks the BVH's invariants for any boxes.
 // run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"

@@ -1,4 +1,4 @@
-// The camera's movements, its YAML, and the pace of coarse frames: without a window or a device.
+// Tests the camera's movements, its YAML, and the pace of coarse frames, without a window or a device.
 #include "host/import/load.h"
 #include "host/scene/portable.h"
 #include "host/view/camera_file.h"

@@ -1,5 +1,6 @@
-// Whole scenes as glint certify judges them: double and certified decide as the reference does, and the
-// reference raises no false alarms. tests/test_certify.py has the command. run_tests: sanitize-long-only
+// Checks whole scenes as glint certify does. Double and certified must decide as the reference does, and the
+// reference must raise no false alarms. tests/test_certify.py has the command.
+// run_tests: sanitize-long-only
 #include "host/verify/certify.h"
 #include "tests/check.h"
 #include "tests/film.h"

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""glint certify: errors are noticed, and uncertified pixels counted. tests/test_certify.c has what needs no command.
+"""Checks that glint certify notices errors and counts uncertified pixels. tests/test_certify.c has what needs no command.
 
 run_tests: sanitize-long-only"""
 import unittest

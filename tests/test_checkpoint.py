@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""A render that ends early can be resumed, and its image equals that of an undisturbed one: after kill -9, a full disk, an
-interrupt and a device's failure, on one device and on two. GLINT_LONG_TESTS=1: 200 kills."""
+"""Checks that a render that ends early can be resumed, and that its image equals that of an undisturbed one. Renders end by
+kill -9, a full disk, an interrupt and a device's failure, on one device and on two. GLINT_LONG_TESTS=1 kills 200 times."""
 import json
 import os
 import random

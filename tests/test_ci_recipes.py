@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""The recipes of docs/ci: their commands pass, fail where an image differs, and write what the recipes collect.
+"""Runs the recipes of docs/ci. Their commands must pass, fail where an image differs, and write what the recipes collect.
 
 They run with this build and small cases. With GLINT_LONG_TESTS=1, as root and with debootstrap and a network, they also run as
 they stand, but for the report's cases, in a chroot that the Containerfile's instructions set up.

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""The command line as a user sees it: every option, every message about a wrong one, the exit status, what is printed
+"""Tests the command line as a user sees it: every option, every message about a wrong one, the exit status, what is printed
 where, and that a failure leaves an earlier image unchanged."""
 import contextlib
 import glob

@@ -1,6 +1,6 @@
-// Cull spheres of rays from the eye or to a light (test_invariances compares whole scenes with and without
-// them). No sphere within the error bound of a line is culled, and every sphere clearly outside it is. The
-// cull of several packets is tried with one ray, where it bounds a single direction.
+// Tests the cull spheres of rays from the eye or to a light. No sphere within the error bound of a line may
+// be culled, and every sphere clearly outside it must be. The cull of several packets is tried with one ray,
+// where it bounds a single direction. test_invariances compares whole scenes with and without cull spheres.
 // run_tests: sanitize-long-only
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"

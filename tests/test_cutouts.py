@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Cutouts: rays pass where the alpha of an image is low, for camera rays, shadows, mirrors and explicit rays, as if the holes
-were cut into the shape; and what formats of meshes make of alpha.
+"""Checks that camera rays, shadow rays, mirrored rays and explicit rays pass where the alpha of an image is low, as if the holes
+were cut into the shape. Also tests what formats of meshes make of alpha.
 
 run_tests: sanitize-long-only"""
 import math

@@ -1,4 +1,4 @@
-// The sun's place, its color, the sky's image, and the scene that has them.
+// Tests the sun's place, its color, the sky's image, and the scene that has them.
 #include "host/base/hash.h"
 #include "host/scene/daylight.h"
 #include "host/scene/portable.h"

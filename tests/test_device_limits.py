@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Limits of devices, which tests/shims/limits.c reports and enforces: glint works within each, with the same bits, or
-refuses the device with the reason.
+"""Checks that glint works within each limit of devices, with the same bits, or refuses the device with the reason.
+tests/shims/limits.c reports and enforces the limits.
 
 run_tests: first"""
 import json

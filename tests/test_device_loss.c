@@ -1,5 +1,5 @@
-// Two devices render one image, and one or both fail, at each call of the first band in turn. The image is
-// whole if one device is left, and the failure is reported.
+// Renders one image on two devices, of which one or both fail, at each call of the first band in turn. The
+// image must be whole if one device is left, and the failure must be reported.
 // run_tests: sanitized
 #include "tests/check.h"
 #include "tests/failing/calls.h"

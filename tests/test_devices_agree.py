@@ -1,8 +1,8 @@
 #!/usr/bin/env -S python3 -B
-"""At `strict` every OpenCL implementation gives the same bits: images and traces of a scene with every shape, every light,
-highlights and checkers, at 4 lanes as PoCL at 1; with GLINT_LONG_TESTS=1 at both everywhere, and of more pixels and rays.
-Implementations that are not installed are skipped. INTEL_OPENCL_RT names a folder that holds Intel's CPU runtime
-(libintelocl.so, for one from the package intel-opencl-rt of PyPI).
+"""Checks that every OpenCL implementation gives the same bits at `strict`, for images and traces of a scene with every shape,
+every light, highlights and checkers. Each is compared at 4 lanes with PoCL at 1, and with GLINT_LONG_TESTS=1 at both
+everywhere, for more pixels and rays. Implementations that are not installed are skipped. INTEL_OPENCL_RT names a folder that
+holds Intel's CPU runtime (libintelocl.so, for one from the package intel-opencl-rt of PyPI).
 
 rusticl on llvmpipe (Mesa 22.3) has no fused multiply-add, and its compiler inlines that of the kernels everywhere. It
 renders one type of shape at a time under all lights, 5 to 15 seconds each. Here these are discs (test_several_devices.py has

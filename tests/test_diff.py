@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""glint diff: exit status, what it refuses, its report as text and JSON, its heat map.
+"""Tests glint diff: its exit status, what it refuses, its report as text and JSON, and its heat map.
 
 run_tests: sanitized"""
 import struct

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""The numbers of glint diff against numpy and flip-evaluator (the authors' own FLIP), which share no code with glint."""
+"""Compares the numbers of glint diff with numpy and flip-evaluator (the authors' own FLIP), which share no code with glint."""
 import math
 from pathlib import Path
 

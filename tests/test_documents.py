@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Sentences of the documents that repeat a measured number agree with docs/measurements, at the digits that they give.
+"""Checks that sentences of the documents that repeat a measured number agree with docs/measurements, at the digits that they
+give.
 
 The tables between <!-- measured --> are tested by tests/report.sh.
 """

@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""--work-group and --build-options: the same image, what reports name, the kernel cache, and what is refused.
+"""Tests --work-group and --build-options: the same image, what reports name, the kernel cache, and what is refused.
 
 run_tests: sanitize-long-only"""
 import os

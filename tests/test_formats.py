@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Reports in the formats of other programs: each is read by the reader of its format and agrees with --json.
-Sanitizers see the same writers in test_json.
+"""Reads reports in the formats of other programs by the reader of each format. They must agree with --json. Sanitizers see the
+same writers in test_json.
 
 run_tests: sanitize-long-only"""
 import csv

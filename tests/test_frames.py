@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Frames of an animation: each is the image of the scene with that frame's values."""
+"""Checks that each frame of an animation is the image of the scene with that frame's values."""
 import json
 import math
 import os

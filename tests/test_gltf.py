@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glTF files, as meshes and as scenes: every layout of numbers, nodes, materials, what is refused, and what is named."""
+"""Reads glTF files, as meshes and as scenes. Tests every layout of numbers, nodes, materials, what is refused, and what is
+named."""
 import base64
 import json
 import math

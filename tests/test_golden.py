@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint golden: the golden images of tests/golden keep their bits, and lines find what changes, where, and in which layer first.
+"""Checks that the golden images of tests/golden keep their bits, and that the lines of glint golden find what changes, where,
+and in which layer first.
 
 run_tests: sanitize-long-only"""
 import pathlib

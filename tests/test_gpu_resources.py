@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Kernels compiled for GPUs without one (tools/gpu-resources) need no more private memory than the scene's pending children
-and bounces, and spill nothing."""
+"""Checks that kernels compiled for GPUs without one (tools/gpu-resources) need no more private memory than the scene's pending
+children and bounces, and spill nothing."""
 import json
 import subprocess
 

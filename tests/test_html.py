@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""The HTML report of glint accuracy: the JSON in it, and what chromium draws from that, as html_probe.js reads it back.
+"""Tests the HTML report of glint accuracy: the JSON in it, and what chromium draws from that, as html_probe.js reads it back.
 
 run_tests: sanitize-long-only"""
 import html

@@ -1,4 +1,4 @@
-// Exposure, the tone curve and dither of PNG and PPM.
+// Tests exposure, the tone curve and the dither of PNG and PPM.
 #include "host/base/text.h"
 #include "host/image/display.h"
 #include "tests/check.h"

@@ -1,4 +1,4 @@
-// EXR files as other programs write them: halves, every lossless compression, tiles, more channels than
+// Reads EXR files as other programs write them: halves, every lossless compression, tiles, more channels than
 // three.
 #include "host/base/text.h"
 #include "host/image/image.h"

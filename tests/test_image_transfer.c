@@ -1,4 +1,4 @@
-// The display values against the formulas of IEC 61966-2-1:1999, worked out in long double.
+// Compares the display values with the formulas of IEC 61966-2-1:1999, computed in long double.
 #include "host/image/image.h"
 #include "host/image/transfer.h"
 #include "tests/check.h"

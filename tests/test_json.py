@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""docs/glint-json.5 and docs/glint.schema.json are what tests/json_reference.py makes of each command's JSON, whose members are of
-the types that it states.
+"""Checks that docs/glint-json.5 and docs/glint.schema.json are what tests/json_reference.py makes of each command's JSON, whose
+members must be of the types that it states.
 
 --write writes both.
 

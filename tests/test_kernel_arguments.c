@@ -1,5 +1,6 @@
-// Every kernel's arguments fit small devices: at most 8 buffers, which is V3D's limit, and 256 bytes in
-// total, which is the least CL_DEVICE_MAX_PARAMETER_SIZE that OpenCL's embedded profile permits.
+// Checks that every kernel's arguments fit small devices. They may have at most 8 buffers, which is V3D's
+// limit, and 256 bytes in total, which is the least CL_DEVICE_MAX_PARAMETER_SIZE that OpenCL's embedded
+// profile permits.
 #include "host/compile/compiled_scene.h"
 #include "tests/check.h"
 #include "tests/probe.h"

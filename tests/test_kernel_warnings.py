@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""The kernels compile without a warning for every single feature and without each one: PoCL prints warnings to its user."""
+"""Checks that the kernels compile without a warning for every single feature and without each one, since PoCL prints warnings
+to its user."""
 import re
 import subprocess
 import sys

@@ -1,5 +1,5 @@
-// Images whose every value is known in closed form. Case numbers such as R1 and P2 are those of the hard
-// cases.
+// Renders images whose every value is known in closed form. Case numbers such as R1 and P2 are those of the
+// hard cases.
 // run_tests: sanitize-long-only
 #include "host/base/text.h"
 #include "host/compile/camera_basis.h"

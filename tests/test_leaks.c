@@ -1,5 +1,5 @@
-// In a sanitized build LeakSanitizer finds what glint forgets to release, OpenCL objects included, which the
-// driver allocates. It does not blame glint for what the driver keeps.
+// Checks that LeakSanitizer, in a sanitized build, finds what glint forgets to release, including OpenCL
+// objects, which the driver allocates. It must not blame glint for what the driver keeps.
 #include "host/base/memory.h"
 #include "host/opencl/compute.h"
 #include "tests/check.h"

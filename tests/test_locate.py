@@ -1,6 +1,7 @@
 #!/usr/bin/env -S python3 -B
-"""python3 -m glint.locate finds the operation that a compiler gets wrong, where and for which operands. Suspect and reference are one
-device, but the suspect's compiler reads the text after a mutation, which knows nothing of how operations are recorded.
+"""Checks that python3 -m glint.locate finds the operation that a compiler gets wrong, where and for which operands. Suspect and
+reference are one device, but the suspect's compiler reads the text after a mutation, which knows nothing of how operations are
+recorded.
 
 run_tests: sanitize-long-only"""
 import functools

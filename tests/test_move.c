@@ -1,4 +1,5 @@
-// A scene that was compiled for one eye and moved to another has the numbers of one compiled for the other.
+// Checks that a scene that was compiled for one eye and moved to another has the numbers of one compiled for
+// the other.
 // run_tests: sanitized
 #include "host/base/array.h"
 #include "host/base/parallel.h"

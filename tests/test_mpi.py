@@ -1,6 +1,7 @@
 #!/usr/bin/env -S python3 -B
-"""glint-mpi: the image of several ranks has the bytes of one process's; errors of any rank end the job with a message; a killed
-rank ends it, and its checkpoint can be resumed. A rank whose device fails, or that sends nonsense, is left out.
+"""Tests glint-mpi. The image of several ranks must have the bytes of one process's. Errors of any rank must end the job with a
+message. A killed rank must end it, and its checkpoint can be resumed. A rank whose device fails, or that sends nonsense, is
+left out.
 
 run_tests: sanitize-long-only
 run_tests: first"""

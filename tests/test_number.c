@@ -1,4 +1,5 @@
-// Numbers of scenes are the nearest doubles, those of the C library, however they are written.
+// Checks that numbers of scenes are read as the nearest doubles, those of the C library, however they are
+// written.
 #include "host/compile/random_shape.h"
 #include "host/import/number.h"
 #include "tests/check.h"

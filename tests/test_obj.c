@@ -1,4 +1,5 @@
-// OBJ and MTL files: the layouts that are read, materials and their images, and each message with its place.
+// Reads OBJ and MTL files. Tests the layouts that are read, materials and their images, and each message with
+// its place.
 #include "host/import/load.h"
 #include "tests/check.h"
 #include "tests/files.h"

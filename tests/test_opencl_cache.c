@@ -1,4 +1,4 @@
-// The kernel cache on disk; no device is needed.
+// Tests the kernel cache on disk, for which no device is needed.
 #include "host/base/array.h"
 #include "host/opencl/cache.h"
 #include "host/opencl/compose.h"

@@ -1,4 +1,4 @@
-// Tests the composed kernel text, its hash, the judgement of event times, and work-groups cut to fit, all
+// Tests the composed kernel text, its hash, whether event times are trusted, and work-groups cut to fit, all
 // without a device.
 #include "host/opencl/compose.h"
 #include "tests/check.h"

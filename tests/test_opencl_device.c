@@ -1,4 +1,4 @@
-// Choice among fabricated devices, and the list of the real ones.
+// Tests the choice among fabricated devices, and the list of the real ones.
 #include "host/opencl/device.h"
 #include "tests/check.h"
 #include "tests/child.h"

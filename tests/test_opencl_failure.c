@@ -1,5 +1,5 @@
-// Calls of each OpenCL function fail once in a render and a trace, in a long test every call. glint reports
-// that call and releases everything. The next render on the same device is right.
+// Makes calls of each OpenCL function fail once in a render and a trace, in a long test every call. glint
+// must report that call and release everything, and the next render on the same device must be right.
 // run_tests: first
 // run_tests: sanitized
 #include "host/base/memory.h"

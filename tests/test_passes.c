@@ -1,5 +1,6 @@
-// An image rendered in passes, and by a renderer whose camera was moved, has the bits of one rendered at
-// once; a preview's differs by roundings. run_tests: sanitize-long-only
+// Checks that an image rendered in passes, or by a renderer whose camera was moved, has the bits of one
+// rendered at once. A preview's may differ by roundings.
+// run_tests: sanitize-long-only
 #include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"

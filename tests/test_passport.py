@@ -1,6 +1,7 @@
 #!/usr/bin/env -S python3 -B
-"""The passport of a device's arithmetic: each property is violated once, by a shim that edits the text of kernels or the times
-of events; `glint devices --probe` names it, and the precisions that rely on it are refused. It is measured once per driver."""
+"""Tests the passport of a device's arithmetic. A shim that edits the text of kernels or the times of events violates each
+property once. `glint devices --probe` must name the property, and the precisions that rely on it must be refused. The passport
+is measured once per driver."""
 import hashlib
 import os
 import re

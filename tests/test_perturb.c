@@ -1,5 +1,6 @@
-// Differences between devices: at `strict` quotients and roots with the error that the specification permits
-// are repaired to the correctly rounded ones, and the fma of devices without one in hardware has fma's bits.
+// Tests differences between devices. At `strict`, quotients and roots with the error that the specification
+// permits must be repaired to the correctly rounded ones. The fma of devices without one in hardware must
+// have fma's bits.
 // run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"

@@ -1,4 +1,5 @@
-// The sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it chooses.
+// Tests the sample of pixels that a pilot renders, its upper bound of a mean, and the precision that it
+// chooses.
 #include "host/compile/compile.h"
 #include "host/compile/random_shape.h"
 #include "host/measure/pilot.h"

@@ -1,4 +1,4 @@
-// The lines of objects in a scene's file, by every reader, and their description.
+// Tests the lines of objects in a scene's file, by every reader, and their description.
 #include "host/scene/describe.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"

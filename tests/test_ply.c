@@ -1,5 +1,5 @@
-// PLY files: the layouts that are read, as one square, and the errors for files shorter than they
-// hold.
+// Reads PLY files. Tests the layouts that are read, each with one square, and the errors for files that end
+// before all declared data.
 #include "host/scene/vector.h"
 #include "tests/check.h"
 #include "tests/files.h"

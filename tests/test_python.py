@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""The Python package over libglint: scenes, images and their metrics, rays with bounds, the drop-in for trimesh, errors and threads.
+"""Tests the Python package over libglint: scenes, images and their metrics, rays with bounds, the drop-in for trimesh, errors
+and threads.
 
 run_tests: sanitize-long-only"""
 import copy

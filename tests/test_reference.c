@@ -1,4 +1,4 @@
-// The reference itself, against roots known by hand or from certified interval arithmetic.
+// Compares the reference itself with roots known by hand or from certified interval arithmetic.
 #include "host/compile/camera_basis.h"
 #include "host/verify/certify.h"
 #include "host/verify/reference_color.h"

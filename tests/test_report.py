@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint report: what its archive holds, what it leaves out, and that it is written if a driver crashes, never returns or rejects
-kernels.
+"""Tests glint report: what its archive holds, what it leaves out, and that it is written if a driver crashes, never returns or
+rejects kernels.
 
 run_tests: sanitize-long-only"""
 import json

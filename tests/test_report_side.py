@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint report with reports of glint bench: which rows are the same, what is said of their times, and the page. No device is used."""
+"""Tests glint report with reports of glint bench: which rows are the same, what is stated about their times, and the page. No
+device is used."""
 import copy
 import html
 import json

@@ -1,4 +1,4 @@
-// Bounds against points on each shape, known in closed form.
+// Compares bounds with points on each shape, which are known in closed form.
 #include "host/compile/scene_bounds.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"

@@ -1,5 +1,5 @@
-// Every scene of the tables in tests/broken, whose README has their format, gets exactly the messages next to
-// it, and every message has such a scene.
+// Checks that every scene of the tables in tests/broken, whose README describes their format, gets exactly
+// the messages next to it, and that every message has such a scene.
 #include "host/base/array.h"
 #include "host/import/load.h"
 #include "tests/check.h"

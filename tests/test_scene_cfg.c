@@ -1,4 +1,4 @@
-// `.cfg`: every block's values, and the tolerances.
+// Reads `.cfg` scenes. Tests every block's values, and the tolerances.
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 

@@ -1,5 +1,5 @@
-// Tachyon's `.dat`: every statement's values in glint's coordinates, what glint does not show, and a picture
-// that Tachyon's own pixels check.
+// Reads Tachyon's `.dat` scenes. Tests every statement's values in glint's coordinates, what glint does not
+// show, and an image against Tachyon's own pixels.
 #include "host/import/load.h"
 #include "tests/check.h"
 #include "tests/film.h"

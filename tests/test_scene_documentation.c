@@ -1,5 +1,5 @@
-// The examples in docs/scene-format.md are scenes that are read without a message, and its tables name every
-// shape.
+// Checks that the examples in docs/scene-format.md are scenes that are read without a message, and that its
+// tables name every shape.
 #include "tests/check.h"
 #include "tests/scene_reading.h"
 

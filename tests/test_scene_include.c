@@ -1,4 +1,5 @@
-// `include` of YAML scenes: what the files give, in which order, and the places of what is wrong in them.
+// Tests `include` of YAML scenes: what the files give, in which order, and the places of what is wrong in
+// them.
 #include "host/import/load.h"
 #include "host/scene/describe.h"
 #include "tests/check.h"

@@ -1,4 +1,4 @@
-// `.nff`: every element's values, and what files in the wild hold and is tolerated.
+// Reads `.nff` scenes. Tests every element's values, and what is tolerated in files in the wild.
 #include "tests/check.h"
 #include "tests/probe.h"
 #include "tests/scene_reading.h"

@@ -1,4 +1,4 @@
-// Polygons cut into triangles: every point of the polygon lies in exactly one, whatever its form.
+// Cuts polygons into triangles. Every point of the polygon must lie in exactly one, whatever its form.
 #include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/compile/random_shape.h"

@@ -1,4 +1,4 @@
-// `.rt`: every element's values, and what files in the wild hold and is tolerated.
+// Reads `.rt` scenes. Tests every element's values, and what is tolerated in files in the wild.
 #include "host/compile/scene_bounds.h"
 #include "tests/check.h"
 #include "tests/scene_reading.h"

@@ -1,4 +1,5 @@
-// The native format: every key's value, every default, warnings, and the scene that is read.
+// Reads scenes in the native format. Tests every key's value, every default, warnings, and the scene that is
+// read.
 #include "host/import/load.h"
 #include "tests/check.h"
 #include "tests/files.h"

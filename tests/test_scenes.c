@@ -1,5 +1,5 @@
-// Every scene in scenes/ is read without a warning and renders to an image that is not blank. Where tests are
-// long each has the kernel that glint builds for it.
+// Checks that every scene in scenes/ is read without a warning and renders to an image that is not blank.
+// Where tests are long, each scene has the kernel that glint builds for it.
 #include "tests/check.h"
 #include "tests/film.h"
 #include "tests/probe.h"

@@ -1,7 +1,7 @@
 #!/usr/bin/env -S python3 -B
-"""One image by several devices: the same bytes as by one, at `strict` even by different OpenCL implementations together:
-PoCL with rusticl, Oclgrind and Intel's CPU runtime, those that are installed. INTEL_OPENCL_RT names a folder that holds the
-last one's libintelocl.so (the packages intel-opencl-rt and intel-cmplr-lib-rt of PyPI).
+"""Checks that an image by several devices has the same bytes as by one, at `strict` even by different OpenCL implementations
+together. These are PoCL with rusticl, Oclgrind and Intel's CPU runtime, those that are installed. INTEL_OPENCL_RT names a
+folder that holds the last one's libintelocl.so (the packages intel-opencl-rt and intel-cmplr-lib-rt of PyPI).
 
 run_tests: sanitize-long-only"""
 import os

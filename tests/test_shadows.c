@@ -1,4 +1,4 @@
-// Shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
+// Tests shadows that faster traversals, or surfaces much larger than the objects on them, once got wrong.
 // run_tests: sanitize-long-only
 #include "host/base/array.h"
 #include "host/base/memory.h"

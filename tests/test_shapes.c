@@ -1,4 +1,4 @@
-// Every shape at every precision against the reference: hit or miss, distance and normal.
+// Compares every shape at every precision with the reference: hit or miss, distance and normal.
 // run_tests: sanitize-long-only
 #include "host/compile/compile.h"
 #include "host/verify/reference.h"

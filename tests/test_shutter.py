@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Motion blur: a frame's samples show the scene at times between it and the next, while the shutter is open."""
+"""Tests motion blur. A frame's samples must show the scene at times between it and the next, while the shutter is open."""
 import math
 import os
 

@@ -1,4 +1,5 @@
-// The sky as a light: its cells have the light of its colors, and what hides them casts a shadow.
+// Tests the sky as a light. Its cells must have the light of its colors, and what hides them must cast a
+// shadow.
 #include "host/base/array.h"
 #include "host/scene/sky.h"
 #include "tests/check.h"

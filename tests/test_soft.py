@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Soft shadows, the lens, parallel rays and the sky against what geometry says, and how the error falls with the samples."""
+"""Compares soft shadows, the lens, parallel rays and the sky with geometry, and tests how the error falls with the samples."""
 import itertools
 import math
 import struct

@@ -1,6 +1,6 @@
-// The rays of the Standard Procedural Databases, counted and compared with the published numbers (Haines,
-// Standard Procedural Databases 3.14, README, Database analysis): all classical ray tracers should be within
-// 10%. Skipped where the scenes are not there.
+// Counts the rays of the Standard Procedural Databases and compares them with the published numbers (Haines,
+// Standard Procedural Databases 3.14, README, Database analysis), which all classical ray tracers should
+// match within 10%. The test is skipped where the scenes are not there.
 // run_tests: sanitize-long-only
 #include "host/compile/flat_types.h"
 #include "tests/check.h"

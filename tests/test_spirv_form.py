@@ -1,5 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""The kernels' SPIR-V has the form that drivers for Vulkan need, and tools/spirv-form names the place of each fault."""
+"""Checks that the kernels' SPIR-V has the form that drivers for Vulkan need, and that tools/spirv-form names the place of each
+fault."""
 import subprocess
 
 import glint

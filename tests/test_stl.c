@@ -1,4 +1,4 @@
-// STL files in text and binary: their facets, and messages about wrong ones.
+// Reads STL files in text and binary. Tests their facets, and messages about wrong ones.
 #include "tests/check.h"
 #include "tests/files.h"
 #include "tests/scene_reading.h"

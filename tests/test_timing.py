@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Event times are used where they can be true. Where a runtime reports zeros or counts (rusticl, Mesa 22.3) the host's clock
-is used instead, and the report says so. The trace has all commands and stages on one axis."""
+"""Checks that event times are used where they can be true. Where a runtime reports zeros or counts (rusticl, Mesa 22.3), the
+host's clock must be used instead, and the report must state so. The trace must have all commands and stages on one axis."""
 import http.server
 import json
 import os

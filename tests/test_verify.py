@@ -1,7 +1,7 @@
 #!/usr/bin/env -S python3 -B
-"""glint verify: the hard cases pass, even on a device whose divisions, roots and powers are as wrong as the OpenCL C
-specification permits. Here with --quick at single, and a few at the other precisions. GLINT_LONG_TESTS=1 runs all in full at
-every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few.
+"""Checks that the hard cases of glint verify pass, even on a device whose divisions, roots and powers are as wrong as the
+OpenCL C specification permits. They run with --quick at single, and a few at the other precisions. GLINT_LONG_TESTS=1 runs all
+in full at every precision, perturbed by 20 seeds. A sanitized build, many times as slow, runs the host's side of a few.
 
 run_tests: first
 run_tests: sanitize-long-only"""

@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""glint view, in a display of Xvfb with xdotool's mouse and keys: what the display shows and what is saved are the bits
-that glint render writes with the camera that is printed.
+"""Tests glint view in a display of Xvfb with xdotool's mouse and keys. What the display shows and what is saved must be the
+bits that glint render writes with the camera that is printed.
 
 Nothing here depends on time: a test waits until glint has printed or shown what it must.
 """

@@ -1,6 +1,6 @@
 #!/usr/bin/env -S python3 -B
-"""Scenes in the manner of those that people keep, tests/wild/*.rt and *.cfg: each renders or is refused as the file
-SCENE.expected says. Its first line is one of
+"""Renders scenes in the manner of those that people keep, tests/wild/*.rt and *.cfg. Each must render or be refused as the file
+SCENE.expected states. Its first line is one of
     refused          exit status 1, and no image
     renders          an image of more than one color
     renders blank    an image of one color

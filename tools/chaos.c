@@ -1,4 +1,4 @@
-// A library that tools/chaos preloads into glint. Makes one or more calls of a process fail; counts calls.
+// Makes one or more calls of a process fail, and counts calls. tools/chaos preloads this library into glint.
 //
 // GLINT_CHAOS selects what fails. Calls are counted from 0:
 //   cl N      OpenCL call N of glint

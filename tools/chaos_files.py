@@ -1,4 +1,4 @@
-"""Small files that tools/chaos renders, damages and enlarges."""
+"""Provides the small files that tools/chaos renders, damages and enlarges."""
 import struct
 import zlib
 

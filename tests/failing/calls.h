@@ -1,4 +1,4 @@
-// Calls that fail on demand. The linker puts the functions __wrap_… of calls.c in the place of those that
+// Makes calls fail on demand. The linker puts the functions __wrap_… of calls.c in the place of those that
 // glint calls (ld --wrap, see the Makefile). An OpenCL call without one does not link.
 #pragma once
 

@@ -1,6 +1,6 @@
-// libFuzzer's target. Whatever a reader gets, it must not crash, leak, or rely on data that is not there.
-// GLINT_FUZZ names the reader. tools/fuzz runs all of them, and tests/test_readers.c those without assimp.
-// The memory that a file claims is bounded by what it has.
+// Passes libFuzzer's inputs to the readers. Whatever a reader gets, it must not crash, leak, or rely on data
+// that is not there. GLINT_FUZZ names the reader. tools/fuzz runs all of them, and tests/test_readers.c those
+// without assimp. The memory that a file claims is bounded by what it has.
 #include "tests/fuzz/readers.h"
 #include "host/base/array.h"
 #include "host/base/fault.h"

@@ -1,4 +1,4 @@
-// libFuzzer's entrances to the readers of tests/fuzz/readers.c.
+// Declares libFuzzer's entry points of tests/fuzz/readers.c.
 #pragma once
 
 #include <stddef.h>

@@ -1,5 +1,5 @@
-"""Closest hits in exact rationals, certified roots and 300-bit balls. Nothing here cancels, so that every formula is that of
-the textbook.
+"""Computes closest hits in exact rationals, certified roots and 300-bit balls. Nothing here cancels, so that every formula is
+that of the textbook.
 
 A solid is a set of points with an exact membership test and, for a line, the t where it may begin or end. These are
 sorted, the membership of a rational point between each two says whether that interval is inside, and the crossings are

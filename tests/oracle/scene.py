@@ -1,4 +1,4 @@
-"""Scenes for the oracle, from the YAML of docs/scene-format.md without meshes and images on surfaces.
+"""Reads scenes for the oracle from the YAML of docs/scene-format.md, without meshes and images on surfaces.
 
 As docs/verify.md states, the eye is subtracted in double, then each number is rounded once to the precision. The rest is
 exact."""

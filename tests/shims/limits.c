@@ -1,5 +1,5 @@
-// Preloaded into glint by tests/test_device_limits.py: OpenCL devices report the limits that GLINT_LIMITS
-// lists, NAME or NAME=VALUE with commas between, and enforce them. Where GLINT_LIMITED is set, only devices
+// Makes OpenCL devices report the limits that GLINT_LIMITS lists, NAME or NAME=VALUE with commas between, and
+// enforce them. tests/test_device_limits.py preloads it into glint. Where GLINT_LIMITED is set, only devices
 // with that in their names report limits, and then only those of arithmetic are enforced.
 //
 //   embedded       the embedded profile

@@ -1,6 +1,6 @@
-// Preloaded by tests: RAPL has a counter of a package of the processors, which grows by a joule from one read
-// to the next and wraps after one and a half, and others of its cores and of the platform, which grow by
-// more.
+// Simulates RAPL for the tests that preload it. A package of the processors has a counter that grows by a
+// joule from one read to the next and wraps after one and a half. Its cores and the platform have others,
+// which grow by more.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <glob.h>

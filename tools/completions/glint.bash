@@ -1,4 +1,4 @@
-# Completion of glint for bash. The commands and options are those that --help lists.
+# Completes command lines of glint in bash. The commands and options are those that --help lists.
 
 _glint_commands() { glint --help | sed -n 's/^  \([a-z][a-z]*\)  .*/\1/p'; }
 

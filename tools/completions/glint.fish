@@ -1,4 +1,4 @@
-# Completion of glint for fish. The commands and options, with what they do, are those that --help lists.
+# Completes command lines of glint in fish. The commands and options, with what they do, are those that --help lists.
 
 function __glint_options
     glint (commandline -opc)[2] --help | string replace -rf '^ +(?:-\w, )?(--[a-z-]+)\S*(?: \S+)?(?:  +(.*))?$' '$1\t$2'

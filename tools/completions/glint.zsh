@@ -1,5 +1,5 @@
 #compdef glint
-# Completion of glint for zsh. The commands and options, with what they do, are those that --help lists.
+# Completes command lines of glint in zsh. The commands and options, with what they do, are those that --help lists.
 
 _glint() {
     local -a found

@@ -1,5 +1,6 @@
-// Textbook intersections of rays with shapes, to compare with glint's. They are never shipped. make
-// TEXTBOOK=1 includes them in kernels/traversal/primitives.h, which then calls textbook_SHAPE_hit.
+// Intersects rays with shapes by textbook formulas, to compare with glint's. The formulas are never
+// shipped. make TEXTBOOK=1 includes them in kernels/traversal/primitives.h, which then calls
+// textbook_SHAPE_hit.
 
 // The roots of a t^2 + 2 b t + c = 0 by the quadratic formula.
 typedef struct {

@@ -1,4 +1,4 @@
-"""The hard cases that are images, for tools/peers/hard-cases. Each case renders with a program and checks the pixels."""
+"""Runs the hard cases that are images, for tools/peers/hard-cases. Each case renders with a program and checks the pixels."""
 import json
 import pathlib
 import struct

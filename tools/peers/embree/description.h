@@ -1,5 +1,5 @@
-// A scene as tools/peers/embree.py writes it: lists of numbers, each preceded by its name and its number of
-// items.
+// Reads a scene as tools/peers/embree.py writes it: lists of numbers, each preceded by its name and its
+// number of items.
 #pragma once
 
 #include <stdbool.h>

@@ -1,5 +1,5 @@
-// Spheres in Embree, in one of two ways: its own geometry for them, which tests several spheres against one
-// ray, or a user geometry whose callbacks test one sphere against the 16 rays of a packet.
+// Makes spheres in Embree, in one of two ways. Its own geometry for them tests several spheres against one
+// ray. A user geometry has callbacks that test one sphere against the 16 rays of a packet.
 #pragma once
 
 #include "description.h"
