@@ -9,7 +9,7 @@ import tempfile
 from collections import namedtuple
 from pathlib import Path
 
-from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, run, skip_all, terminal_run, write
+from glint import BALLS, IS_LONG, PLANET, ROOT, TestCase, main, need_device, plain, png_read, read, run, skip_all, terminal_run, write
 from metrics import flip, np, percentile_99_9, psnr, srgb8_distance, srgb_encode
 
 MISS = 0xFFFFFFFF
@@ -332,7 +332,8 @@ class Accuracy(TestCase):
 
     def test_perturbation(self):
         """Variants err, and the reference keeps its bits."""
-        report = self.json(f"accuracy {BALLS} {SMALL} --precision double --perturb 1:1000 --save perturbed --json")
+        self.glint(f"accuracy {BALLS} {SMALL} --precision double --perturb 1:1000 --save perturbed --output perturbed/report.json")
+        report = json.loads(read("perturbed/report.json"))
         (scene,) = report["scenes"]
         (double,) = scene["variants"]
         self.assertEqual(report["perturb"], {"seed": 1, "scale": 1000})

@@ -117,6 +117,14 @@ class Bench(TestCase):
         self.assertEqual((row["build_ms"], row["traverses_bvh"]), ({"cold": untimed, "cached": untimed}, True))
         self.assertEqual(process.stdout.count("builds were not timed"), 1)
 
+    def test_report_in_new_folder(self):
+        """The folder of kernels exists before the report in it is opened. A wrong command line creates neither."""
+        command = f"bench sphere.yaml {TINY} --seconds 0.1 --keep-kernels kept --output kept/report"
+        self.refuses(f"{command}.txt", "the file's ending gives no format")
+        self.assertFalse(os.path.exists("kept"))
+        self.glint(f"{command}.json")
+        self.assertEqual(len(json.loads(read("kept/report.json"))["runs"]), 1)
+
     def decided(self, command, status=0):
         """Runs the command with as much time as it takes until the samples are enough for an interval."""
         for seconds in (0.5, 2, 8):

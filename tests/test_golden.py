@@ -135,7 +135,8 @@ class Golden(TestCase):
         self.refuses("golden check --file missing.txt", "missing.txt")
         self.refuses("golden", "expected write or check")
         self.refuses("golden write", "no scene given")
-        self.refuses("golden write s.yaml --format csv", "--format is for check")
+        for option in "--format csv", "--output report.csv":
+            self.refuses(f"golden write s.yaml {option}", "--format, --json and --output are for check")
         self.refuses("golden write missing.yaml --file new.txt", "missing.yaml")
 
 

@@ -89,7 +89,8 @@ typedef struct {
 enum { OPTIONS_READ = -1 };
 
 // Reads options and operands into the struct, checks the whole command line, and only then carries out the
-// effects of options. Returns OPTIONS_READ, or the exit status after printing the help or a message.
+// effects of options, in the order of the groups. Returns OPTIONS_READ, or the exit status after printing the
+// help or a message.
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments);
 
 // Readers. The types are those of their fields.

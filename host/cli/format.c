@@ -20,17 +20,26 @@ static bool json_choose(const Option *option, const char *value, void *options)
     return true;
 }
 
+// The file of the report, of which a command writes one.
+static OutputFile report_file;
+
+// Opens the file before anything is measured, so that a failure shows early.
+static bool report_file_open(const Option *option, void *options)
+{
+    MessageList messages = {0};
+    const bool is_open = output_open(&report_file, *(const char **)option_field(option, options), &messages);
+    messages_print(&messages, NULL);
+    return is_open;
+}
+
 const Option report_options[] = {{"format", "F",
                                   "text, json, csv, markdown, junit or benchmark (default: text, with "
                                   "--output by the file's ending: .json "
                                   ".csv .md .xml)",
                                   option_choice, offsetof(ReportOptions, format), NAMES(format_names)},
                                  {"output", "FILE", "write the report to a file and print the text",
-                                  option_text, offsetof(ReportOptions, output)},
+                                  option_text, offsetof(ReportOptions, output), .effect = report_file_open},
                                  {"json", NULL, "print JSON", json_choose, 0}};
-
-// The file of the report, of which a command writes one. It is opened before anything is measured.
-static OutputFile report_file;
 
 static ReportFormat format_of_ending(const char *path)
 {
@@ -54,12 +63,7 @@ bool report_options_check(ReportOptions *options, const ResultTable *table)
                        : options->format == FORMAT_BENCHMARK && !table->times
                            ? "--format benchmark is for times, which bench and accuracy measure"
                            : NULL;
-    if (what) option_usage_fault(table->command, what);
-    if (what || options->format == FORMAT_TEXT) return !what;
-    MessageList messages = {0};
-    const bool is_open = output_open(&report_file, options->output ? options->output : "-", &messages);
-    messages_print(&messages, NULL);
-    return is_open;
+    return !what || option_usage_fault(table->command, what);
 }
 
 // A row with the objects that its columns may come from.
@@ -393,6 +397,7 @@ bool report_write(Json *json, const ResultTable *table, const ReportOptions *opt
         text_free(&document);
     }
     MessageList messages = {0};
+    if (!options->output) output_open(&report_file, "-", &messages);
     fwrite(text_c(&text), 1, text.count, report_file.file);
     const bool written = output_commit(&report_file, &messages);
     messages_print(&messages, NULL);

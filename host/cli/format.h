@@ -48,10 +48,12 @@ typedef struct {
     const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL
 } ResultTable;
 
-extern const Option report_options[3]; // in ReportOptions
+// The options of ReportOptions, whose group must follow those of options that create folders, since the file
+// may be in one.
+extern const Option report_options[3];
 
-// Checks the options together, after all others of a command, and opens the file. Returns false with a
-// message if the command has no times, if the file's format is unknown, or if the file cannot be written.
+// Checks the options together, and chooses the format by the file's ending if no other is given. Returns
+// false with a message if the command has no times or if the file's format is unknown.
 bool report_options_check(ReportOptions *options, const ResultTable *table);
 // Returns whether the command prints its text.
 static inline bool report_has_text(const ReportOptions *options)

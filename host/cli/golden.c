@@ -112,8 +112,8 @@ static bool options_check(void *golden_options)
     if (size[0] == 0) memcpy(size, (const uint32_t[2]){320, 180}, sizeof options->common.size);
     if (options->samples == 0) options->samples = 1;
     if (*bounces == BOUNCES_UNSET) *bounces = BOUNCES_DEFAULT;
-    if (options->writes && options->report.format != FORMAT_TEXT)
-        return option_usage_fault("golden", "--format is for check");
+    if (options->writes && (options->report.format != FORMAT_TEXT || options->report.output))
+        return option_usage_fault("golden", "--format, --json and --output are for check");
     return options->writes || report_options_check(&options->report, &golden_table);
 }
 
