@@ -260,8 +260,8 @@ static void rays_print(const uint64_t *rays, const char *indent, FILE *stream)
 }
 
 static const char table_head[] =
-    "                                 frame ms                  kernel ms                        build ms\n"
-    "  precision lanes  bvh       min   median      max      min   median      max  clock runs  cold kept"
+    "                                 frame ms                  kernel ms                          build ms\n"
+    "  precision lanes  bvh       min   median      max      min   median      max  clock runs   cold  kept"
     " Mrays/s  kernel\n";
 
 void bench_print_text(const BenchReport *report, FILE *stream)
