@@ -302,15 +302,15 @@ int command_bench(int argument_count, char **arguments)
     Bench bench = {.options = {.variants = variant_options_default}};
     const BenchOptions *options = &bench.options;
     int status = command_line_read(&command_line, &bench.options, argument_count, arguments);
-    if (status != OPTIONS_READ) return status;
-    status = EXIT_USER;
-    const VariantOptions *choices =
-        options->variant_count > 0 ? options->variant_options : &options->variants;
-    const size_t choice_count = options->variant_count > 0 ? options->variant_count : 1;
-    if (variant_set_open(&bench.set, choices, choice_count, options->scenes.items, options->scenes.count))
-        status = scenes_bench(&bench, argument_count, arguments);
-    variant_set_close(&bench.set);
-    for (size_t i = 0; i < bench.options.variant_count; i++)
-        free(bench.options.variant_words[i]);
+    if (status == OPTIONS_READ) {
+        const size_t count = options->variant_count;
+        const VariantOptions *choices = count > 0 ? options->variant_options : &options->variants;
+        const bool is_open = variant_set_open(&bench.set, choices, count > 0 ? count : 1,
+                                              options->scenes.items, options->scenes.count);
+        status = is_open ? scenes_bench(&bench, argument_count, arguments) : EXIT_USER;
+        variant_set_close(&bench.set);
+    }
+    for (size_t i = 0; i < options->variant_count; i++)
+        free(options->variant_words[i]);
     return status;
 }
