@@ -61,11 +61,18 @@ static const Option precisions_option[] = {
     {"precision", "LIST", "any of single, strict, double, certified (default: single)", option_set,
      offsetof(VariantOptions, precisions), NAMES(precision_names)}};
 
+typedef struct {
+    VariantOptions options;
+    Operands operands; // there must be none
+} VariantLine;
+
 // The options that --variant accepts.
 static const CommandLine variant_line = {
-    .groups = {OPTIONS(precisions_option), OPTIONS(variant_choice_options),
-               OPTION_WITHIN(ray_options[RAY_BOUNCES], VariantOptions, common),
-               OPTIONS_WITHIN(driver_options, VariantOptions, common)}};
+    .groups = {OPTIONS_WITHIN(precisions_option, VariantLine, options),
+               OPTIONS_WITHIN(variant_choice_options, VariantLine, options),
+               OPTION_WITHIN(ray_options[RAY_BOUNCES], VariantLine, options.common),
+               OPTIONS_WITHIN(driver_options, VariantLine, options.common)},
+    OPERANDS(ANY, VariantLine, operands)};
 
 // Splits a text in place at blanks outside of quotes and removes the quotes, ' or ". Adds each word to
 // `words`. Returns false if a quote is not closed.
@@ -93,9 +100,12 @@ static bool words_split(char *text, char **words, int *count)
 // Reads a variant's options from its words. The first word is the prefix of getopt's messages.
 static bool words_read(VariantOptions *variant, char **words, int count)
 {
-    if (command_line_read(&variant_line, variant, count, words) != OPTIONS_READ) return false;
-    if (optind < count) fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", words[optind]);
-    return optind == count;
+    VariantLine line = {.options = *variant};
+    if (command_line_read(&variant_line, &line, count, words) != OPTIONS_READ) return false;
+    *variant = line.options;
+    if (line.operands.count == 0) return true;
+    fprintf(stderr, "glint: --variant: expected options, not \"%s\"\n", line.operands.items[0]);
+    return false;
 }
 
 static bool variant_read(BenchOptions *options, size_t index)

@@ -19,8 +19,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint cache [OPTIONS]\n\n"
              "Lists and checks the programs of the kernel cache, the least recently used first.\nExit status "
              "3: one is damaged or not private.\n",
-    .groups = {OPTIONS(options_own)},
-    .operands = OPERANDS_NONE};
+    .groups = {OPTIONS(options_own)}};
 
 // Returns whether all entries can be trusted.
 static bool entries_print(const CacheEntries *entries)

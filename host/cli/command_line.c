@@ -281,19 +281,24 @@ static int help_print(const CommandLine *line)
 static bool operands_read(const CommandLine *line, void *options, Operands operands)
 {
     void *field = (char *)options + line->operands_offset;
-    const bool takes_scenes = line->operands == OPERANDS_SCENE || line->operands == OPERANDS_SCENES;
-    if (takes_scenes && operands.count == 0) return option_usage_fault(line->command, "no scene given");
-    if (line->operands == OPERANDS_NONE && operands.count > 0)
-        return option_usage_fault(line->command, "takes no arguments");
-    if (line->operands == OPERANDS_SCENE && operands.count > 1) {
-        fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", line->command,
-                operands.items[1], line->command);
-        return false;
-    }
-    if (line->operands == OPERANDS_SCENE)
+    const size_t count = operands.count;
+    const OperandRule rule = line->operands;
+    const bool takes_scenes = rule == OPERANDS_SCENE || rule == OPERANDS_SCENES;
+    if (takes_scenes && count == 0) return option_usage_fault(line->command, "no scene given");
+    switch (rule) {
+    case OPERANDS_NONE:
+        return count == 0 || option_usage_fault(line->command, "takes no arguments");
+    case OPERANDS_SCENE:
         *(const char **)field = operands.items[0];
-    else if (line->operands > OPERANDS_SCENE)
-        *(Operands *)field = operands;
+        if (count > 1)
+            fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", line->command,
+                    operands.items[1], line->command);
+        return count == 1;
+    case OPERANDS_SCENES:
+    case OPERANDS_ANY:
+        break;
+    }
+    *(Operands *)field = operands;
     return true;
 }
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "host/base/array.h"
-#include <getopt.h> // optind
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -67,11 +66,10 @@ typedef struct {
 
 // How many arguments may follow the options, and the type of the field that stores them.
 typedef enum {
-    OPERANDS_LEFT, // any, which are not stored; they start at getopt's `optind`
-    OPERANDS_NONE,
+    OPERANDS_NONE,   // none, the default
     OPERANDS_SCENE,  // one, in a const char *
     OPERANDS_SCENES, // at least one, in an Operands
-    OPERANDS_ANY     // in an Operands
+    OPERANDS_ANY     // any number, in an Operands
 } OperandRule;
 
 typedef struct {

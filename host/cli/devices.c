@@ -26,8 +26,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint devices [OPTIONS]\n\n"
              "Lists every OpenCL device of every platform; * marks the default. Then\n"
              "what the arithmetic of each really does, where that was measured.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)},
-    .operands = OPERANDS_NONE};
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)}};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
