@@ -47,8 +47,7 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     bool quick, lean; // see VerifySettings
-    Operands names;
-    VerifyChoice cases; // all if none is named
+    Operands names;   // of the cases, all if none is named
 } VerifyOptions;
 
 static const Option options_own[] = {
@@ -80,7 +79,6 @@ static bool case_fault(const char *name)
 static bool options_check(void *verify_options)
 {
     VerifyOptions *options = verify_options;
-    options->cases = (VerifyChoice){options->names.items, options->names.count};
     for (size_t i = 0; i < options->names.count; i++)
         if (!is_case(options->names.items[i])) return case_fault(options->names.items[i]);
     return report_options_check(&options->report, &verify_table);
@@ -117,9 +115,9 @@ typedef struct {
 
 static bool is_chosen(const VerifyOptions *options, const char *name)
 {
-    for (size_t i = 0; i < options->cases.count; i++)
-        if (strcmp(options->cases.names[i], name) == 0) return true;
-    return options->cases.count == 0;
+    for (size_t i = 0; i < options->names.count; i++)
+        if (strcmp(options->names.items[i], name) == 0) return true;
+    return options->names.count == 0;
 }
 
 static bool has_failed(const CaseRecord *record)
@@ -286,9 +284,9 @@ static void precision_verify(Verification *verification, Compute *compute)
         }
         record->is_started = true;
     }
-    const VerifyChoice *choice = options->cases.count > 0 ? &options->cases : NULL;
+    const VerifyChoice choice = {options->names.items, options->names.count};
     const VerifySink sink = {case_start, case_receive, verification};
-    verify_run(compute, &settings, choice, &sink, &record->kernels);
+    verify_run(compute, &settings, choice.count > 0 ? &choice : NULL, &sink, &record->kernels);
     record->seconds = clock_seconds() - record->start_seconds;
     if (!compute_ok(compute)) return;
     record->is_ended = true;
@@ -443,7 +441,7 @@ int command_verify(int argument_count, char **arguments)
     for (size_t i = 0; verify_case_name(i); i++)
         verification.case_count += is_chosen(&options, verify_case_name(i));
     const CommonOptions *common = &options.common;
-    if (!options.common.has_precision && options.cases.count == 0 && !options.lean && !common->no_cache &&
+    if (!options.common.has_precision && options.names.count == 0 && !options.lean && !common->no_cache &&
         !common->kernel_folder)
         builder_start(&options);
     return verify_journal_work(verification.journal, verification_work, &verification);
