@@ -25,7 +25,7 @@ static const struct {
 };
 
 typedef struct {
-    CommonOptions common;
+    uint32_t input_pixels_max;
     Operands images;
     const char *reference_path, *test_path, *heatmap_path, *layer;
     ReportOptions report;
@@ -82,7 +82,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
              "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
              "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
-    .groups = {OPTIONS(options_own), OPTION_WITHIN(common_options[COMMON_MAX_PIXELS], DiffOptions, common),
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(max_pixels_option, DiffOptions, input_pixels_max),
                OPTIONS_WITHIN(report_options, DiffOptions, report)},
     OPERANDS(ANY, DiffOptions, images),
     .check = options_check};

@@ -114,10 +114,10 @@ const Option common_options[] = {
                     "whether to use a BVH, which does not change the image: auto, on or off (default: auto)",
                     option_choice, FIELD(bvh), NAMES(bvh_choice_names)},
     [COMMON_NO_CACHE] = {"no-cache", NULL, "ignore the kernel cache", option_flag, FIELD(no_cache)},
-    [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)},
-    [COMMON_MAX_PIXELS] = {"max-pixels", "N", "refuse input images with more pixels (default: 134217728)",
-                           option_count, FIELD(input_pixels_max), NUMBERS(1, UINT32_MAX),
-                           .effect = input_pixels_limit}};
+    [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)}};
+const Option max_pixels_option[] = {{"max-pixels", "N",
+                                     "refuse input images with more pixels (default: 134217728)",
+                                     option_count, 0, NUMBERS(1, UINT32_MAX), .effect = input_pixels_limit}};
 const Option ray_options[] = {
     [RAY_BOUNCES] = {"bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)",
                      option_count, FIELD(bounce_count), NUMBERS(0, BOUNCES_MAX)},

@@ -13,7 +13,7 @@
 
 enum { OVERRIDES_MAX = 64 };
 
-// The options of every command that uses a device.
+// The options that several commands share, of which each command offers some.
 typedef struct {
     const char *device, *reference_device;
     Precision precision;
@@ -29,7 +29,7 @@ typedef struct {
     uint32_t work_group[2];               // 0 if not given
     const char *kernel_folder;            // NULL if not given
     const char *capture_folder;           // NULL if not given
-    uint32_t input_pixels_max;            // 0 if not given
+    uint32_t input_pixels_max;            // see max_pixels_option
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
     const char *camera; // the scene of --camera, NULL if not given
@@ -40,7 +40,7 @@ typedef struct {
 // Options that several commands share, one table for each set that they share. Their fields are in
 // CommonOptions.
 extern const Option device_option[1], devices_option[1], reference_option[1], precision_option[1];
-enum { COMMON_LANES, COMMON_BVH, COMMON_NO_CACHE, COMMON_LENIENT, COMMON_MAX_PIXELS, COMMON_COUNT };
+enum { COMMON_LANES, COMMON_BVH, COMMON_NO_CACHE, COMMON_LENIENT, COMMON_COUNT };
 extern const Option common_options[COMMON_COUNT];
 enum { RAY_BOUNCES, RAY_MIN_CONTRIBUTION, RAY_COUNT };
 extern const Option ray_options[RAY_COUNT];
@@ -48,13 +48,15 @@ extern const Option set_options[2];         // of scenes whose values can be set
 extern const Option perturb_option[1];      // of commands that render or trace
 extern const Option driver_options[2];      // of commands that measure drivers
 extern const Option keep_kernels_option[1]; // of commands that examine drivers
+extern const Option max_pixels_option[1];   // of commands that read images, in a uint32_t
 OptionReader option_precision;              // of CommonOptions
 
 // The groups of every command that reads a scene and opens one device. `common` is the CommonOptions in the
 // command's struct.
 #define SCENE_GROUPS(Type, common)                                                                           \
     OPTIONS_WITHIN(set_options, Type, common), OPTIONS_WITHIN(device_option, Type, common),                  \
-        OPTIONS_WITHIN(common_options, Type, common)
+        OPTIONS_WITHIN(common_options, Type, common),                                                        \
+        OPTIONS_WITHIN(max_pixels_option, Type, common.input_pixels_max)
 
 enum { BOUNCES_DEFAULT = 5 };
 
