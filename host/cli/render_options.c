@@ -286,24 +286,21 @@ int render_options_read(RenderOptions *options, int argument_count, char **argum
 
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene)
 {
-    uint32_t *size = options->common.size;
-    scene_choose_image_size(scene, &size[0], &size[1]);
-    if (!options->has_region) {
-        options->region[2] = size[0];
-        options->region[3] = size[1];
-    }
+    *settings = settings_of_scene(&options->common, scene);
+    settings->sample_count = options->sample_count;
+    settings->hashes_scene = options->checkpoint != NULL;
+    options->common.size[0] = settings->width;
+    options->common.size[1] = settings->height;
+    if (!options->has_region) return true;
     const uint32_t *region = options->region;
-    if (region[0] + region[2] > size[0] || region[1] + region[3] > size[1]) {
+    if (region[0] + region[2] > settings->width || region[1] + region[3] > settings->height) {
         fprintf(stderr, "glint: --region: %u,%u,%u,%u does not lie within the image of %ux%u pixels\n",
-                region[0], region[1], region[2], region[3], size[0], size[1]);
+                region[0], region[1], region[2], region[3], settings->width, settings->height);
         return false;
     }
-    *settings = settings_of_scene(&options->common, scene);
     settings->region_x = region[0];
     settings->region_y = region[1];
     settings->region_width = region[2];
     settings->region_height = region[3];
-    settings->sample_count = options->sample_count;
-    settings->hashes_scene = options->checkpoint != NULL;
     return true;
 }

@@ -35,6 +35,6 @@ FramePlace frame_place_of(const char *pattern);
 // Returns whether the output is a folder, for several images.
 bool output_is_folder(const char *path);
 
-// Sets the settings for one scene. Chooses the size and region if the options leave them open. Returns false
-// with a message if the options do not fit the scene.
+// Sets the settings for one scene. If the options leave the size open, chooses it and stores it in them, so
+// that all times of a shutter have the same. Returns false with a message if the region does not fit.
 bool render_settings_make(RenderSettings *settings, RenderOptions *options, const Scene *scene);
