@@ -38,7 +38,7 @@ static const Option options_own[] = {
      "errors to allow: report the fastest configuration within each (default: 1e-2,1e-4,1e-6)", budgets_read,
      0, NUMBERS_ABOVE(0, INFINITY)},
     {"save", "FOLDER", "write all compared arrays there, as .npy", option_text,
-     offsetof(AccuracyOptions, folder), .effect = folder_create},
+     offsetof(AccuracyOptions, folder), .effect = effect_folder},
     {"html", "FILE", "self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
     {"precision", "LIST", "any of single, strict, double, certified (default: the first three)", option_set,
      offsetof(AccuracyOptions, variants.precisions), NAMES(precision_names)}};

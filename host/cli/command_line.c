@@ -192,7 +192,7 @@ bool option_set(const Option *option, const char *value, void *options)
     return true;
 }
 
-bool folder_create(const Option *option, void *options)
+bool effect_folder(const Option *option, void *options)
 {
     const char *path = *(const char **)option_field(option, options);
     if (mkdir(path, 0777) != 0 && errno != EEXIST) {
@@ -205,10 +205,10 @@ bool folder_create(const Option *option, void *options)
     return false;
 }
 
-bool folder_create_empty(const Option *option, void *options)
+bool effect_empty_folder(const Option *option, void *options)
 {
     const char *path = *(const char **)option_field(option, options);
-    if (!folder_create(option, options)) return false;
+    if (!effect_folder(option, options)) return false;
     DIR *folder = opendir(path);
     if (!folder) {
         fprintf(stderr, "glint: --%s: cannot read the folder '%s': %s\n", option->name, path,

@@ -101,9 +101,9 @@ OptionReader option_work_group; // uint32_t[2]: WxH work-items
 OptionReader option_choice;     // an enum: the index of the name
 OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
 
-// Effects of options whose value is the path of a folder, which must be writable.
-OptionEffect folder_create;
-OptionEffect folder_create_empty; // the folder must also be empty
+// Effects that create the folder that the option's value names, unless it exists. It must be writable.
+OptionEffect effect_folder;
+OptionEffect effect_empty_folder; // which must also be empty
 
 // What option_count and option_choice read, for readers that store it elsewhere.
 bool count_read(const Option *option, const char *value, uint32_t *count);
@@ -116,7 +116,8 @@ typedef struct {
     size_t item_size, most; // bytes of an item, and the largest number of them
     size_t *count;
 } OptionItems;
-// Reads values, separated by commas.
+// Reads at most list.most values, separated by commas, and sets *list.count. Returns false with a message on
+// a mistake.
 bool option_list(const Option *option, const char *value, OptionReader *read, OptionItems list);
 // Reads decimal digits only, until their number exceeds 2^31. *end receives the position after them. Returns
 // false if there are none.

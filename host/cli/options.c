@@ -138,7 +138,7 @@ const Option driver_options[] = {
      FIELD(build_options)}};
 const Option keep_kernels_option[] = {{"keep-kernels", "FOLDER",
                                        "write the text and the build log of each kernel that is built",
-                                       option_text, FIELD(kernel_folder), .effect = folder_create}};
+                                       option_text, FIELD(kernel_folder), .effect = effect_folder}};
 
 void messages_print_once(MessageList *messages, MessageList *printed, const char *path)
 {

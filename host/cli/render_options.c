@@ -232,7 +232,7 @@ static const Option options_own[] = {
      frames_read, 0},
     {"skip-existing", NULL, "leave out images that exist", option_flag, FIELD(skips_existing)},
     {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
-     FIELD(common.capture_folder), .effect = folder_create_empty},
+     FIELD(common.capture_folder), .effect = effect_empty_folder},
     {"format", "F", "format of --output -: png, ppm or npy", format_read, 0, NAMES(format_names)},
     {"quiet", NULL, "print no progress", option_flag, FIELD(quiet)}};
 

@@ -187,7 +187,7 @@ static bool file_write(const char *folder, const char *name, const char *text)
 
 // Creates the folder in which the steps run. The caller removes and frees it. Returns NULL with a message on
 // failure.
-static char *folder_make(void)
+static char *steps_folder_create(void)
 {
     const char *parent = getenv("TMPDIR");
     char *folder = text_format("%s/glint-report-XXXXXX", parent && parent[0] ? parent : "/tmp");
@@ -422,7 +422,7 @@ static int archive_make(ReportChoice *choice)
     const bool is_open = output_open(&output, choice->output, &messages);
     messages_print(&messages, NULL);
     if (!is_open) return EXIT_USER;
-    char *folder = folder_make();
+    char *folder = steps_folder_create();
     const int status = folder ? report_make(choice, folder, &output) : EXIT_MACHINE;
     if (folder) folder_remove(folder);
     free(folder);
