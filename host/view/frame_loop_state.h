@@ -7,7 +7,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-// What the window's thread and the loop's pass to each other. Only under the mutex.
+// The data that the window's thread and the loop's thread exchange. Every access holds the mutex.
 typedef struct {
     FrameRequest request;
     unsigned request_number;

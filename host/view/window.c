@@ -48,15 +48,15 @@ static void facts_exchange(Window *window)
     const double *at = window->facts.at;
     const bool is_inside =
         at[0] >= 0 && at[1] >= 0 && at[0] < window->size.width && at[1] < window->size.height;
-    if (window->facts.are_shown && window->facts.are_due && is_inside && window->request > 0) {
+    if (window->facts.are_shown && window->facts.needs_probe && is_inside && window->request > 0) {
         frame_loop_probe(window->frames, (uint32_t)at[0], (uint32_t)at[1]);
-        window->facts.are_due = false;
+        window->facts.needs_probe = false;
     }
     char *facts = frame_loop_acquire_facts(window->frames);
     if (!facts) return;
-    if (window->facts.prints) fputs(facts, stdout);
+    if (window->facts.prints_next) fputs(facts, stdout);
     fflush(stdout);
-    window->facts.prints = false;
+    window->facts.prints_next = false;
     free(window->facts.text);
     window->facts.text = facts;
     window->redraws = true;
@@ -108,7 +108,7 @@ static void event_handle(Window *window, const SDL_Event *event)
         break;
     case SDL_MOUSEMOTION:
         position_set(window, window->facts.at, event->motion.x, event->motion.y);
-        window->facts.are_due = true;
+        window->facts.needs_probe = true;
         drag_move(window, &event->motion);
         break;
     case SDL_MOUSEWHEEL:
@@ -180,7 +180,7 @@ static void work_exchange(Window *window)
     key_record(window);
     request_send(window);
     if (frame_loop_acquire(window->frames, &window->frame)) {
-        window->facts.are_due |= window->frame.number != window->facts.request;
+        window->facts.needs_probe |= window->frame.number != window->facts.request;
         window->facts.request = window->frame.number;
         frame_show(window);
     }

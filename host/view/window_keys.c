@@ -88,7 +88,8 @@ static void facts_toggle(Window *window)
     int x, y;
     SDL_GetMouseState(&x, &y);
     position_set(window, window->facts.at, x, y);
-    window->facts.are_shown = window->facts.are_due = window->facts.prints = !window->facts.are_shown;
+    window->facts.are_shown = window->facts.needs_probe = window->facts.prints_next =
+        !window->facts.are_shown;
     free(window->facts.text);
     window->facts.text = NULL;
     window->redraws = true;

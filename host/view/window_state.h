@@ -7,7 +7,7 @@
 
 typedef enum { DRAG_NONE, DRAG_ORBIT, DRAG_PAN, DRAG_LOOK, DRAG_TIME } Drag;
 
-// What SDL has of the window.
+// The SDL objects of the window.
 typedef struct {
     SDL_Window *window;
     SDL_Renderer *renderer;
@@ -31,12 +31,14 @@ typedef struct {
     uint32_t start_frame;
 } Play;
 
-// What the pixel under the cursor shows.
+// The facts of the pixel under the cursor.
 typedef struct {
     double at[2];     // the cursor, in pixels
     char *text;       // NULL: not shown, or not known yet
     unsigned request; // the request whose image the text describes
-    bool are_shown, are_due, prints;
+    bool are_shown;
+    bool needs_probe; // the loop has not been asked about the pixel
+    bool prints_next; // the next text is also printed on standard output
 } PixelFacts;
 
 // All of it is owned by the window's thread. The FrameLoop has what the thread that renders owns and what
