@@ -30,7 +30,7 @@ bool dat_skip(DatReader *reader, const char *keyword)
 void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 {
     char text[256];
-    FORMAT_TEXT(text, format);
+    ARGUMENTS_FORMAT(text, format);
     if (!report_repeats(&reader->report, NULL, 0, 0, text))
         report_warning(&reader->report, offset, "%s", text);
 }

@@ -45,7 +45,7 @@ void report_include(Report *report, Report *included);
 bool report_close(Report *report);
 
 // Formats the arguments after `format` of the function that uses it into the array `text`.
-#define FORMAT_TEXT(text, format)                                                                            \
+#define ARGUMENTS_FORMAT(text, format)                                                                       \
     do {                                                                                                     \
         va_list arguments;                                                                                   \
         va_start(arguments, format);                                                                         \

@@ -27,7 +27,7 @@ static void draft_report(const MeshDraft *draft, bool is_error, const char *text
 bool draft_refuse(MeshDraft *draft, const char *format, ...)
 {
     char text[TEXT_BYTES];
-    FORMAT_TEXT(text, format);
+    ARGUMENTS_FORMAT(text, format);
     draft_report(draft, true, text);
     return false;
 }
@@ -35,14 +35,14 @@ bool draft_refuse(MeshDraft *draft, const char *format, ...)
 void draft_warn(MeshDraft *draft, const char *format, ...)
 {
     char text[TEXT_BYTES];
-    FORMAT_TEXT(text, format);
+    ARGUMENTS_FORMAT(text, format);
     draft_report(draft, false, text);
 }
 
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
 {
     char text[TEXT_BYTES];
-    FORMAT_TEXT(text, format);
+    ARGUMENTS_FORMAT(text, format);
     if (draft->places == DRAFT_NO_PLACES) return draft_refuse(draft, "%s", text);
     if (draft->places == DRAFT_BYTES) return draft_refuse(draft, "byte %zu: %s", offset, text);
     return report_error(&draft->report, offset, "%s", text);

@@ -42,7 +42,7 @@ static const char *const extensions_read[] = {
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
     char text[256];
-    FORMAT_TEXT(text, format);
+    ARGUMENTS_FORMAT(text, format);
     if (!gltf->is_optional) return draft_refuse(gltf->draft, "%s: %s", item->path, text);
     draft_warn(gltf->draft, "%s: %s: not used", item->path, text);
     return false;
@@ -51,7 +51,7 @@ bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
     char text[256];
-    FORMAT_TEXT(text, format);
+    ARGUMENTS_FORMAT(text, format);
     draft_warn(gltf->draft, "%s: %s", item->path, text);
 }
 
