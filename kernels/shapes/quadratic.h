@@ -35,13 +35,14 @@ typedef struct {
 } QuadraticRoots;
 
 // Returns both roots. q / a beyond the range of numbers, as for a = 0, is infinite with its sign. With q = 0
-// both roots are q / a.
+// both roots are q / a. A huge c / q stays a root, because q / a may be far from it.
 static inline QuadraticRoots quadratic_roots(real a, real b, real c, real d)
 {
     const real q = quadratic_q(b, d);
-    const mask positive = (q > (real)(0)) == (a >= (real)(0));
+    const mask zero = q == (real)(0), positive = (q > (real)(0)) == (a >= (real)(0));
     const real q_over_a = divide_or(q, a, lanes_select(positive, (real)(LARGEST), (real)(-LARGEST)));
-    return (QuadraticRoots){divide_or(c, q, q_over_a), q_over_a};
+    const real c_over_q = real_divide(c, lanes_select(zero, (real)(1), q));
+    return (QuadraticRoots){lanes_select(zero, q_over_a, c_over_q), q_over_a};
 }
 
 static inline Interval quadratic_interval(QuadraticRoots roots)
