@@ -251,7 +251,7 @@ static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, 
 // Returns a bound on how fast the normal turns along the surface.
 static inline real torus_curvature(const CertainTorus *torus, real rho)
 {
-    return divide_or((real)(2), real_min(rho, torus->minor), (real)(1 / SMALLEST_RATIO));
+    return divide_or((real)(2), real_min(rho, torus->minor), (real)(2 / SMALLEST_RATIO));
 }
 
 // Returns the t before which a ray that starts on the torus cannot return to it, or 0 if that is unknown.
