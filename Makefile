@@ -64,7 +64,7 @@ endif
 kernels := $(patsubst kernels/traversal/primitives.h,$(BUILD)/primitives.h,$(kernels))
 endif
 shapes  := $(filter kernels/shapes/%,$(kernels))
-kernels += $(BUILD)/shapes.h
+kernels += $(BUILD)/all_shapes.h
 window_sources := $(wildcard host/view/window*.c) host/view/caption.c host/view/legend.c
 sources := $(filter-out $(if $(has_window),,$(window_sources) host/cli/view_start.c), \
            $(filter-out host/mpi/%,$(sort $(wildcard host/*.c host/*/*.c host/*/*/*.c))))
@@ -123,7 +123,7 @@ $(BUILD)/glint-mpi: $(mpi_objects) $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) $(shell $(PKG_CONFIG) --libs ompi-c) -o $@
 
 # Includes every file of kernels/shapes/.
-$(BUILD)/shapes.h: $(shapes) kernels/shapes
+$(BUILD)/all_shapes.h: $(shapes) kernels/shapes
 	@mkdir -p $(@D)
 	printf '#include "%s"\n' $(shapes:kernels/%=%) > $@
 

@@ -4,6 +4,7 @@
 
 #include "shading/chords.h"
 #include "shading/lane_points.h"
+#include "shapes/triangle_normals.h"
 #include "traversal/traversal.h"
 
 // Members that only reflection, transmission or images need are set only with them. For an explicit ray,

@@ -2,7 +2,7 @@
 #ifndef PRIMITIVES_H
 #define PRIMITIVES_H
 
-#include "shapes.h" // of the Makefile: every file of shapes/
+#include "all_shapes.h" // The Makefile generates all_shapes.h, which includes every file of shapes/.
 #include "traversal/cull_sphere.h"
 #include "traversal/cutout.h"
 
