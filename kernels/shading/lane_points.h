@@ -126,8 +126,8 @@ static inline Color3 object_color(const Scene *scene, const Material *material, 
         color = vector_select(odd, vector_of(material->other_color), color);
     }
     if (HAS_IMAGES && material->texture.x > 0)
-        color = texture_color(scene, image_on(hit->entry.x, material->texture), hit->images.coordinates,
-                              hit->images.footprint, hit->lanes);
+        color = texture_color(scene, image_wrapped(material->texture, hit->entry.x == TYPE_SPHERES),
+                              hit->images.coordinates, hit->images.footprint, hit->lanes);
     return color;
 }
 

@@ -63,8 +63,8 @@ static inline Vector normal_tilted(const Scene *scene, const Material *material,
         vector_fma(tangents.u, (real)(side * row_v.y), vector_scale(tangents.v, (real)(-side * row_v.x)));
     Vector along_v =
         vector_fma(tangents.v, (real)(side * row_u.x), vector_scale(tangents.u, (real)(-side * row_u.y)));
-    Vector texel =
-        texture_color(scene, image_on(type, material->normal_map), mapped, place->footprint, wanted);
+    Vector texel = texture_color(scene, image_wrapped(material->normal_map, type == TYPE_SPHERES), mapped,
+                                 place->footprint, wanted);
     real x = strength * real_fma(two, texel.x, -one), y = strength * real_fma(two, texel.y, -one),
          z = real_fma(two, texel.z, -one);
     Vector across = vector_fma(normal, -vector_dot(normal, along_u), along_u);

@@ -118,11 +118,10 @@ static inline scalar4 scalar4_between(scalar4 a, scalar4 b, scalar part)
     return fma(b - a, (scalar4)(part), a);
 }
 
-// Returns one of a material's images, which wraps by z and w, as it lies on shapes of a type. On a sphere it
-// does not wrap across the poles.
-static inline uint4 image_on(uint type, uint4 image)
+// Returns an image, which wraps by z and w. One on a sphere or the sky does not wrap across the poles.
+static inline uint4 image_wrapped(uint4 image, bool has_poles)
 {
-    if (type == TYPE_SPHERES) image.w = WRAP_CLAMPED;
+    if (has_poles) image.w = WRAP_CLAMPED;
     return image;
 }
 
@@ -221,8 +220,8 @@ static inline Vector sky_image_color(const Scene *scene, Vector direction, mask 
     real z = vector_dot(direction, vector_of(header->sky_forward));
     real across = real_sqrt(real_fma(x, x, z * z));
     scalar texels = max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
-    Vector color = image_color(scene, image_on(TYPE_SPHERES, header->sky_texture),
-                               one_half + real_turns(z, x), real_fma(two, real_turns(across, y), one_half),
+    Vector color = image_color(scene, image_wrapped(header->sky_texture, true), one_half + real_turns(z, x),
+                               real_fma(two, real_turns(across, y), one_half),
                                (real)(header->sample.x * texels), wanted);
     return vector_scale(color, (real)(header->sky_forward.w));
 }

@@ -70,7 +70,8 @@ static OUT_OF_LINE mask object_hole_lanes(const Traversal *traversal, const Scen
     const uint4 entry = object_entry(traversal, scene, id);
     const uint4 cutout = scene->materials[entry.z].cutout;
     if (cutout.x == 0) return mask_none();
-    return alpha_is_low(scene, image_on(entry.x, cutout), cutout_coordinates(scene, entry, ray, t), wanted);
+    return alpha_is_low(scene, image_wrapped(cutout, entry.x == TYPE_SPHERES),
+                        cutout_coordinates(scene, entry, ray, t), wanted);
 }
 
 // Removes from `found` the crossings that would not be recorded and those in holes. Returns the lanes whose
