@@ -48,7 +48,7 @@ static inline Vector affine_normal(const scalar4 inverses[3], Vector n)
 #define MAPPED_POINT_ERROR ((real)(1.5f))
 
 // Returns the image of a surface point p. `normal` is the mapped normal, of any length, `largest` the largest
-// coordinates of p's shape, and rounding_scale that before mapping.
+// coordinates of p's shape, and `rounding_scale` is the point's before mapping.
 static inline SurfacePoint affine_surface_point(const scalar4 rows[3], scalar condition, Vector p,
                                                 Vector normal, Vector largest, real rounding_scale)
 {

@@ -5,10 +5,10 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// Where the ray is inside the side, or outside it for both nappes of an unbounded cone around it, and where
-// it is between the ends.
+// The intervals of t that decide where a ray hits the side and the caps.
 typedef struct {
-    Interval side, slab;
+    Interval side;   // inside the side; between the nappes of an unbounded cone, outside it
+    Interval slab;   // between the ends
     mask real_roots; // the line crosses the side or is inside it everywhere
 } EndedCrossings;
 

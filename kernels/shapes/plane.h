@@ -88,7 +88,9 @@ static inline mask certain_plane(Vector point, Vector normal, real size, scalar 
     return crosses;
 }
 
-// Does the same for a normal that is exact except for its rounding, and whose w is one over its length.
+// Returns the lanes where the line crosses a plane, with bounds on t in *crossing. In other lanes it may
+// cross it at or beyond crossing->near. The normal is exact except for its rounding; its w is one over its
+// length.
 static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray, Interval *crossing)
 {
     real size = (real)(uniform_divide(1 + 16 * UNIT_ROUNDOFF, normal.w));

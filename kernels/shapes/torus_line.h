@@ -29,8 +29,8 @@ static inline real torus_line_t(const TorusLine *line, real s)
     return real_fma(s, line->t_per_s, line->closest_t);
 }
 
-// Returns half of the squared chord of the bounding sphere, whose squared radius is enlarged so that the ends
-// of the line in it lie outside the torus however numbers are rounded.
+// Returns the squared half chord of the bounding sphere, whose squared radius is enlarged so that the ends of
+// the line in it lie outside the torus however numbers are rounded.
 static inline real torus_half_chord_squared(real major, real minor, real squared_distance)
 {
     const real radius = major + minor;
