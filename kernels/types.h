@@ -206,6 +206,18 @@ typedef struct {
 
 enum { BVH_EMPTY = 0, BVH_NODE = 0xff };
 
+// Returns the TYPE_… of a leaf's primitives, and another number for BVH_NODE.
+static inline unsigned leaf_type(unsigned child_type)
+{
+    return child_type & 0xff;
+}
+
+// Returns the number of a leaf's primitives, and 0 for BVH_NODE and BVH_EMPTY.
+static inline unsigned leaf_count(unsigned child_type)
+{
+    return child_type >> 8;
+}
+
 // The vertices of a leaf's triangles, for kernels with several lanes, which test one triangle per lane
 // (kernels/traversal/triangle_block.h). The rows a.x, a.y, a.z, b.x ... c.z are as wide as a node. If a leaf
 // has fewer triangles, the first one is repeated.

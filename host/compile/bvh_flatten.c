@@ -264,8 +264,8 @@ static FlatSphereBlock sphere_block_at(const CompiledScene *compiled, size_t blo
 // Returns whether a child is a leaf that kernels with several lanes read as a block.
 static bool is_block(uint32_t child_type)
 {
-    const unsigned type = child_type & 0xff;
-    return child_type >> 8 > 0 && type_has_blocks(type);
+    const unsigned type = leaf_type(child_type);
+    return leaf_count(child_type) > 0 && type_has_blocks(type);
 }
 
 // Returns the index of a block's first primitive, to be read or set.
@@ -283,7 +283,7 @@ static void blocks_place(CompiledScene *compiled, unsigned width, bool is_double
     for (size_t i = 0; i < nodes->count; i++)
         for (unsigned k = 0; k < width; k++) {
             const uint32_t child_type = flat_node_at(nodes, i).child_type[k];
-            if (is_block(child_type)) counts[child_type & 0xff]++;
+            if (is_block(child_type)) counts[leaf_type(child_type)]++;
         }
     flat_wide_array_renew(compiled, FLAT_TRIANGLE_BLOCKS, counts[TYPE_TRIANGLES], width, !is_double);
     flat_wide_array_renew(compiled, FLAT_SPHERE_BLOCKS, counts[TYPE_SPHERES], width, false);
@@ -293,7 +293,7 @@ static void blocks_place(CompiledScene *compiled, unsigned width, bool is_double
         const FlatNode node = flat_node_at(nodes, i);
         for (unsigned k = 0; k < width; k++) {
             if (!is_block(node.child_type[k])) continue;
-            const unsigned type = node.child_type[k] & 0xff;
+            const unsigned type = leaf_type(node.child_type[k]);
             *block_place(compiled, type, next[type]) = node.child_index[k];
             node.child_index[k] = next[type]++;
         }
@@ -351,7 +351,7 @@ static void nodes_fill_blocks(void *context, size_t begin, size_t end)
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
         for (unsigned k = 0; k < node.width; k++) {
             if (!is_block(node.child_type[k])) continue;
-            const unsigned type = node.child_type[k] & 0xff, count = node.child_type[k] >> 8;
+            const unsigned type = leaf_type(node.child_type[k]), count = leaf_count(node.child_type[k]);
             if (type == TYPE_SPHERES)
                 sphere_block_fill(compiled, node.child_index[k], count);
             else
@@ -451,7 +451,7 @@ static void leaves_fit(void *context, size_t begin, size_t end)
     for (size_t i = begin; i < end; i++) {
         const FlatNode node = flat_node_at(&compiled->arrays[FLAT_NODES], i);
         for (unsigned k = 0; k < node.width; k++) {
-            const unsigned type = node.child_type[k] & 0xff, count = node.child_type[k] >> 8;
+            const unsigned type = leaf_type(node.child_type[k]), count = leaf_count(node.child_type[k]);
             if (count == 0) continue;
             const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];
             Bounds all = bounds_empty(), box;

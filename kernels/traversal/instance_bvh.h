@@ -20,7 +20,7 @@ static inline void mesh_traverse(Traversal *traversal, const Scene *scene, const
             if (next.child_type == BVH_NODE) {
                 visit_node(&stack, &scene->nodes[next.child_index], box_ray, octant, tmax);
             } else {
-                const uint first = next.child_index, last = first + (next.child_type >> 8);
+                const uint first = next.child_index, last = first + leaf_count(next.child_type);
                 intersect_triangles(traversal, scene, ray, first, last);
                 if (!traversal->active) return;
                 tmax = traversal_tmax(traversal);

@@ -249,7 +249,7 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
         uint first = ((global const uint *)node->child_index)[leaf];
         uint type = ((global const uint *)node->child_type)[leaf];
         if (hit_by == 0 || type == BVH_EMPTY) continue;
-        if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES) {
+        if (HAS_INSTANCES && leaf_type(type) == TYPE_INSTANCES) {
             stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, met.entry.each[leaf]});
             continue;
         }

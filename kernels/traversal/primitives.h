@@ -251,7 +251,7 @@ static inline bool type_has_blocks(uint type)
 static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, const Ray *ray, uint leaf,
                                   uint first)
 {
-    const uint type = leaf & 0xff, last = first + (leaf >> 8);
+    const uint type = leaf_type(leaf), last = first + leaf_count(leaf);
 #define INTERSECT_LEAF(feature, Type, name, names)                                                           \
     if (HAS_##feature && !type_has_blocks(TYPE_##feature) && type == TYPE_##feature)                         \
         return intersect_##names(traversal, scene, ray, first, last);
@@ -264,7 +264,7 @@ static inline bool intersect_leaf(Traversal *traversal, const Scene *scene, cons
 static inline bool intersect_leaf_or_block(Traversal *traversal, const Scene *scene, const Ray *ray,
                                            uint leaf, uint index, uint lanes)
 {
-    const uint type = leaf & 0xff, count = leaf >> 8;
+    const uint type = leaf_type(leaf), count = leaf_count(leaf);
     if (HAS_SPHERES && type == TYPE_SPHERES)
         return intersect_sphere_block(traversal, scene, ray, index, count, lanes);
     if (HAS_TRIANGLES && type == TYPE_TRIANGLES)

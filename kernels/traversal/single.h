@@ -38,7 +38,7 @@ static inline void traverse_bvh(Traversal *traversal, const Scene *scene, Ray *r
             if (next.child_type == BVH_NODE) {
                 visit_node(&stack, &scene->nodes[next.child_index], &box_ray, octant, tmax);
             } else {
-                if (HAS_INSTANCES && (next.child_type & 0xff) == TYPE_INSTANCES)
+                if (HAS_INSTANCES && leaf_type(next.child_type) == TYPE_INSTANCES)
                     instance_traverse(traversal, scene, ray, next.child_index, 1);
                 else
                     intersect_leaf(traversal, scene, ray, next.child_type, next.child_index);

@@ -120,7 +120,7 @@ static inline ALWAYS_INLINE void tile_visit_spheres(MacroTile *tile, const Scene
     if (tile->has_shrunk) tile_bound_reach(tile);
     SphereView view;
     global const SphereBlock *block = &scene->sphere_blocks[leaf->index];
-    const uint spheres = spheres_see(&view, tile, block, leaf->type >> 8);
+    const uint spheres = spheres_see(&view, tile, block, leaf_count(leaf->type));
     if (spheres == 0) return;
     for (uint packets = leaf->packets; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);

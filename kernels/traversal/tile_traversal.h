@@ -86,12 +86,12 @@ static inline void entry_prefetch(const Scene *scene, uint type, uint index)
 {
     if (type == BVH_NODE)
         memory_prefetch((global const char *)&scene->nodes[index], sizeof(BvhNode));
-    else if (HAS_TRIANGLES && (type & 0xff) == TYPE_TRIANGLES)
+    else if (HAS_TRIANGLES && leaf_type(type) == TYPE_TRIANGLES)
         memory_prefetch((global const char *)&scene->triangle_blocks[index], sizeof(TriangleBlock));
-    else if (HAS_SPHERES && (type & 0xff) == TYPE_SPHERES)
+    else if (HAS_SPHERES && leaf_type(type) == TYPE_SPHERES)
         memory_prefetch((global const char *)&scene->sphere_blocks[index],
                         sizeof(scene->sphere_blocks->rows) + sizeof(scene->sphere_blocks->ids));
-    else if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES)
+    else if (HAS_INSTANCES && leaf_type(type) == TYPE_INSTANCES)
         memory_prefetch((global const char *)&scene->instances[index], sizeof(Instance));
 }
 
@@ -100,7 +100,7 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
 {
     for (uint packets = leaf->packets; packets != 0; packets &= packets - 1) {
         const uint packet = lowest_bit(packets);
-        if (HAS_INSTANCES && (leaf->type & 0xff) == TYPE_INSTANCES) {
+        if (HAS_INSTANCES && leaf_type(leaf->type) == TYPE_INSTANCES) {
             const uint rays = rays_within(tile, packet, &leaf->seen);
             if (rays != 0 &&
                 instance_traverse(&tile->traversals[packet], scene, &tile->rays[packet], leaf->index, rays))
@@ -118,9 +118,9 @@ static inline void tile_visit_leaf(MacroTile *tile, const Scene *scene, const Ti
 // between blocks of spheres.
 static inline bool child_waits(uint type, bool is_shadow)
 {
-    if (HAS_INSTANCES && (type & 0xff) == TYPE_INSTANCES) return true;
-    return type == BVH_NODE || (type & 0xff) == TYPE_TRIANGLES ||
-           (!is_shadow && (type & 0xff) == TYPE_SPHERES);
+    if (HAS_INSTANCES && leaf_type(type) == TYPE_INSTANCES) return true;
+    return type == BVH_NODE || leaf_type(type) == TYPE_TRIANGLES ||
+           (!is_shadow && leaf_type(type) == TYPE_SPHERES);
 }
 
 // Visits the children of a node that its packets may hit, or pushes those that wait, the nearest to the
@@ -151,7 +151,7 @@ static inline ALWAYS_INLINE uint tile_visit_node(MacroTile *tile, const Scene *s
         if (entry.packets == 0 || entry.type == BVH_EMPTY) continue;
         entry.index = ((global const uint *)node->child_index)[child];
         if (!child_waits(entry.type, is_shadow)) {
-            if (HAS_SPHERES && is_shadow && (entry.type & 0xff) == TYPE_SPHERES)
+            if (HAS_SPHERES && is_shadow && leaf_type(entry.type) == TYPE_SPHERES)
                 tile_visit_spheres(tile, scene, &entry, true);
             else
                 tile_visit_leaf(tile, scene, &entry);
@@ -180,9 +180,9 @@ static inline ALWAYS_INLINE void tile_traverse(MacroTile *tile, const Scene *sce
         if (entry.packets == 0) continue;
         if (entry.type == BVH_NODE)
             count = tile_visit_node(tile, scene, &entry, entries, count, is_shadow);
-        else if (HAS_TRIANGLES && (entry.type & 0xff) == TYPE_TRIANGLES)
+        else if (HAS_TRIANGLES && leaf_type(entry.type) == TYPE_TRIANGLES)
             tile_visit_triangles(tile, scene, &entry, is_shadow);
-        else if (HAS_INSTANCES && (entry.type & 0xff) == TYPE_INSTANCES)
+        else if (HAS_INSTANCES && leaf_type(entry.type) == TYPE_INSTANCES)
             tile_visit_leaf(tile, scene, &entry);
         else if (HAS_SPHERES && !is_shadow)
             tile_visit_spheres(tile, scene, &entry, false);

@@ -290,7 +290,7 @@ static inline ALWAYS_INLINE void tile_visit_triangles(MacroTile *tile, const Sce
     if (tile->has_shrunk) tile_bound_reach(tile);
     BlockView view;
     const BlockVertices vertices = block_load(tile, &scene->triangle_blocks[leaf->index]);
-    const uint triangles = block_see(&view, tile, &vertices, leaf->type >> 8);
+    const uint triangles = block_see(&view, tile, &vertices, leaf_count(leaf->type));
     if (triangles == 0) return;
     block_set_edges(&view, tile, &vertices, is_shadow);
     const uint first = block_first(scene, leaf->index);
