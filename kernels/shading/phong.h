@@ -206,109 +206,169 @@ static inline real highlight_error(const Surface *surface, const LightRay *light
     return brightness * real_min(bound, one);
 }
 
-// Bounds the error of the contribution of a light that shines in full, with `brightest` in the largest
-// channel. `angle_error` is that of its direction, `strength_error` that of its strength, relative to full.
-static inline real light_color_error(real brightest, const Surface *surface, const LightRay *to_light,
-                                     real angle_error, real facing_error, real strength_error)
+// Bounds on a light and on the errors of the way to it, before the shadow ray is traced.
+typedef struct {
+    real place;         // bounds the errors of the shadow ray's ends
+    real angle;         // bounds the error of the light's direction
+    real facing;        // bounds the error of its cosine with the shading normal
+    real strength;      // bounds the error of its strength, relative to full
+    real brightest;     // the largest channel of its color that arrives
+    mask far_off;       // too near or too far away to bound whether it is occluded
+    mask skips_culling; // the errors are too large for cull spheres
+} LightErrors;
+
+// Bounds the error of the light's contribution in every channel, while it shines in full.
+static inline real light_color_error(const Surface *surface, const LightRay *to_light,
+                                     const LightErrors *errors)
 {
     Color3 diffuse = surface->diffuse;
-    real largest = real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
+    real largest = real_max(real_max(diffuse.x, diffuse.y), diffuse.z), brightest = errors->brightest;
     real shiny = brightest * surface->specular;
-    real compared = real_fma((real)(2), surface->normal_error, angle_error + surface->eye_error);
+    real compared = real_fma((real)(2), surface->normal_error, errors->angle + surface->eye_error);
     real highlight = highlight_error(surface, to_light, shiny, compared);
-    real error = real_fma(brightest * largest, facing_error, highlight);
-    return real_fma(real_fma(brightest, largest, shiny), strength_error + COLOR_ROUNDING, error);
+    real error = real_fma(brightest * largest, errors->facing, highlight);
+    return real_fma(real_fma(brightest, largest, shiny), errors->strength + COLOR_ROUNDING, error);
 }
 
-// Sets the shadow ray's bounds, and what is uncertain before it is traced. Returns the lanes whose
-// errors are too large for cull spheres.
+// Returns the bounds of a directional light, which those of other lights extend.
+static inline LightErrors light_errors(const Light *light, const Surface *surface)
+{
+    LightErrors errors;
+    errors.place = surface->place_error;
+    if (HAS_SMOOTH_NORMALS) errors.place = errors.place + surface->lift_error;
+    errors.angle = (real)(16 * UNIT_ROUNDOFF);
+    errors.strength = (real)(0);
+    errors.brightest = (real)(light->color.w);
+    errors.far_off = errors.skips_culling = mask_none();
+    return errors;
+}
+
+// Extends the bounds to those of a light at a distance, a point or spot light, at which its shadow ray ends.
+static inline void light_add_distance_errors(const Light *light, const Surface *surface, LightRay *to_light,
+                                             LightErrors *errors)
+{
+    Ray *shadow_ray = &to_light->shadow_ray;
+    shadow_ray->ends_at_light = true;
+    errors->place = errors->place + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
+    // avoids another root, as a unit vector is off by 14.5 u and a dot product by 3 u
+    if (!HAS_SMOOTH_NORMALS)
+        shadow_ray->length =
+            vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
+    // nothing is known of a light so near that rounding moves it onto the surface, or too far away to square
+    real squared = shadow_ray->squared;
+    mask in_range = (squared >= (real)(SMALLEST_RATIO)) & (squared <= (real)(1 / SMALLEST_RATIO));
+    real nearest = ray_inverse_length(shadow_ray);
+    if (HAS_SMOOTH_NORMALS) { // the light's distance from the position may be less
+        Vector to_position = vector_add(shadow_ray->direction, surface->lift);
+        real inverse = divide_or((real)(1 + 32 * UNIT_ROUNDOFF), vector_norm(to_position), NEVER);
+        nearest = real_max(nearest, inverse);
+    }
+    real relative = lanes_select(in_range, errors->place * nearest, NEVER);
+    errors->far_off = !(relative <= SHADOW_UNCERTAIN_MAX);
+    errors->skips_culling =
+        (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
+    errors->angle = errors->angle + relative + relative;
+    // the distance d is off by at most the part r of it, 2^-6 unless that is uncertain, and
+    // 1 / (a + b d + c d^2) by less than 1 / (1 - r)^2 - 1 < 2.06 r
+    if (HAS_FADING_LIGHTS) {
+        errors->strength = real_fma((real)(2.06f), relative, (real)(32 * UNIT_ROUNDOFF));
+        errors->brightest = (real)(1.04f) * errors->brightest * to_light->fading;
+    }
+}
+
+// The cosine between the geometric normal and the way to a light.
+typedef struct {
+    real cosine, error;
+} LightElevation;
+
+// Returns the light's elevation, and sets to which side of the surface the shadow ray leaves.
+static inline LightElevation light_set_side(const Surface *surface, LightRay *to_light, real angle_error)
+{
+    Ray *shadow_ray = &to_light->shadow_ray;
+    LightElevation light;
+    light.cosine = vector_dot(surface_normal(surface), to_light->direction);
+    light.error = (HAS_TRIANGLES ? surface->geometric_error : surface->normal_error) + angle_error;
+    if (HAS_SMOOTH_NORMALS) { // the shadow ray, not parallel to the light's direction, must leave the surface
+        light.cosine =
+            vector_dot(surface_normal(surface), shadow_ray->direction) * ray_inverse_length(shadow_ray);
+        light.error = light.error + (real)(96 * UNIT_ROUNDOFF);
+        shadow_ray->is_lifted = surface->lift_error > (real)(0);
+        shadow_ray->sinks = shadow_ray->is_lifted & (light.cosine < -light.error);
+    }
+    shadow_ray->leaves_outward = surface->entering & (light.cosine > light.error);
+    return light;
+}
+
+// Returns the largest channel of the diffuse light that the surface reflects, or 1 if that is more.
+static inline real light_brightness(const Surface *surface, real brightest)
+{
+    Color3 diffuse = surface->diffuse;
+    return real_max(brightest * real_max(real_max(diffuse.x, diffuse.y), diffuse.z), (real)(1));
+}
+
+// Removes the lanes that the surface itself hides from the light. Sets those where the light may or may not
+// face the surface. Returns the lanes that certainly face away from the light.
+static inline mask light_set_facing(const Surface *surface, LightRay *to_light, const LightErrors *errors,
+                                    LightVisibility *visibility)
+{
+    const LightElevation light = light_set_side(surface, to_light, errors->angle);
+    mask turned = (to_light->facing < -errors->facing) | !surface_found(surface);
+    mask open = !turned & !(to_light->facing > errors->facing);
+    mask faint = errors->facing * light_brightness(surface, errors->brightest) <= FACING_ERROR_MAX;
+    visibility->facing_uncertain = open & faint;
+    // a light in front of the shading normal but behind the surface is occluded by the surface itself
+    mask behind = HAS_TRIANGLES ? !turned & (light.cosine < -light.error) : mask_none();
+    // unless the ray is lifted beyond its rim
+    if (HAS_SMOOTH_NORMALS) behind = behind & !to_light->shadow_ray.sinks;
+    visibility->lit = visibility->lit & !behind;
+    visibility->uncertain = open & !faint;
+    if (HAS_TRIANGLES)
+        visibility->uncertain =
+            visibility->uncertain | (!turned & !open & (fabs(light.cosine) <= light.error));
+    if (HAS_TRANSMISSION)
+        visibility->uncertain = visibility->uncertain | (behind & (surface->transmission > (real)(0)));
+    return turned;
+}
+
+// Adds the error of a spotlight's strength, and the lanes that may be on either side of its edge, except for
+// those that are `turned` away.
+static inline void light_add_spot_errors(const Light *light, const Surface *surface, const LightRay *to_light,
+                                         mask turned, LightErrors *errors, LightVisibility *visibility)
+{
+    Vector difference = vector_subtract(vector_negate(to_light->direction), vector_of(light->direction));
+    real s = (real)(0.5f) * vector_dot(difference, difference), edge = (real)(light->cone.x);
+    real error = errors->angle + (real)(16 * UNIT_ROUNDOFF);
+    real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
+    mask at_edge = !turned & (fabs(s - edge) <= s_error);
+    real brightness = light_brightness(surface, errors->brightest);
+    mask fades = s_error * (real)(light->cone.z) * brightness <= FACING_ERROR_MAX;
+    if (light->cone.z == 0)
+        fades = mask_none();
+    else // the smooth step's slope is at most 1.5
+        errors->strength = errors->strength + real_min((real)(1.5f * light->cone.z) * s_error, (real)(1));
+    visibility->uncertain = visibility->uncertain | (at_edge & !fades);
+    visibility->facing_uncertain = visibility->facing_uncertain | (at_edge & fades);
+}
+
+// Sets the shadow ray's bounds, and what is uncertain before it is traced. Returns the lanes whose errors are
+// too large for cull spheres.
 static inline mask light_set_errors(const Light *light, const Surface *surface, LightRay *to_light,
                                     LightVisibility *visibility)
 {
     Ray *shadow_ray = &to_light->shadow_ray;
-    const real zero = (real)(0);
-    real angle_error = (real)(16 * UNIT_ROUNDOFF), place_error = surface->place_error;
-    if (HAS_SMOOTH_NORMALS) place_error = place_error + surface->lift_error;
-    real brightest = (real)(light->color.w), strength_error = zero;
-    mask far_off = mask_none(), skips_culling = far_off;
+    LightErrors errors = light_errors(light, surface);
+    if (light->type.x != LIGHT_TYPE_DIRECTIONAL) light_add_distance_errors(light, surface, to_light, &errors);
+    errors.facing = surface->normal_error + errors.angle;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);
-    if (light->type.x != LIGHT_TYPE_DIRECTIONAL) {
-        place_error = place_error + (real)(2 * UNIT_ROUNDOFF) * vector_norm1(vector_of(light->position));
-        // avoids another root, as a unit vector is off by 14.5 u and a dot product by 3 u
-        if (!HAS_SMOOTH_NORMALS)
-            shadow_ray->length =
-                vector_dot(to_light->direction, shadow_ray->direction) * (real)(1 + 24 * UNIT_ROUNDOFF);
-        // nothing is known of a light so near that rounding moves it onto the surface, or too far away to
-        // square
-        real squared = shadow_ray->squared;
-        mask in_range = (squared >= (real)(SMALLEST_RATIO)) & (squared <= (real)(1 / SMALLEST_RATIO));
-        real nearest = ray_inverse_length(shadow_ray);
-        if (HAS_SMOOTH_NORMALS) { // the light's distance from the position may be less
-            Vector to_position = vector_add(shadow_ray->direction, surface->lift);
-            real inverse = divide_or((real)(1 + 32 * UNIT_ROUNDOFF), vector_norm(to_position), NEVER);
-            nearest = real_max(nearest, inverse);
-        }
-        real relative = lanes_select(in_range, place_error * nearest, NEVER);
-        far_off = !(relative <= SHADOW_UNCERTAIN_MAX);
-        skips_culling =
-            (relative > (real)(SHADOW_ERROR_MAX * UNIT_ROUNDOFF)) | (squared * squared < CULLED_DISTANCE_MIN);
-        angle_error = angle_error + relative + relative;
-        // the distance d is off by at most the part r of it, 2^-6 unless that is uncertain, and 1 / (a + b d
-        // + c d^2) by less than 1 / (1 - r)^2 - 1 < 2.06 r
-        if (HAS_FADING_LIGHTS) {
-            strength_error = real_fma((real)(2.06f), relative, (real)(32 * UNIT_ROUNDOFF));
-            brightest = (real)(1.04f) * brightest * to_light->fading;
-        }
-        shadow_ray->ends_at_light = true;
-    }
-    shadow_ray->origin_error = place_error;
+    shadow_ray->origin_error = errors.place;
     shadow_ray->origin_object = surface->object;
-    real geometric = vector_dot(surface_normal(surface), to_light->direction);
-    real facing_error = surface->normal_error + angle_error;
-    real geometric_error = HAS_TRIANGLES ? surface->geometric_error + angle_error : facing_error;
-    if (HAS_SMOOTH_NORMALS) { // the shadow ray, not parallel to the light's direction, must leave the surface
-        geometric =
-            vector_dot(surface_normal(surface), shadow_ray->direction) * ray_inverse_length(shadow_ray);
-        geometric_error = geometric_error + (real)(96 * UNIT_ROUNDOFF);
-        shadow_ray->is_lifted = surface->lift_error > (real)(0);
-        shadow_ray->sinks = shadow_ray->is_lifted & (geometric < -geometric_error);
-    }
-    shadow_ray->leaves_outward = surface->entering & (geometric > geometric_error);
-    mask turned = (to_light->facing < -facing_error) | !surface_found(surface);
-    mask open = !turned & !(to_light->facing > facing_error);
-    Color3 diffuse = surface->diffuse;
-    real reflected = brightest * real_max(real_max(diffuse.x, diffuse.y), diffuse.z);
-    real brightness = real_max(reflected, (real)(1));
-    mask faint = facing_error * brightness <= FACING_ERROR_MAX;
-    visibility->facing_uncertain = open & faint;
-    // a light in front of the shading normal but behind the surface is occluded by the surface itself
-    mask behind = HAS_TRIANGLES ? !turned & (geometric < -geometric_error) : mask_none();
-    if (HAS_SMOOTH_NORMALS) behind = behind & !shadow_ray->sinks; // unless the ray is lifted beyond its rim
-    mask self_uncertain =
-        HAS_TRIANGLES ? !turned & !open & (fabs(geometric) <= geometric_error) : mask_none();
-    self_uncertain = self_uncertain | (open & !faint);
-    if (HAS_TRANSMISSION) self_uncertain = self_uncertain | (behind & (surface->transmission > zero));
-    if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT) {
-        Vector difference = vector_subtract(vector_negate(to_light->direction), vector_of(light->direction));
-        real s = (real)(0.5f) * vector_dot(difference, difference), edge = (real)(light->cone.x);
-        real error = angle_error + (real)(16 * UNIT_ROUNDOFF);
-        real s_error = error * (vector_norm(difference) + error) + (real)(16 * UNIT_ROUNDOFF) * (s + edge);
-        mask at_edge = !turned & (fabs(s - edge) <= s_error);
-        mask fades = s_error * (real)(light->cone.z) * brightness <= FACING_ERROR_MAX;
-        if (light->cone.z == 0)
-            fades = mask_none();
-        else // the smooth step's slope is at most 1.5
-            strength_error = strength_error + real_min((real)(1.5f * light->cone.z) * s_error, (real)(1));
-        self_uncertain = self_uncertain | (at_edge & !fades);
-        visibility->facing_uncertain = visibility->facing_uncertain | (at_edge & fades);
-    }
-    real color_error =
-        light_color_error(brightest, surface, to_light, angle_error, facing_error, strength_error);
-    visibility->color_error = lanes_select(turned, (real)(0), color_error);
-    visibility->lit = visibility->lit & !behind;
-    visibility->uncertain = self_uncertain | (visibility->lit & far_off);
+    const mask turned = light_set_facing(surface, to_light, &errors, visibility);
+    if (HAS_SPOT_LIGHTS && light->type.x == LIGHT_TYPE_SPOT)
+        light_add_spot_errors(light, surface, to_light, turned, &errors, visibility);
+    visibility->color_error = lanes_select(turned, (real)(0), light_color_error(surface, to_light, &errors));
+    visibility->uncertain = visibility->uncertain | (visibility->lit & errors.far_off);
     shadow_ray->active = shadow_ray->active & !visibility->uncertain;
-    return skips_culling;
+    return errors.skips_culling;
 }
 
 // Adds the lanes whose traced shadow ray leaves the light's visibility uncertain.
