@@ -91,22 +91,24 @@ static inline void surface_narrow_place(Surface *surface, mask lanes, real heigh
         lanes_select(lanes, real_min(surface->place_error, (real)(1.01f) * both), surface->place_error);
 }
 
-// Returns the surface points of the triangles of one material among the objects hit that are in the range. In
-// a fine mesh each lane hits a different triangle, so vertices are gathered triangle by triangle, then
-// evaluated for all lanes at once.
-static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
-                                                             const ObjectRange *range, uint material,
-                                                             const Ray *ray, real t, Surface *surface)
+// Triangles of one material, one per lane.
+typedef struct {
+    mask lanes, next_to_eye; // next_to_eye: those with has_eye_height
+    Corners corners, normals, uvs;
+    Vector normal;          // geometric
+    real liftable, density; // liftable: whether the normals are on one side of the triangle, 1 or 0
+    bool smooth;            // some have normals
+} LaneTriangles;
+
+// Returns the triangles of one material among the objects hit that are in the range. In a fine mesh each lane
+// hits a different triangle, so vertices are gathered triangle by triangle.
+static inline LaneTriangles triangles_gather(const Scene *scene, integer objects, const ObjectRange *range,
+                                             uint material)
 {
     const Vector zero = {(real)(0), (real)(0), (real)(0)};
-    LaneSurfacePoints hit;
-    hit.lanes = mask_none();
-    Vector normal = zero;
-    Corners corners = {zero, zero, zero}, normals = corners, uvs = corners;
-    real density = (real)(scene->materials[material].reflection_transmission_ior.w);
-    real liftable = (real)(0);
-    mask next_to_eye = mask_none();
-    bool smooth = false;
+    const Corners none = {zero, zero, zero};
+    const real density = (real)(scene->materials[material].reflection_transmission_ior.w);
+    LaneTriangles hit = {mask_none(), mask_none(), none, none, none, zero, (real)(0), density, false};
     for (;;) {
         scalar_integer object = lanes_smallest(objects);
         if (object == INT_MAX) break;
@@ -117,44 +119,66 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         if (entry.x != TYPE_TRIANGLES || entry.z != material) continue;
         hit.lanes = hit.lanes | same;
         Triangle triangle = scene->triangles[entry.y];
-        if (has_eye_height(triangle.id)) next_to_eye = next_to_eye | same;
-        corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), corners);
-        normal = vector_select(same, triangle_normal(&triangle), normal);
+        if (has_eye_height(triangle.id)) hit.next_to_eye = hit.next_to_eye | same;
+        hit.corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), hit.corners);
+        hit.normal = vector_select(same, triangle_normal(&triangle), hit.normal);
         if (HAS_SMOOTH_NORMALS && triangle.id.y > 0) {
-            smooth = true;
+            hit.smooth = true;
             TriangleNormals own = scene->triangle_normals[triangle.id.y - 1];
-            normals = corners_select(same, corners_of(own.a, own.b, own.c), normals);
-            liftable = lanes_select(same, (real)(own.a.w), liftable);
+            hit.normals = corners_select(same, corners_of(own.a, own.b, own.c), hit.normals);
+            hit.liftable = lanes_select(same, (real)(own.a.w), hit.liftable);
         }
         if (HAS_IMAGES && triangle.id.z > 0) {
             TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
-            uvs = corners_select(same, corners_of(own.a_b, (scalar4)(own.a_b.zw, 0, 0), own.c_density), uvs);
-            density = lanes_select(same, (real)(own.c_density.z), density);
+            const Corners uvs = corners_of(own.a_b, (scalar4)(own.a_b.zw, 0, 0), own.c_density);
+            hit.uvs = corners_select(same, uvs, hit.uvs);
+            hit.density = lanes_select(same, (real)(own.c_density.z), hit.density);
         }
     }
-    TriangleWeights weights;
-    if (HAS_INSTANCES && range->is_instance) {
-        const Instance instance = scene->instances[range->instance];
-        Ray own = instance_ray(&instance, ray);
-        ray_prepare(&own);
-        weights = triangle_weights(corners, &own);
-        hit.point = instance_surface_point(&instance, corners, normal, weights);
-        if (smooth) normals = instance_normals(&instance, normals);
-        if (smooth || HAS_NORMAL_MAPS) corners = instance_corners(&instance, corners);
-        if (HAS_IMAGES)
-            density =
-                real_divide(density, lanes_select(hit.lanes, instance_stretch(&instance, normal), (real)(1)));
-    } else {
-        weights = triangle_weights(corners, ray);
-        hit.point = corners_surface_point(corners, normal, weights, next_to_eye, ray, t);
+    return hit;
+}
+
+// Sets the points of flat triangles and returns their weights. Maps the triangles from an instance's space.
+static inline TriangleWeights triangles_set_point(LaneTriangles *hit, const Scene *scene,
+                                                  const ObjectRange *range, const Ray *ray, real t,
+                                                  SurfacePoint *point)
+{
+    if (!HAS_INSTANCES || !range->is_instance) {
+        const TriangleWeights weights = triangle_weights(hit->corners, ray);
+        *point = corners_surface_point(hit->corners, hit->normal, weights, hit->next_to_eye, ray, t);
+        return weights;
     }
+    const Instance instance = scene->instances[range->instance];
+    Ray own = instance_ray(&instance, ray);
+    ray_prepare(&own);
+    const TriangleWeights weights = triangle_weights(hit->corners, &own);
+    *point = instance_surface_point(&instance, hit->corners, hit->normal, weights);
+    if (hit->smooth) hit->normals = instance_normals(&instance, hit->normals);
+    if (hit->smooth || HAS_NORMAL_MAPS) hit->corners = instance_corners(&instance, hit->corners);
+    const real stretch = instance_stretch(&instance, hit->normal);
+    if (HAS_IMAGES) hit->density = real_divide(hit->density, lanes_select(hit->lanes, stretch, (real)(1)));
+    return weights;
+}
+
+// Returns the surface points of the triangles of one material among the objects hit that are in the range,
+// evaluated for all lanes at once.
+static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
+                                                             const ObjectRange *range, uint material,
+                                                             const Ray *ray, real t, Surface *surface)
+{
+    LaneTriangles triangles = triangles_gather(scene, objects, range, material);
+    LaneSurfacePoints hit;
+    hit.lanes = triangles.lanes;
+    const TriangleWeights weights = triangles_set_point(&triangles, scene, range, ray, t, &hit.point);
+    const Corners corners = triangles.corners, normals = triangles.normals;
     TriangleHeights heights = {(real)(0), (real)(0), (real)(0), (real)(0)};
-    if (smooth) {
+    real side = triangles.liftable;
+    if (triangles.smooth) {
         triangle_smooth(normals, weights, &hit.point);
         mask along = vector_dot(hit.point.normal, ray->direction) > (real)(0),
              opposite = vector_dot(hit.point.normal, hit.point.shading_normal) < (real)(0);
-        liftable = lanes_select(along ^ opposite, -liftable, liftable);
-        heights = triangle_lift(corners, normals, weights, liftable, &hit.point);
+        side = lanes_select(along ^ opposite, -side, side);
+        heights = triangle_lift(corners, normals, weights, side, &hit.point);
     }
 #if IS_CERTIFIED
     const real slimness = triangle_slimness(corners), cosine = least_cosine(hit.point.normal, ray),
@@ -162,16 +186,16 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
                weights_error = triangle_weights_error(corners, ray, cosine);
     triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);
     surface_narrow_place(surface, hit.lanes, height, cosine);
-    if (smooth)
-        triangle_set_lift_error(corners, heights, liftable, slimness, surface->place_error + weights_error,
+    if (triangles.smooth)
+        triangle_set_lift_error(corners, heights, side, slimness, surface->place_error + weights_error,
                                 &hit.point);
     else
         hit.point.height = height;
 #endif
     if (HAS_IMAGES) {
-        Vector uv = triangle_blend(weights, uvs);
-        hit.images.coordinates = (TextureCoordinates){uv.x, uv.y, density};
-        if (HAS_NORMAL_MAPS) hit.images.tangents = triangle_tangents(corners, uvs);
+        Vector uv = triangle_blend(weights, triangles.uvs);
+        hit.images.coordinates = (TextureCoordinates){uv.x, uv.y, triangles.density};
+        if (HAS_NORMAL_MAPS) hit.images.tangents = triangle_tangents(corners, triangles.uvs);
     }
     return hit;
 }
@@ -285,9 +309,8 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     if (HAS_TRANSMISSION) surface->refracted_offset = surface->error + surface->error;
 }
 
-// Returns the surface at the closest hit. Rays of a packet mostly hit one or two objects, so each object is
-// looked up once, for all its lanes.
-static inline Surface surface_interaction(const Scene *scene, const Ray *ray, const Hit *hit)
+// Returns what the ray and its t alone decide of the surface, with the material of the background.
+static inline Surface surface_start(const Ray *ray, const Hit *hit)
 {
     Surface surface;
     surface.object = hit->object;
@@ -308,59 +331,73 @@ static inline Surface surface_interaction(const Scene *scene, const Ray *ray, co
     }
     if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
     if (HAS_AREA_LIGHTS) surface.sample = ray->sample;
+    surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
     if (IS_CERTIFIED) {
         surface_set_place_error(&surface, ray, hit);
         surface.eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
-    }
-    surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
-
-    if (IS_CERTIFIED) {
         surface.uncertain = hit->uncertain;
         if (HAS_CHORDS) surface.chord_end = chord_end_none();
     }
+    return surface;
+}
+
+// Sets the point and the material in the lanes of *pending that hit one of their objects, or triangles of its
+// material, and removes them. Returns false if none is pending. A call would keep the surface out of
+// registers, and Oclgrind does not know what clang makes of an inlined function that returns a struct.
+static inline ALWAYS_INLINE bool surface_add_object(Surface *surface, SurfacePoint *point, integer *pending,
+                                                    const Scene *scene, const Ray *ray, const Hit *hit)
+{
+    const scalar_integer object = lanes_smallest(*pending);
+    if (object == INT_MAX) return false;
+    const ObjectRange range = object_range(scene, (uint)object);
+    uint4 entry = range_entry(scene, &range, object);
+    LaneSurfacePoints found;
+    if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
+        // other precisions pass no pointer, which would keep the surface out of registers
+        found = triangles_surface_point(scene, *pending, &range, entry.z, ray, hit->t,
+                                        IS_CERTIFIED ? surface : 0);
+    } else {
+        found.lanes = *pending == (integer)(object);
+        found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
+    }
+    found.entry = entry;
+    found.uncertain = mask_none();
+    // the exact hit lies as near to the ray's own point as place_error says
+    if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
+#if IS_CERTIFIED
+    if (HAS_CHORDS && entry.x == TYPE_SPHERES) {
+        Sphere sphere = scene->spheres[entry.y];
+        surface_set_chord_end(surface, &sphere, ray, hit, &found);
+    }
+    shape_set_errors(scene, &found, ray, hit->t, surface->place_error);
+    if (!HAS_TRIANGLES || entry.x != TYPE_TRIANGLES)
+        surface_narrow_place(surface, found.lanes & (found.point.height < NEVER), found.point.height,
+                             least_cosine(found.point.normal, ray));
+#endif
+    Material material = scene->materials[entry.z];
+    if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
+        hit_set_images(&found, scene, &material, ray, surface->travelled);
+    if (HAS_NORMAL_MAPS && material.normal_map.x > 0)
+        found.point.shading_normal =
+            normal_tilted(scene, &material, entry.x, &found.images, found.point.shading_normal, found.lanes);
+    // storing the zero in every surface would cost 2 % of a frame's time
+    Color3 color =
+        object_color(scene, &material, &found, ray, IS_CERTIFIED ? surface->place_error : (real)(0));
+    if (IS_CERTIFIED) surface->uncertain = surface->uncertain | (found.lanes & found.uncertain);
+    surface_set_material(surface, scene, found.lanes, &material, color);
+    *pending = lanes_select(found.lanes, NO_OBJECT, *pending);
+    surface_point_replace(point, found.lanes, &found.point);
+    return true;
+}
+
+// Returns the surface at the closest hit. Rays of a packet mostly hit one or two objects, so each object is
+// looked up once, for all its lanes.
+static inline Surface surface_interaction(const Scene *scene, const Ray *ray, const Hit *hit)
+{
+    Surface surface = surface_start(ray, hit);
     SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
     integer pending = lanes_select(hit_found(hit), hit->object, NO_OBJECT);
-    for (;;) {
-        scalar_integer object = lanes_smallest(pending);
-        if (object == INT_MAX) break;
-        const ObjectRange range = object_range(scene, (uint)object);
-        uint4 entry = range_entry(scene, &range, object);
-        LaneSurfacePoints found;
-        if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
-            // other precisions pass no pointer, which would keep the surface out of registers
-            found = triangles_surface_point(scene, pending, &range, entry.z, ray, hit->t,
-                                            IS_CERTIFIED ? &surface : 0);
-        } else {
-            found.lanes = pending == (integer)(object);
-            found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
-        }
-        found.entry = entry;
-        found.uncertain = mask_none();
-        pending = lanes_select(found.lanes, NO_OBJECT, pending);
-        // the exact hit lies as near to the ray's own point as place_error says
-        if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
-#if IS_CERTIFIED
-        if (HAS_CHORDS && entry.x == TYPE_SPHERES) {
-            Sphere sphere = scene->spheres[entry.y];
-            surface_set_chord_end(&surface, &sphere, ray, hit, &found);
-        }
-        shape_set_errors(scene, &found, ray, hit->t, surface.place_error);
-        if (!HAS_TRIANGLES || entry.x != TYPE_TRIANGLES)
-            surface_narrow_place(&surface, found.lanes & (found.point.height < NEVER), found.point.height,
-                                 least_cosine(found.point.normal, ray));
-#endif
-        Material material = scene->materials[entry.z];
-        if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
-            hit_set_images(&found, scene, &material, ray, surface.travelled);
-        if (HAS_NORMAL_MAPS && material.normal_map.x > 0)
-            found.point.shading_normal = normal_tilted(scene, &material, entry.x, &found.images,
-                                                       found.point.shading_normal, found.lanes);
-        surface_point_replace(&point, found.lanes, &found.point);
-        // storing the zero in every surface would cost 2 % of a frame's time
-        Color3 color =
-            object_color(scene, &material, &found, ray, IS_CERTIFIED ? surface.place_error : (real)(0));
-        if (IS_CERTIFIED) surface.uncertain = surface.uncertain | (found.lanes & found.uncertain);
-        surface_set_material(&surface, scene, found.lanes, &material, color);
+    while (surface_add_object(&surface, &point, &pending, scene, ray, hit)) {
     }
     surface_set_point(&surface, &point, ray);
     return surface;
