@@ -1,6 +1,5 @@
 #include "host/cli/image_output.h"
 
-#include "host/api/version.h"
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/memory.h"
@@ -11,8 +10,6 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-
-enum { NOTE_COUNT_MAX = 26 };
 
 const char *const tone_names[TONE_COUNT] = {"none", "filmic"};
 
@@ -55,49 +52,6 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOri
     return output;
 }
 
-typedef struct {
-    Text text;
-    size_t starts[NOTE_COUNT_MAX][2];
-    size_t count;
-} Notes;
-
-static void notes_add(Notes *notes, const char *key, const char *value)
-{
-    notes->starts[notes->count][0] = notes->text.count;
-    text_append(&notes->text, key, strlen(key) + 1);
-    notes->starts[notes->count++][1] = notes->text.count;
-    text_append(&notes->text, value, strlen(value) + 1);
-}
-
-// Returns whether the devices may round differently: the precision is not strict and the devices are not all
-// of one make.
-static bool is_mixed(const ImageOutput *output)
-{
-    const Device *first = renderer_report(output->origin.renderers[0])->device;
-    Rank own = {0};
-    rank_set_device(&own, first);
-    bool differs = false;
-    for (size_t i = 1; i < output->origin.renderer_count; i++) {
-        const Device *device = renderer_report(output->origin.renderers[i])->device;
-        differs =
-            differs || strcmp(device->name, first->name) != 0 || strcmp(device->driver, first->driver) != 0;
-    }
-    for (size_t i = 0; output->origin.ranks && i < output->origin.ranks->remote.count; i++) {
-        const Rank *rank = &output->origin.ranks->items[i];
-        differs = differs || strcmp(rank->device, own.device) != 0 || strcmp(rank->driver, own.driver) != 0;
-    }
-    return differs && output->origin.settings->precision != PRECISION_STRICT;
-}
-
-static const char certified_key[] = "Certified";
-
-static void certified_describe(Text *text, const ImageOutput *output)
-{
-    text_appendf(text, "%llu sample%s re-rendered in double, %llu uncertified",
-                 (unsigned long long)output->rerenders.rerendered, text_plural(output->rerenders.rerendered),
-                 (unsigned long long)output->rerenders.uncertified);
-}
-
 static bool is_exr(const ImageOutput *output)
 {
     return output->format == IMAGE_EXR;
@@ -112,73 +66,6 @@ bool image_output_holds_floats(ImageFormat format)
 static bool keeps_bands(const ImageOutput *output)
 {
     return output->origin.settings->precision == PRECISION_CERTIFIED && is_exr(output);
-}
-
-// Adds notes with the settings that made the image, which suffice to re-render it.
-static void notes_write(Notes *notes, const ImageOutput *output)
-{
-    const RenderSettings *settings = output->origin.settings;
-    const char *slash = strrchr(output->origin.scene_path, '/');
-    Text value = {0};
-#define NOTE(key, ...)                                                                                       \
-    (text_free(&value), text_appendf(&value, __VA_ARGS__), notes_add(notes, key, text_c(&value)))
-// Adds the note with the devices' values.
-#define NOTE_EACH(key, ...)                                                                                  \
-    do {                                                                                                     \
-        text_free(&value);                                                                                   \
-        for (size_t i = 0; i < output->origin.renderer_count; i++) {                                         \
-            const Renderer *renderer = output->origin.renderers[i];                                          \
-            const RenderReport *report = renderer_report(renderer);                                          \
-            (void)report;                                                                                    \
-            text_appendf(&value, "%s", i > 0 ? " + " : "");                                                  \
-            text_appendf(&value, __VA_ARGS__);                                                               \
-        }                                                                                                    \
-        notes_add(notes, key, text_c(&value));                                                               \
-    } while (0)
-    NOTE("Software", "glint %s", glint_version());
-    NOTE("Scene", "%s", slash ? slash + 1 : output->origin.scene_path);
-    if (output->origin.scene->overrides) {
-        text_free(&value);
-        for (const Source *set = output->origin.scene->overrides; set; set = set->next)
-            text_appendf(&value, "%s%s", set->bytes, set->next ? "\n" : "");
-        notes_add(notes, "Set", text_c(&value));
-    }
-    if (output->origin.scene->is_animated) NOTE("Frame", "%g", output->origin.scene->frame);
-    NOTE_EACH("Device", "%s", report->device->name);
-    NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
-    NOTE("Precision", "%s", precision_names[settings->precision]);
-    if (output->options->pilot) {
-        const Pilot *pilot = output->options->pilot;
-        NOTE("Budget", "%g %s", pilot->budget.limit, error_metric_names[pilot->budget.metric]);
-        text_free(&value);
-        pilot_describe(&value, pilot);
-        notes_add(notes, "Pilot", text_c(&value));
-    }
-    if (keeps_bands(output)) {
-        text_free(&value);
-        certified_describe(&value, output);
-        notes_add(notes, certified_key, text_c(&value));
-    }
-    NOTE_EACH("Lanes", "%u", report->lanes);
-    NOTE("Samples", "%u", settings->sample_count);
-    NOTE("Bounces", "%u", settings->bounce_count);
-    if (settings->min_contribution > 0) NOTE("MinContribution", "%.17g", settings->min_contribution);
-    NOTE("Size", "%ux%u", settings->width, settings->height);
-    NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
-         settings->region_height);
-    const bool is_display =
-        output->options->transfer == TRANSFER_SRGB && !image_output_holds_floats(output->format);
-    NOTE("Transfer", "%s", is_display ? "srgb" : "none");
-    if (output->options->exposure != 0) NOTE("Exposure", "%g", output->options->exposure);
-    if (output->options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[output->options->tone]);
-    if (output->options->dither) NOTE("Dither", "ordered");
-    if (output->options->alpha) NOTE("Alpha", "%s", is_exr(output) ? "premultiplied" : "straight");
-    NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
-    if (output->origin.ranks) NOTE("Ranks", "%zu", output->origin.ranks->remote.count + 1);
-    if (is_mixed(output)) NOTE("Comment", "rendered by devices that may round differently");
-#undef NOTE
-#undef NOTE_EACH
-    text_free(&value);
 }
 
 static ImageHeader layer_header(const Film *film, Layer layer)
@@ -265,11 +152,11 @@ static bool image_open(ImageOutput *output, const Film *film, const ImageNote *n
 
 static bool files_open(ImageOutput *output, const Film *band, MessageList *messages)
 {
-    Notes notes = {0};
-    notes_write(&notes, output);
-    ImageNote list[NOTE_COUNT_MAX + 1] = {0};
-    for (size_t i = 0; i < notes.count; i++)
-        list[i] = (ImageNote){notes.text.items + notes.starts[i][0], notes.text.items + notes.starts[i][1]};
+    const RerenderCounts *counts = keeps_bands(output) ? &output->rerenders : NULL;
+    ImageNotes notes = {0};
+    image_notes_add_all(&notes, &output->origin, output->options, output->format, counts);
+    ImageNote list[NOTE_COUNT_MAX + 1];
+    image_notes_list(&notes, list);
     Film film = *band;
     film.height = output->origin.settings->region_height;
     bool opened = image_open(output, &film, list, messages);
@@ -437,7 +324,7 @@ static bool late_notes_write(ImageOutput *output, MessageList *messages)
 {
     if (output->origin.settings->precision != PRECISION_CERTIFIED || keeps_bands(output)) return true;
     Text text = {0};
-    certified_describe(&text, output);
+    counts_describe(&text, &output->rerenders);
     const ImageNote note = {certified_key, text_c(&text)};
     const bool written = image_writer_note(output->image, &note, messages);
     text_free(&text);

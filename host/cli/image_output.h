@@ -2,9 +2,7 @@
 // layers.
 #pragma once
 
-#include "host/cli/image_paths.h"
-#include "host/cli/ranks.h"
-#include "host/render/renderer.h"
+#include "host/cli/image_notes.h"
 
 extern const char *const tone_names[TONE_COUNT];
 
@@ -12,16 +10,6 @@ typedef struct ImageOutput ImageOutput;
 
 // Returns whether the format holds linear floats, not display values.
 bool image_output_holds_floats(ImageFormat format);
-
-// What makes an image, for its notes.
-typedef struct {
-    const char *scene_path;
-    const Scene *scene;
-    const RenderSettings *settings;
-    Renderer *const *renderers;
-    size_t renderer_count;
-    const Ranks *ranks; // render parts of the image; may be NULL
-} ImageOrigin;
 
 // Opens the output. Its files are opened with the first band, and their notes name the devices of all
 // renderers.
