@@ -20,8 +20,9 @@ static void reflected_add(Color *sum, Color color, Vector3 direction, Vector3 no
 // Returns the unit direction of a longitude in turns from -z towards +x, and of a latitude's sine.
 static Vector3 direction_of(double longitude, double sine)
 {
-    const double across = sqrt(1 - sine * sine), angle = longitude * 2 * M_PI;
-    return (Vector3){across * sin(angle), sine, -across * cos(angle)};
+    const double across = sqrt(1 - sine * sine), angle = longitude * 2 * M_PI, x = across * sin(angle),
+                 z = -across * cos(angle);
+    return (Vector3){x, sine, z};
 }
 
 // Returns what a white surface reflects of the sky, by a fine grid of latitudes and longitudes.

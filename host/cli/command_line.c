@@ -308,7 +308,7 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
         const Option *option;
         void *fields;
         bool is_given;
-    } listed[OPTIONS_MAX] = {0};
+    } listed[OPTIONS_MAX + 1] = {0}; // cppcheck does not see that fault never returns
     struct option long_options[OPTIONS_MAX + 2] = {0};
     char letters[2 * OPTIONS_MAX + 2] = "", *letter = letters;
     size_t count = 0;

@@ -182,7 +182,7 @@ void verify_coincident_faces(VerifyRun *run)
         scene_free(&scene);
     }
     for (size_t order = 0; order < 2 * (size_t)COINCIDENT; order++) {
-        size_t place_of[COINCIDENT];
+        size_t place_of[COINCIDENT] = {0};
         Scene scene = verify_scene("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
         scene.objects.count = 0;
         for (size_t k = 0; k < COINCIDENT; k++) {
