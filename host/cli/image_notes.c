@@ -1,5 +1,4 @@
 #include "host/cli/image_notes.h"
-#include "host/cli/image_output.h"
 
 #include "host/api/version.h"
 #include "host/base/numbers.h"
@@ -94,7 +93,7 @@ void image_notes_add_all(ImageNotes *notes, const ImageOrigin *origin, const Ima
     NOTE("Size", "%ux%u", settings->width, settings->height);
     NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
          settings->region_height);
-    const bool is_display = options->transfer == TRANSFER_SRGB && !image_output_holds_floats(format);
+    const bool is_display = options->transfer == TRANSFER_SRGB && !image_format_holds_floats(format);
     NOTE("Transfer", "%s", is_display ? "srgb" : "none");
     if (options->exposure != 0) NOTE("Exposure", "%g", options->exposure);
     if (options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[options->tone]);

@@ -11,8 +11,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const tone_names[TONE_COUNT] = {"none", "filmic"};
-
 typedef struct {
     void *items;
     size_t capacity;
@@ -55,11 +53,6 @@ ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOri
 static bool is_exr(const ImageOutput *output)
 {
     return output->format == IMAGE_EXR;
-}
-
-bool image_output_holds_floats(ImageFormat format)
-{
-    return format == IMAGE_EXR || format == IMAGE_NPY;
 }
 
 // Returns whether all bands must be kept, because EXR's notes precede its pixels and report all counts.

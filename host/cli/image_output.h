@@ -4,12 +4,7 @@
 
 #include "host/cli/image_notes.h"
 
-extern const char *const tone_names[TONE_COUNT];
-
 typedef struct ImageOutput ImageOutput;
-
-// Returns whether the format holds linear floats, not display values.
-bool image_output_holds_floats(ImageFormat format);
 
 // Opens the output. Its files are opened with the first band, and their notes name the devices of all
 // renderers.

@@ -121,7 +121,7 @@ static bool display_fits(const ImageOutputOptions *output)
                                : !output->path || output_is_folder(output->path)
                                    ? IMAGE_PNG
                                    : image_format_of(output->path);
-    if (is_changed && image_output_holds_floats(format))
+    if (is_changed && image_format_holds_floats(format))
         option_usage_fault(
             "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
     else if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)

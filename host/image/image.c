@@ -23,6 +23,8 @@ static const struct {
     [IMAGE_NPY] = {".npy", &npy_encoder},
 };
 
+const char *const tone_names[TONE_COUNT] = {"none", "filmic"};
+
 ImageFormat image_format_of(const char *path)
 {
     const char *ending = strrchr(path, '.');
@@ -30,6 +32,11 @@ ImageFormat image_format_of(const char *path)
     while (format < IMAGE_UNKNOWN && !(ending && strcasecmp(ending, formats[format].ending) == 0))
         format++;
     return format;
+}
+
+bool image_format_holds_floats(ImageFormat format)
+{
+    return format == IMAGE_EXR || format == IMAGE_NPY;
 }
 
 static const Encoder *encoder_of(ImageFormat format)

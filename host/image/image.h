@@ -8,6 +8,7 @@
 
 typedef enum { TRANSFER_SRGB, TRANSFER_NONE } Transfer;
 typedef enum { TONE_NONE, TONE_FILMIC, TONE_COUNT } Tone; // curves from linear values to displayed light
+extern const char *const tone_names[TONE_COUNT];
 typedef enum { IMAGE_PNG, IMAGE_PPM, IMAGE_EXR, IMAGE_NPY, IMAGE_UNKNOWN } ImageFormat;
 
 typedef struct {
@@ -40,6 +41,8 @@ typedef struct {
 enum { IMAGE_LAYERS_MAX = 16 };
 
 ImageFormat image_format_of(const char *path); // by its ending, in any case
+// Returns whether the format holds linear floats, not display values.
+bool image_format_holds_floats(ImageFormat format);
 
 uint64_t image_bytes(const ImageHeader *header); // of its pixels, uncompressed
 
