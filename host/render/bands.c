@@ -163,10 +163,7 @@ typedef struct {
     BandBuffers buffers;
 } PassBand;
 
-typedef struct {
-    PassBand *items;
-    size_t count, capacity;
-} PassBands;
+typedef ARRAY_OF(PassBand) PassBands;
 
 // Renders the first pass, which divides the image into bands, each with separate buffers.
 static bool first_pass(Pass *pass, PassBands *bands, unsigned aovs, const BandQueue *queue)

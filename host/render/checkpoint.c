@@ -46,14 +46,8 @@ struct Checkpoint {
     off_t end; // the end of the last record
     double synced_seconds;
     char *failure; // the first failure, or NULL
-    struct {
-        BandRows *items;
-        size_t count, capacity;
-    } bands;
-    struct {
-        off_t *items; // in the order of `bands`
-        size_t count, capacity;
-    } offsets;
+    ARRAY_OF(BandRows) bands;
+    ARRAY_OF(off_t) offsets; // in the order of `bands`
 };
 
 // Reads bytes at an offset. Returns false at the end of the file, or if it cannot be read.

@@ -1,6 +1,7 @@
 // What a renderer reports: its device, its kernels, and the times of what it did.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/stage.h"
 #include "host/compile/features.h"
 #include "host/opencl/compute.h"
@@ -24,13 +25,7 @@ typedef struct {
     const char *build_options; // the kernels' options, before those of the device
     bool is_out_of_line;       // whether a driver could not build a kernel with its functions inlined
     uint64_t rays[RAYS_COUNT]; // by RAYS_… (kernels/types.h), if settings.counting
-    struct {
-        NamedLaunch *items;
-        size_t count, capacity;
-    } launches, reads;
-    struct {
-        HostSpan *items; // a build has its kernel's name
-        size_t count, capacity;
-    } builds, bands;
-    WorkerShare share; // in the last render
+    ARRAY_OF(NamedLaunch) launches, reads;
+    ARRAY_OF(HostSpan) builds, bands; // a build has its kernel's name
+    WorkerShare share;                // in the last render
 } RenderReport;

@@ -11,10 +11,7 @@ typedef struct {
     uint32_t index; // in the band
 } ListPixel;
 
-typedef struct {
-    ListPixel *items;
-    size_t count, capacity;
-} PixelList;
+typedef ARRAY_OF(ListPixel) PixelList;
 
 // Lists the flagged pixels of a band tile by tile, so that neighbors share packets.
 static PixelList flagged_list(const Pass *pass, BandRows rows, const uint32_t *flags, size_t word_count)

@@ -33,15 +33,9 @@ struct Scheduler {
     uint32_t delivered_rows; // to the sink
     bool is_delivering, has_ended;
     WorkerState *workers;
-    struct {
-        BandRows *items; // neither taken nor rendered, from the top
-        size_t count, capacity;
-    } free_rows;
-    struct {
-        Film *items; // copies, which have no layers if the checkpoint has them
-        size_t count, capacity;
-    } waiting;
-    size_t row_bytes; // memory per row of a waiting band; 0 if none or unknown
+    ARRAY_OF(BandRows) free_rows; // neither taken nor rendered, from the top
+    ARRAY_OF(Film) waiting;       // copies, which have no layers if the checkpoint has them
+    size_t row_bytes;             // memory per row of a waiting band; 0 if none or unknown
 };
 
 bool scheduler_close(Scheduler *scheduler, WorkerShare *shares)

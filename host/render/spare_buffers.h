@@ -3,12 +3,10 @@
 // that for the launch.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/opencl/compute.h"
 
-typedef struct {
-    cl_mem *items;
-    size_t count, capacity;
-} SpareBuffers;
+typedef ARRAY_OF(cl_mem) SpareBuffers;
 
 // Returns the smallest spare buffer of at least `size` bytes, with undefined contents. Creates one if there
 // is none, in place of the largest spare, so that there are never more buffers than were once used together.
