@@ -16,7 +16,7 @@ static void check(GlintStatus status, char **messages)
 
 static int show_progress(void *context, double fraction_done)
 {
-    fprintf(context, "%3.0f %%\n", 100 * fraction_done);
+    fprintf(context, "%3.0f%%\n", 100 * fraction_done);
     return 0;
 }
 

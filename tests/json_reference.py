@@ -285,7 +285,7 @@ MEANINGS = {
     "mrays_per_s": "number; rays of all kinds over the median of `kernel_ms`",
     "traverses_bvh": "boolean",
     "runs[].drift": "object; the last fifth of the runs compared with the first, by processor time on a CPU, else by kernel time",
-    "runs[].drift.verdict": "text; `same` within 5 %, `slower` (a device that is throttled or shared), `faster` or `undecided`",
+    "runs[].drift.verdict": "text; `same` within 5%, `slower` (a device that is throttled or shared), `faster` or `undecided`",
     "runs[].drift.ratio": "number; estimated",
     "runs[].drift.{low,high}": "number or null; of its confidence interval; null: too few runs",
     "runs[].energy": "figure; of frames over a second or more",

@@ -281,7 +281,7 @@ class Accuracy(TestCase):
         errors = terminal_run(f"accuracy {self.spheres} --size 1280x800 --bounces 16 --seconds 2.6 --precision single,double --json")
         # the time left is known after two seconds, which may be at any step
         for step in "measuring rows 1 to 2 of 2", r"[a-z]+ (the reference for )?rows? [^\r]*, \d+ seconds? left", "comparing row 2 of 2":
-            self.assertRegex(errors, rf"\r *\d+ % \x1b\[K {step}")
+            self.assertRegex(errors, rf"\r *\d+% \x1b\[K {step}")
 
     def test_budgets(self):
         """Budgets are reported in the list's order. All that err exceed the smallest, and the fastest keeps the largest."""

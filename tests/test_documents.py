@@ -223,11 +223,11 @@ CLAIMS = [  # N stands for a number
      lambda: (frame("spheres-1000000"), frame("bunny-1000000"))),
     ("docs/measurements/README.md", r"Among N million rays of all precisions N has a wrong hit or miss outside its band: at `(\w+)`, at a (\w+) "
                                     "N radii away", ladder_wrong),
-    ("docs/measurements/README.md", "At most N % of a shape's rays from one distance lie in the band up to 100,000 radii, N % at a million",
+    ("docs/measurements/README.md", "At most N% of a shape's rays from one distance lie in the band up to 100,000 radii, N% at a million",
      lambda: (ladder_open(lambda d: d <= 1e5), ladder_open(lambda d: d == 1e6))),
     ("docs/measurements/README.md", "The torus at its two nearest distances needs up to N times its bound", torus_beyond_its_bound),
-    ("docs/measurements/README.md", "are off by N ulp or more from a hundred radii on, and their hits and misses are wrong for N to N % of the rays at "
-                                    "10,000 and 100,000 radii; those of tori for N to N % from 100 to 100,000", textbook),
+    ("docs/measurements/README.md", "are off by N ulp or more from a hundred radii on, and their hits and misses are wrong for N to N% of the rays at "
+                                    "10,000 and 100,000 radii; those of tori for N to N% from 100 to 100,000", textbook),
     ("docs/measurements/README.md", "In trials of N scenes and N budgets every image keeps its budget. The N pilots took N s in the median.", budget_pilots),
     ("docs/measurements/README.md", "Where `double` takes more than 0.15 s, N of N trials found a faster precision and took N of the time of `double` in "
                                     "the median; the other N took N of it.", lambda: budget_long(0.15)),

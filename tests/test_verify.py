@@ -124,7 +124,7 @@ class Verify(VerifyTestCase):
     def test_progress(self):
         """A terminal shows the case and how many there are."""
         errors = terminal_run("verify S5 S6 P4 P5 C7 T2 M3 --precision single --quick --json")
-        self.assertRegex(errors, r"\r *\d+ % \x1b\[K [A-Z]\d at single, case \d of 7")
+        self.assertRegex(errors, r"\r *\d+% \x1b\[K [A-Z]\d at single, case \d of 7")
 
     def test_unknown_case(self):
         self.refuses("verify S1 S99", 'no case "S99".* S1, S2, ')

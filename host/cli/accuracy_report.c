@@ -255,7 +255,7 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
         for (size_t k = 0; k < scene->variant_count; k++)
             variant_print(&scene->variants[k], stream);
         kernels_print(scene, stream);
-        fprintf(stream, "  fastest rows, with intervals of %g %% confidence for all together:\n",
+        fprintf(stream, "  fastest rows, with intervals of %g%% confidence for all together:\n",
                 100 * comparison_confidence);
         for (size_t k = 0; k < scene->recommendation_count; k++) {
             Text sentence = {0};

@@ -298,7 +298,7 @@ static Json *against_json(const Against *against, const Device *device)
 
 static void against_print_text(const Against *against, const Device *device)
 {
-    printf("%s, %s %s\nagainst %s; intervals of %g %% confidence\n\n", device->name, device->platform_name,
+    printf("%s, %s %s\nagainst %s; intervals of %g%% confidence\n\n", device->name, device->platform_name,
            device->driver, against->options->other, 100 * comparison_confidence);
     passports_remark(device, stdout);
     for (size_t i = 0; i < against->set->count; i++) {

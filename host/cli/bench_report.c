@@ -35,13 +35,13 @@ static void ratio_print(const char *of_what, const Comparison *result, FILE *str
         fputs(": too noisy to decide\n", stream);
         break;
     case VERDICT_SAME:
-        fprintf(stream, ": same within %.1f %%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
+        fprintf(stream, ": same within %.1f%%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
         break;
     case VERDICT_SLOWER:
-        fprintf(stream, ": slower by at least %.1f %%\n", 100 * (result->low - 1));
+        fprintf(stream, ": slower by at least %.1f%%\n", 100 * (result->low - 1));
         break;
     case VERDICT_FASTER:
-        fprintf(stream, ": faster by at least %.1f %%\n", 100 * (1 / result->high - 1));
+        fprintf(stream, ": faster by at least %.1f%%\n", 100 * (1 / result->high - 1));
         break;
     }
 }

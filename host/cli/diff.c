@@ -256,7 +256,7 @@ static void differences_print(const DiffOptions *options, const ComparedImages *
     const ImageMetrics *metrics = &comparison->metrics;
     const ErrorSummary *linear = &metrics->linear;
     const Image *reference = &comparison->reference;
-    printf("  %-10s max %.4g, RMSE %.4g, bias %+.4g, 99.9 %% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
+    printf("  %-10s max %.4g, RMSE %.4g, bias %+.4g, 99.9%% within %.4g, relMSE %.4g, PSNR %.2f dB\n",
            reference->data ? "data" : "light", linear->largest, linear->rmse, linear->bias,
            linear->percentile_999, linear->rel_mse, linear->psnr);
     if (reference->data && metrics->has_ulp) printf("  ulp        at most %.4g\n", metrics->largest_ulp);

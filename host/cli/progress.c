@@ -77,7 +77,7 @@ static const double SHOW_SECONDS = 0.25;
 static void line_show(Progress *progress, double fraction_done, double left)
 {
     progress->shown_seconds = clock_seconds();
-    fprintf(stderr, "\r%3.0f %% \033[K", 100 * fraction_done);
+    fprintf(stderr, "\r%3.0f%% \033[K", 100 * fraction_done);
     if (progress->step[0] != '\0') fprintf(stderr, " %s", progress->step);
     if (left >= 0)
         fprintf(stderr, "%s %s left ", progress->step[0] != '\0' ? "," : "", text_duration(left).text);

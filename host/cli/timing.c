@@ -85,7 +85,7 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
 // Prints a device's share of the rows and of the time if several devices render.
 static void share_print(const WorkerShare *share, const RenderSettings *settings)
 {
-    fprintf(stderr, "  %.1f %% of the rows in %u %s; busy %.3f ms, idle %.3f ms\n",
+    fprintf(stderr, "  %.1f%% of the rows in %u %s; busy %.3f ms, idle %.3f ms\n",
             100.0 * share->rows / settings->region_height, share->bands, share->bands == 1 ? "band" : "bands",
             1e3 * share->busy_seconds, 1e3 * share->idle_seconds);
 }

@@ -8,7 +8,7 @@
 typedef struct {
     size_t count;               // values compared
     double largest, rmse, bias; // bias is the mean difference with its sign
-    double percentile_999;      // the smallest magnitude that is at least as large as 99.9 % of them
+    double percentile_999;      // the smallest magnitude that is at least as large as 99.9% of them
     double psnr;                // dB for a peak of 1; infinite if nothing differs
     // The mean of difference^2 / (reference^2 + 0.01) (Rousselle, Knaus, Zwicker: "Adaptive Sampling and
     // Reconstruction using Greedy Error Minimization", 2011)

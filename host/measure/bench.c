@@ -38,7 +38,7 @@ void bench_add_launch(BenchTimes *times, const LaunchTime *launch)
         if (!launch->trusted)
             times->clock_fault = launch_clock_fault(launch);
         else if (clock_drifts(times, launch))
-            times->clock_fault = "the device's clock drifts from the host's by more than 1 %";
+            times->clock_fault = "the device's clock drifts from the host's by more than 1%";
     }
     times->run_event += launch->event_seconds;
     times->run_host += launch->host_seconds;

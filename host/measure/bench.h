@@ -21,7 +21,7 @@ typedef struct {
     Series event, host;         // seconds of a run's launches, by their events and by the host's clock
     const char *clock_fault;    // why some launch shows that the events' times are unreliable, or NULL
     double run_event, run_host; // sums over the current run
-    // Extremes over the launches so far of the device's clock minus the host's, if the device's ran 1 %
+    // Extremes over the launches so far of the device's clock minus the host's, if the device's ran 1%
     // faster or slower.
     double least_fast_start, greatest_slow_end;
 } BenchTimes;

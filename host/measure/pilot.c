@@ -253,11 +253,10 @@ void pilot_describe(Text *text, const Pilot *pilot)
                      error_metric_names[budget->metric], budget->limit);
     } else if (budget->metric == ERROR_MAX) {
         text_appendf(
-            text,
-            "largest error in the sample %.2g; with %g %% confidence at most %.2g %% of pixels exceed %g",
+            text, "largest error in the sample %.2g; with %g%% confidence at most %.2g%% of pixels exceed %g",
             verdict->error, percent, 100 * verdict->bound, budget->limit);
     } else {
-        text_appendf(text, "%s %sat most %.2g with %g %% confidence", error_metric_names[budget->metric],
+        text_appendf(text, "%s %sat most %.2g with %g%% confidence", error_metric_names[budget->metric],
                      budget->metric == ERROR_FLIP ? "estimated as " : "", verdict->bound, percent);
     }
     text_appendf(text, "; %zu of %zu pixels", pilot->pixels, pilot->image_pixels);

@@ -9,8 +9,8 @@ const kinds = [
   { name: "object", title: "Wrong object", unit: "pixels", error: (errors) => both(errors.object) },
   { name: "shadow", title: "Wrong shadow", unit: "pixels, per light", error: (errors) => both(errors.shadow) },
   { name: "path", title: "Wrong path", unit: "pixels", error: (errors) => both(errors.path) },
-  { name: "t", title: "Distance", unit: "relative, 99.9 % within", error: (errors) => errors.t.relative?.p99_9 },
-  { name: "normal", title: "Normal", unit: "radians, 99.9 % within", error: (errors) => errors.normal.p99_9 },
+  { name: "t", title: "Distance", unit: "relative, 99.9% within", error: (errors) => errors.t.relative?.p99_9 },
+  { name: "normal", title: "Normal", unit: "radians, 99.9% within", error: (errors) => errors.normal.p99_9 },
 ];
 
 // Returns the measured variants that have this kind's error.

@@ -5,7 +5,7 @@ const { reports, rows, columns, constants, confidence, tolerance } =
   JSON.parse(document.getElementById("report").textContent);
 const hasRatios = reports.length > 1;
 const find = (selector) => document.querySelector(selector);
-const percent = (ratio) => `${formatNumber(100 * ratio)}\u00A0%`.replace(/\.0+(?=\D)/, "");
+const percent = (ratio) => `${formatNumber(100 * ratio)}%`.replace(/\.0+(?=\D)/, "");
 const reportClass = (index) => `report-${index % 6}`;
 const letterOf = (index) => String.fromCharCode(65 + index);
 const drawLetter = (index) => html("span", { class: `letter ${reportClass(index)}` }, letterOf(index));

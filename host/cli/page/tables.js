@@ -37,13 +37,13 @@ const tables = [
   { caption: "Errors of the other pixels", columns: [
     number("Shading, RMSE", ({ errors }) => errors.shading.rmse),
     number("Shading, largest", ({ errors }) => errors.shading.max),
-    number("Shading, 99.9 %", ({ errors }) => errors.shading.p99_9),
+    number("Shading, 99.9%", ({ errors }) => errors.shading.p99_9),
     number("Shading, bias", ({ errors }) => errors.shading.bias),
-    number("Distance, 99.9 %", ({ errors }) => errors.t.relative?.p99_9),
+    number("Distance, 99.9%", ({ errors }) => errors.t.relative?.p99_9),
     number("Distance, largest", ({ errors }) => errors.t.relative?.max),
-    number("Distance, 99.9 %, ulp", ({ errors }) => errors.t.ulps?.p99_9),
+    number("Distance, 99.9%, ulp", ({ errors }) => errors.t.ulps?.p99_9),
     number("Distance, largest, ulp", ({ errors }) => errors.t.ulps?.max),
-    number("Normal, 99.9 %", ({ errors }) => errors.normal.p99_9),
+    number("Normal, 99.9%", ({ errors }) => errors.normal.p99_9),
     number("Normal, largest", ({ errors }) => errors.normal.max),
   ] },
   { caption: "The whole image", columns: [
