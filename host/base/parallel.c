@@ -1,42 +1,41 @@
 #include "host/base/parallel.h"
 
 #include <pthread.h>
-#include <stdbool.h>
 #include <unistd.h>
 
 enum { THREADS_MAX = 64 };
 
 typedef struct {
+    pthread_t thread;
     void (*work)(void *context, size_t begin, size_t end);
     void *context;
     size_t begin, end;
 } IndexRange;
 
-static void *range_run(void *context)
+static void *range_run(void *index_range)
 {
-    const IndexRange *range = context;
+    const IndexRange *range = index_range;
     range->work(range->context, range->begin, range->end);
     return NULL;
 }
 
-void parallel_run(size_t count, size_t least, void (*work)(void *context, size_t begin, size_t end),
+void parallel_run(size_t count, size_t grain_size, void (*work)(void *context, size_t begin, size_t end),
                   void *context)
 {
-    long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    size_t threads = cores < 1 ? 1 : cores > THREADS_MAX ? THREADS_MAX : (size_t)cores;
-    if (threads > count / least) threads = count < least ? 1 : count / least;
+    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    size_t range_count = cores < 1 ? 1 : cores > THREADS_MAX ? THREADS_MAX : (size_t)cores;
+    if (range_count > count / grain_size) range_count = count < grain_size ? 1 : count / grain_size;
     IndexRange ranges[THREADS_MAX];
-    pthread_t others[THREADS_MAX];
-    bool started[THREADS_MAX];
-    for (size_t i = 1; i < threads; i++) {
-        ranges[i] = (IndexRange){work, context, count * i / threads, count * (i + 1) / threads};
-        started[i] = pthread_create(&others[i], NULL, range_run, &ranges[i]) == 0;
+    size_t started = 0, begin = 0;
+    while (started + 1 < range_count) {
+        IndexRange *range = &ranges[started];
+        *range = (IndexRange){
+            .work = work, .context = context, .begin = begin, .end = count * (started + 1) / range_count};
+        if (pthread_create(&range->thread, NULL, range_run, range) != 0) break;
+        begin = range->end;
+        started++;
     }
-    work(context, 0, count / threads);
-    for (size_t i = 1; i < threads; i++) {
-        if (started[i])
-            pthread_join(others[i], NULL);
-        else
-            range_run(&ranges[i]);
-    }
+    work(context, begin, count); // the last range, and those whose threads could not be started
+    for (size_t i = 0; i < started; i++)
+        pthread_join(ranges[i].thread, NULL);
 }
