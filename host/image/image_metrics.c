@@ -2,6 +2,7 @@
 
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
+#include "host/base/text.h"
 #include "host/image/flip.h"
 #include "host/image/srgb.h"
 #include <float.h>
@@ -55,10 +56,10 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
 {
     if (reference->width != test->width || reference->height != test->height ||
         reference->channels != test->channels)
-        return message_error(messages, "the images differ in size: %ux%u with %u %s, and %ux%u with %u",
+        return message_error(messages,
+                             "the images differ in size: %ux%u with %u channel%s, and %ux%u with %u",
                              reference->width, reference->height, reference->channels,
-                             reference->channels == 1 ? "channel" : "channels", test->width, test->height,
-                             test->channels);
+                             text_plural(reference->channels), test->width, test->height, test->channels);
     if (strcmp(image_kind(reference), image_kind(test)) != 0)
         return message_error(messages, "the images differ in kind: the first holds %s, the second %s",
                              image_kind(reference), image_kind(test));
@@ -75,32 +76,28 @@ static double *linear_values(const Image *image)
     return values;
 }
 
-void image_errors(const Image *reference, const Image *test, float *errors)
+// Returns the largest difference among a pixel's channels. It is infinite where one value is finite and the
+// other is not, and 0 where neither is.
+static float pixel_error(const double *expected, const double *found, uint32_t channels)
 {
-    double *expected = linear_values(reference), *found = linear_values(test);
-    for (size_t i = 0; i < pixel_count(reference); i++) {
-        errors[i] = 0;
-        for (size_t k = i * reference->channels; k < (i + 1) * reference->channels; k++) {
-            if (isfinite(expected[k]) && isfinite(found[k]))
-                errors[i] = fmaxf(errors[i], (float)fabs(found[k] - expected[k]));
-            else if (isfinite(expected[k]) || isfinite(found[k]))
-                errors[i] = INFINITY;
-        }
+    float error = 0;
+    for (uint32_t i = 0; i < channels; i++) {
+        if (isfinite(expected[i]) && isfinite(found[i]))
+            error = fmaxf(error, (float)fabs(found[i] - expected[i]));
+        else if (isfinite(expected[i]) || isfinite(found[i]))
+            error = INFINITY;
     }
-    free(expected);
-    free(found);
+    return error;
 }
 
-static size_t nonfinite_pixels(const Image *image)
+void image_errors(const Image *reference, const Image *test, float *errors)
 {
-    size_t count = 0;
-    for (size_t i = 0; i < pixel_count(image); i++) {
-        bool finite = true;
-        for (size_t k = 0; k < image->channels; k++)
-            finite &= isfinite(image_value(image, i * image->channels + k)) != 0;
-        count += !finite;
-    }
-    return count;
+    const uint32_t channels = reference->channels;
+    double *expected = linear_values(reference), *found = linear_values(test);
+    for (size_t i = 0; i < pixel_count(reference); i++)
+        errors[i] = pixel_error(expected + i * channels, found + i * channels, channels);
+    free(expected);
+    free(found);
 }
 
 static uint32_t display_step(const Image *image, size_t i)
@@ -149,16 +146,35 @@ static void flip_compare(ImageMetrics *metrics, const Image *reference, const Im
     free(map);
 }
 
-static void worst_find(ImageMetrics *metrics, const Image *reference, const Image *test)
+static bool is_finite_pixel(const double *values, uint32_t channels)
 {
-    float *errors = memory_allocate(pixel_count(reference), sizeof *errors);
-    image_errors(reference, test, errors);
+    for (uint32_t i = 0; i < channels; i++)
+        if (!isfinite(values[i])) return false;
+    return true;
+}
+
+// Compares linear light, or data as they are.
+static void light_compare(ImageMetrics *metrics, const Image *reference, const Image *test)
+{
+    const uint32_t channels = reference->channels;
+    double *expected = linear_values(reference), *found = linear_values(test);
+    metrics->linear = error_summarize(expected, found, value_count(reference));
     size_t worst = 0;
-    for (size_t i = 1; i < pixel_count(reference); i++)
-        if (errors[i] > errors[worst]) worst = i;
+    float worst_error = 0;
+    for (size_t i = 0; i < pixel_count(reference); i++) {
+        const double *pixel = expected + i * channels, *other = found + i * channels;
+        metrics->nonfinite_reference += !is_finite_pixel(pixel, channels);
+        metrics->nonfinite_test += !is_finite_pixel(other, channels);
+        const float error = pixel_error(pixel, other, channels);
+        if (error > worst_error) {
+            worst = i;
+            worst_error = error;
+        }
+    }
     metrics->worst_x = (uint32_t)(worst % reference->width);
     metrics->worst_y = (uint32_t)(worst / reference->width);
-    free(errors);
+    free(expected);
+    free(found);
 }
 
 static bool is_same_number(double a, double b)
@@ -194,17 +210,10 @@ static void values_compare(ImageMetrics *metrics, const Image *reference, const 
 ImageMetrics image_metrics(const Image *reference, const Image *test)
 {
     ImageMetrics metrics = {
-        .nonfinite_reference = nonfinite_pixels(reference),
-        .nonfinite_test = nonfinite_pixels(test),
         .has_color = !reference->data &&
-                     (reference->channels == 3 || (reference->channels == 1 && reference->display)),
-    };
+                     (reference->channels == 3 || (reference->channels == 1 && reference->display))};
     values_compare(&metrics, reference, test);
-    double *expected = linear_values(reference), *found = linear_values(test);
-    metrics.linear = error_summarize(expected, found, value_count(reference));
-    free(expected);
-    free(found);
-    worst_find(&metrics, reference, test);
+    light_compare(&metrics, reference, test);
     if (metrics.has_color) {
         steps_compare(&metrics, reference, test);
         flip_compare(&metrics, reference, test);
