@@ -135,6 +135,13 @@ void json_int64(Json *json, const char *key, int64_t value)
     json_word(json, key, word);
 }
 
+void json_count(Json *json, const char *key, uint64_t value)
+{
+    char word[32];
+    snprintf(word, sizeof word, "%" PRIu64, value);
+    json_word(json, key, word);
+}
+
 void json_bool(Json *json, const char *key, bool value)
 {
     json_word(json, key, value ? "true" : "false");

@@ -77,7 +77,7 @@ static void image_json(Json *json, const AccuracyScene *scene, float *values)
     json_begin_object(json, NULL);
     json_begin_array(json, "variants");
     for (size_t i = 0; i < scene->variant_count; i++)
-        if (same_image(scene, scene->variants[i].image, values)) json_int64(json, NULL, (int64_t)i);
+        if (same_image(scene, scene->variants[i].image, values)) json_count(json, NULL, i);
     json_end(json);
     uint8_t *colors = memory_allocate(count, 1);
     transfer_quantize(colors, values, count, scene->display_values ? TRANSFER_NONE : TRANSFER_SRGB, 8);

@@ -305,8 +305,8 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
         json_int64(json, "samples", scene->reference.samples);
         hash_json(json, "kernel_hash", scene->reference.kernel_hash);
     }
-    json_int64(json, "nonfinite", (int64_t)scene->reference.nonfinite);
-    json_int64(json, "negative", (int64_t)scene->reference.negative);
+    json_count(json, "nonfinite", scene->reference.nonfinite);
+    json_count(json, "negative", scene->reference.negative);
     saved_json(json, report, index, NULL);
     json_end(json);
 
@@ -314,21 +314,21 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
     if (scene->reference.file) {
         unavailable_json(json, "the reference has colors only");
     } else {
-        json_int64(json, "silhouette", (int64_t)scene->edges.silhouette_pixels);
+        json_count(json, "silhouette", scene->edges.silhouette_pixels);
         json_begin_array(json, "shadow");
         for (uint32_t i = 0; i < scene->light_count; i++)
-            json_int64(json, NULL, (int64_t)scene->edges.shadow_edge_pixels[i]);
+            json_count(json, NULL, scene->edges.shadow_edge_pixels[i]);
         json_end(json);
-        json_int64(json, "path", (int64_t)scene->edges.path_pixels);
+        json_count(json, "path", scene->edges.path_pixels);
     }
     json_end(json);
 }
 
-static void count_json(Json *json, const char *key, EdgeCount count)
+static void edge_count_json(Json *json, const char *key, EdgeCount count)
 {
     json_begin_object(json, key);
-    json_int64(json, "edge", (int64_t)count.edge);
-    json_int64(json, "away", (int64_t)count.away);
+    json_count(json, "edge", count.edge);
+    json_count(json, "away", count.away);
     json_end(json);
 }
 
@@ -342,12 +342,12 @@ static void extremes_json(Json *json, const char *key, ErrorExtremes extremes)
 
 static void kinds_json(Json *json, const AccuracyErrors *errors)
 {
-    count_json(json, "object", errors->object);
-    count_json(json, "shadow", errors->shadow);
-    count_json(json, "path", errors->path);
+    edge_count_json(json, "object", errors->object);
+    edge_count_json(json, "shadow", errors->shadow);
+    edge_count_json(json, "path", errors->path);
     if (errors->shading_pixels > 0) {
         json_begin_object(json, "shading");
-        json_int64(json, "pixels", (int64_t)errors->shading_pixels);
+        json_count(json, "pixels", errors->shading_pixels);
         json_number(json, "max", errors->shading.largest);
         json_number(json, "rmse", errors->shading.rmse);
         json_number(json, "p99_9", errors->shading.percentile_999);
@@ -358,12 +358,12 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
     }
     if (errors->surface_pixels > 0) {
         json_begin_object(json, "t");
-        json_int64(json, "pixels", (int64_t)errors->surface_pixels);
+        json_count(json, "pixels", errors->surface_pixels);
         extremes_json(json, "relative", errors->t_relative);
         extremes_json(json, "ulps", errors->t_ulps);
         json_end(json);
         json_begin_object(json, "normal");
-        json_int64(json, "pixels", (int64_t)errors->surface_pixels);
+        json_count(json, "pixels", errors->surface_pixels);
         extremes_json(json, NULL, errors->normal);
         json_end(json);
     } else {
@@ -375,8 +375,8 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
 static void errors_json(Json *json, const AccuracyErrors *errors)
 {
     json_begin_object(json, "errors");
-    json_int64(json, "nonfinite", (int64_t)errors->nonfinite);
-    json_int64(json, "negative", (int64_t)errors->negative);
+    json_count(json, "nonfinite", errors->nonfinite);
+    json_count(json, "negative", errors->negative);
     if (errors->why_colors_only)
         for (unsigned measure = 0; measure < ACCURACY_IMAGE; measure++)
             absent_json(json, accuracy_measure_names[measure], errors->why_colors_only);
@@ -388,8 +388,8 @@ static void errors_json(Json *json, const AccuracyErrors *errors)
     json_number(json, "psnr", errors->image.psnr);
     json_number(json, "rel_mse", errors->image.rel_mse);
     json_number(json, "srgb_psnr", display->srgb_psnr);
-    json_int64(json, "off_by_1", (int64_t)display->off_by_1);
-    json_int64(json, "off_by_more", (int64_t)display->off_by_more);
+    json_count(json, "off_by_1", display->off_by_1);
+    json_count(json, "off_by_more", display->off_by_more);
     json_number(json, "flip_mean", display->flip_mean);
     json_number(json, "flip_max", display->flip_max);
     json_end(json);
@@ -471,7 +471,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
     } else {
         const AccuracyVariant *variant = &scene->variants[pick->variant];
         Figure error = accuracy_figure(variant, pick->measure);
-        json_int64(json, "variant", (int64_t)pick->variant);
+        json_count(json, "variant", pick->variant);
         if (error.why_not)
             json_none(json, "error");
         else
@@ -482,7 +482,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
             const Comparison *time = &pick->times[i];
             if (time->ratio == 0) continue;
             json_begin_object(json, NULL);
-            json_int64(json, "variant", (int64_t)i);
+            json_count(json, "variant", i);
             json_bool(json, "ties", accuracy_ties(pick, i));
             json_number(json, "ratio", time->ratio);
             json_number(json, "low", time->low);
@@ -504,7 +504,7 @@ static void scene_json(Json *json, const AccuracyReport *report, size_t index)
     json_begin_object(json, NULL);
     json_text(json, "scene", scene->path);
     size_json(json, scene->width, scene->height);
-    json_int64(json, "pixels", (int64_t)scene->width * scene->height);
+    json_count(json, "pixels", (uint64_t)scene->width * scene->height);
     json_int64(json, "bounces", scene->bounce_count);
     json_int64(json, "lights", scene->light_count);
     reference_json(json, report, index);

@@ -142,16 +142,16 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
 {
     json_begin_object(json, NULL);
     json_text(json, "precision", precision_names[precision]);
-    json_int64(json, "compared", (int64_t)errors->compared);
+    json_count(json, "compared", errors->compared);
     json_begin_object(json, "wrong");
-    json_int64(json, "object", (int64_t)errors->object);
-    json_int64(json, "shadow", (int64_t)errors->shadow);
-    json_int64(json, "path", (int64_t)errors->path);
-    json_int64(json, "color", (int64_t)errors->color);
+    json_count(json, "object", errors->object);
+    json_count(json, "shadow", errors->shadow);
+    json_count(json, "path", errors->path);
+    json_count(json, "color", errors->color);
     json_number(json, "margin", errors->margin);
     json_end(json);
     json_begin_object(json, "color");
-    json_int64(json, "pixels", (int64_t)errors->colors);
+    json_count(json, "pixels", errors->colors);
     json_number(json, "bound", CERTIFIED_COLOR_ERROR);
     json_number(json, "max_right", errors->right_color);
     json_number(json, "max_wrong", errors->wrong_color);
@@ -159,15 +159,15 @@ static void row_json(Json *json, Precision precision, const CertifyErrors *error
     json_int64(json, "y", errors->worst[1]);
     json_end(json);
     if (precision == PRECISION_CERTIFIED) {
-        json_int64(json, "wrong_decided", (int64_t)errors->wrong_decided);
+        json_count(json, "wrong_decided", errors->wrong_decided);
         json_text(json, "claim", errors->wrong_decided > 0 ? "broken" : "kept");
-        json_int64(json, "unconfirmed", (int64_t)errors->unconfirmed);
-        json_int64(json, "contradicted", (int64_t)errors->contradicted);
+        json_count(json, "unconfirmed", errors->unconfirmed);
+        json_count(json, "contradicted", errors->contradicted);
         json_begin_object(json, "uncertified");
-        json_int64(json, "pixels", (int64_t)uncertified->count);
-        json_int64(json, "examined", (int64_t)uncertified->examined);
-        json_int64(json, "witnessed", (int64_t)uncertified->witnessed);
-        json_int64(json, "close", (int64_t)uncertified->close);
+        json_count(json, "pixels", uncertified->count);
+        json_count(json, "examined", uncertified->examined);
+        json_count(json, "witnessed", uncertified->witnessed);
+        json_count(json, "close", uncertified->close);
         json_end(json);
     }
     json_end(json);
@@ -189,13 +189,13 @@ static Json *certify_json(const Certification *certification)
     size_json(json, sample->width, sample->height);
     json_int64(json, "bounces", certification->options->common.bounce_count);
     json_number(json, "min_contribution", certification->options->common.min_contribution);
-    json_int64(json, "pixels", (int64_t)sample->count);
+    json_count(json, "pixels", sample->count);
     json_int64(json, "reference_bits", QUAD_BITS);
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
     size_t uncertain = 0;
     for (size_t i = 0; i < sample->count; i++)
         uncertain += reference_is_uncertain(&sample->pixels[i]);
-    json_int64(json, "reference_uncertain", (int64_t)uncertain);
+    json_count(json, "reference_uncertain", uncertain);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured)

@@ -143,15 +143,15 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
     json_bool(json, "valid", loaded);
     if (loaded) {
         SceneFacts facts = facts_of(scene);
-        json_int64(json, "objects", (int64_t)scene->objects.count);
+        json_count(json, "objects", scene->objects.count);
         json_begin_object(json, "shapes");
         for (size_t type = 0; type < SHAPE_COUNT; type++)
-            if (type != SHAPE_OVAL) json_int64(json, shape_names[type], (int64_t)facts.shapes[type]);
+            if (type != SHAPE_OVAL) json_count(json, shape_names[type], facts.shapes[type]);
         json_end(json);
-        json_int64(json, "mesh_triangles", (int64_t)facts.mesh_triangle_count);
-        json_int64(json, "unbounded", (int64_t)facts.unbounded_count);
-        json_int64(json, "lights", (int64_t)scene->lights.count);
-        json_int64(json, "materials", (int64_t)scene->materials.count);
+        json_count(json, "mesh_triangles", facts.mesh_triangle_count);
+        json_count(json, "unbounded", facts.unbounded_count);
+        json_count(json, "lights", scene->lights.count);
+        json_count(json, "materials", scene->materials.count);
         json_int64(json, "frames", scene->frame_count);
         json_number(json, "fps", scene->frame_rate);
         if (bounds_is_empty(&facts.bounds)) {

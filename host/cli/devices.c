@@ -63,10 +63,10 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
         json_bool(json, "correctly_rounded_divide_sqrt", device->correctly_rounded);
         json_bool(json, "compiler", device->compiler);
         json_int64(json, "address_bits", device->address_bits);
-        json_int64(json, "memory_bytes", (int64_t)device->memory_bytes);
-        json_int64(json, "largest_buffer_bytes", (int64_t)device->largest_buffer_bytes);
-        json_int64(json, "local_memory_bytes", (int64_t)device->local_memory_bytes);
-        json_int64(json, "largest_work_group", (int64_t)device->largest_work_group);
+        json_count(json, "memory_bytes", device->memory_bytes);
+        json_count(json, "largest_buffer_bytes", device->largest_buffer_bytes);
+        json_count(json, "local_memory_bytes", device->local_memory_bytes);
+        json_count(json, "largest_work_group", device->largest_work_group);
         json_number(json, "timer_resolution_seconds", device->timer_resolution_seconds);
         passports_json(json, device);
         passports_refusals_json(json, device);

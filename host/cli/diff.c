@@ -199,14 +199,14 @@ static Json *diff_json(const DiffOptions *options, const ComparedImages *compari
     json_int64(json, "channels", reference->channels);
     json_text(json, "kind", kind_word(reference));
     json_bool(json, "equal", metrics->differing_count == 0);
-    json_int64(json, "differing_values", (int64_t)metrics->differing_count);
+    json_count(json, "differing_values", metrics->differing_count);
     json_begin_object(json, "nonfinite_pixels");
-    json_int64(json, "reference", (int64_t)metrics->nonfinite_reference);
-    json_int64(json, "image", (int64_t)metrics->nonfinite_test);
+    json_count(json, "reference", metrics->nonfinite_reference);
+    json_count(json, "image", metrics->nonfinite_test);
     json_end(json);
-    json_int64(json, "unmatched_values", (int64_t)metrics->unmatched_count);
+    json_count(json, "unmatched_values", metrics->unmatched_count);
     json_begin_object(json, "linear");
-    json_int64(json, "values", (int64_t)metrics->linear.count);
+    json_count(json, "values", metrics->linear.count);
     json_number(json, "max_abs", metrics->linear.largest);
     json_number(json, "rmse", metrics->linear.rmse);
     json_number(json, "bias", metrics->linear.bias);
@@ -218,8 +218,8 @@ static Json *diff_json(const DiffOptions *options, const ComparedImages *compari
     if (metrics->has_color) {
         json_begin_object(json, "srgb8");
         json_number(json, "psnr", metrics->srgb_psnr);
-        json_int64(json, "off_by_1", (int64_t)metrics->off_by_1);
-        json_int64(json, "off_by_2_or_more", (int64_t)metrics->off_by_more);
+        json_count(json, "off_by_1", metrics->off_by_1);
+        json_count(json, "off_by_2_or_more", metrics->off_by_more);
         json_end(json);
         json_begin_object(json, "flip");
         json_number(json, "mean", metrics->flip_mean);

@@ -383,7 +383,7 @@ static Json *findings_json(const Device *device, const Finding *findings, size_t
                   : finding->scene_differs ? "another scene"
                                            : "different");
         json_text(json, "first", same ? NULL : hashed[finding->first].name);
-        json_int64(json, "tiles", (int64_t)finding->tile_count);
+        json_count(json, "tiles", finding->tile_count);
         if (finding->tile_count > 0) {
             json_int64(json, "left", finding->left);
             json_int64(json, "top", finding->top);

@@ -8,8 +8,8 @@ static void rounded_results_json(Json *json, const char *key, const RoundedResul
 {
     json_begin_object(json, key);
     json_number(json, "largest_ulp", results->largest_ulp);
-    json_int64(json, "count", (int64_t)results->count);
-    json_int64(json, "wrong", (int64_t)results->wrong_count);
+    json_count(json, "count", results->count);
+    json_count(json, "wrong", results->wrong_count);
     json_bool(json, "exhaustive", results->is_exhaustive);
     json_end(json);
 }

@@ -14,7 +14,7 @@ void summary_json(Json *json, const char *key, Summary seconds)
     json_number(json, "median", 1e3 * seconds.median);
     json_number(json, "max", 1e3 * seconds.max);
     json_number(json, "quartile_range", 1e3 * (seconds.upper_quartile - seconds.lower_quartile));
-    json_int64(json, "runs", (int64_t)seconds.count);
+    json_count(json, "runs", seconds.count);
     json_end(json);
 }
 
@@ -62,7 +62,7 @@ static void counts_json(Json *json, const char *key, const size_t *counts, cl_ui
 {
     json_begin_array(json, key);
     for (cl_uint i = 0; i < dimensions; i++)
-        json_int64(json, NULL, (int64_t)counts[i]);
+        json_count(json, NULL, counts[i]);
     json_end(json);
 }
 
@@ -163,7 +163,7 @@ void rays_json(Json *json, const BenchRow *row)
 {
     json_begin_object(json, "rays");
     for (int type = 0; type < RAYS_COUNT; type++)
-        json_int64(json, bench_ray_names[type], (int64_t)row->rays[type]);
+        json_count(json, bench_ray_names[type], row->rays[type]);
     json_end(json);
     json_number(json, "mrays_per_s", bench_rays_per_second(row) / 1e6);
 }

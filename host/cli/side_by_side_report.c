@@ -164,12 +164,12 @@ static void report_json(Json *json, const SideReport *report)
     json_text(json, "platform", baseline->platform);
     json_text(json, "driver", baseline->driver);
     json_text(json, "host", baseline->host);
-    json_int64(json, "rows", (int64_t)baseline->count);
-    json_int64(json, "common", (int64_t)report->ratio_count);
+    json_count(json, "rows", baseline->count);
+    json_count(json, "common", report->ratio_count);
     if (report->ratio_count > 0) json_number(json, "mean_ratio", report->mean_ratio);
     if (report->why_not) json_text(json, "why_not", report->why_not);
     for (size_t verdict = 0; verdict <= VERDICT_FASTER; verdict++)
-        json_int64(json, verdict_names[verdict], (int64_t)report->verdicts[verdict]);
+        json_count(json, verdict_names[verdict], report->verdicts[verdict]);
     json_end(json);
 }
 
@@ -184,7 +184,7 @@ static void times_summary_json(Json *json, const char *key, const Summary *secon
         json_number(json, "lower_quartile", 1e3 * seconds->lower_quartile);
         json_number(json, "upper_quartile", 1e3 * seconds->upper_quartile);
     }
-    json_int64(json, "runs", (int64_t)seconds->count);
+    json_count(json, "runs", seconds->count);
     json_end(json);
 }
 

@@ -250,7 +250,7 @@ static void pilot_json(Json *json, const Pilot *pilot)
     json_number(json, "limit", pilot->budget.limit);
     json_text(json, "metric", error_metric_names[pilot->budget.metric]);
     json_number(json, "confidence", pilot->confidence);
-    json_int64(json, "pixels", (int64_t)pilot->pixels);
+    json_count(json, "pixels", pilot->pixels);
     json_number(json, "color_max", pilot->color_max);
     json_number(json, "total_ms", 1e3 * pilot->seconds);
     json_number(json, "build_ms", 1e3 * pilot->build_seconds);
@@ -271,8 +271,8 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     json_int64(json, "samples", settings->sample_count);
     json_text(json, "precision", precision_names[settings->precision]);
     if (settings->precision == PRECISION_CERTIFIED) {
-        json_int64(json, "rerendered_samples", (int64_t)host->rerenders.rerendered);
-        json_int64(json, "uncertified_samples", (int64_t)host->rerenders.uncertified);
+        json_count(json, "rerendered_samples", host->rerenders.rerendered);
+        json_count(json, "uncertified_samples", host->rerenders.uncertified);
     }
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);

@@ -15,7 +15,7 @@ static void event_begin(Json *json, const char *phase, const char *name, size_t 
     json_text(json, "ph", phase);
     json_text(json, "name", name);
     json_int64(json, "pid", PROCESS);
-    json_int64(json, "tid", (int64_t)thread);
+    json_count(json, "tid", thread);
 }
 
 static void thread_name(Json *json, size_t thread, const char *name)
@@ -85,7 +85,7 @@ static void command_add(Json *json, const Commands *commands, const NamedLaunch 
     if (time->dimensions > 0) {
         json_begin_array(json, "work_items");
         for (cl_uint i = 0; i < time->dimensions; i++)
-            json_int64(json, NULL, (int64_t)time->global[i]);
+            json_count(json, NULL, time->global[i]);
         json_end(json);
     }
     json_end(json);

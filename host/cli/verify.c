@@ -181,13 +181,13 @@ static void record_add_json(Json *json, const CaseRecord *record)
         json_end(json);
         return;
     }
-    json_int64(json, "rays", (int64_t)result->ray_count);
-    json_int64(json, "wrong", (int64_t)result->wrong);
-    json_int64(json, "leaks", (int64_t)result->leaks);
-    json_int64(json, "unsound", (int64_t)result->unsound);
-    json_int64(json, "off", (int64_t)result->off_surface);
-    json_int64(json, "turned", (int64_t)result->wrong_normals);
-    json_int64(json, "differing", (int64_t)result->differing);
+    json_count(json, "rays", result->ray_count);
+    json_count(json, "wrong", result->wrong);
+    json_count(json, "leaks", result->leaks);
+    json_count(json, "unsound", result->unsound);
+    json_count(json, "off", result->off_surface);
+    json_count(json, "turned", result->wrong_normals);
+    json_count(json, "differing", result->differing);
     json_number(json, "surface_part", result->worst_position_ratio);
     json_number(json, "normal_part", result->worst_normal_ratio);
     json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
@@ -316,8 +316,8 @@ static void precision_add_json(Json *json, const PrecisionRecord *record, Precis
     json_int64(json, "lanes", record->kernels.lanes);
     hash_json(json, "trace_kernel", record->kernels.trace_hash);
     hash_json(json, "render_kernel", record->kernels.render_hash);
-    json_int64(json, "passed", (int64_t)(records_count(record, has_ended) - failed));
-    json_int64(json, "failed", (int64_t)failed);
+    json_count(json, "passed", records_count(record, has_ended) - failed);
+    json_count(json, "failed", failed);
     json_number(json, "seconds", record->seconds);
     json_end(json);
 }
