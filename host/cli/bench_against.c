@@ -298,9 +298,9 @@ static Json *against_json(const Against *against, const Device *device)
 
 static void against_print_text(const Against *against, const Device *device)
 {
-    printf("%s, %s %s\nagainst %s; intervals of %g%% confidence\n\n", device->name, device->platform_name,
-           device->driver, against->options->other, 100 * comparison_confidence);
-    passports_remark(device, stdout);
+    device_heading_print(device, stdout);
+    printf("against %s; intervals of %g%% confidence\n\n", against->options->other,
+           100 * comparison_confidence);
     for (size_t i = 0; i < against->set->count; i++) {
         const BenchKey *key = &against->set->rows[i].key;
         printf("%s, %ux%u, %s, %u lane%s, BVH %s, %u sample%s, %u bounce%s%s%s: %zu pair%s\n", key->scene,

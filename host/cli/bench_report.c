@@ -113,13 +113,6 @@ const ResultTable bench_table = {
     .processor_times = "processor_samples_ms",
 };
 
-static void device_print(const BenchReport *report, FILE *stream)
-{
-    fprintf(stream, "%s, %s %s\n", report->device->name, report->device->platform_name,
-            report->device->driver);
-    passports_remark(report->device, stream);
-}
-
 static void summary_print(FILE *stream, Summary seconds)
 {
     fprintf(stream, " %8.2f %8.2f %8.2f", 1e3 * seconds.min, 1e3 * seconds.median, 1e3 * seconds.max);
@@ -266,7 +259,7 @@ static const char table_head[] =
 
 void bench_print_text(const BenchReport *report, FILE *stream)
 {
-    device_print(report, stream);
+    device_heading_print(report->device, stream);
     const char *scene = "";
     const uint64_t *rays = NULL; // those last printed of the scene
     for (size_t i = 0; i < report->set->count; i++) {

@@ -107,14 +107,12 @@ static void certified_print(const CertifyErrors *errors, const CertifyUncertifie
 static void text_print(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
-    const Device *device = certification->compute->device;
     size_t uncertain = 0, textured = 0;
     for (size_t i = 0; i < sample->count; i++) {
         uncertain += reference_is_uncertain(&sample->pixels[i]);
         textured += sample->pixels[i].has_texture;
     }
-    printf("%s, %s %s\n", device->name, device->platform_name, device->driver);
-    passports_remark(device, stdout);
+    device_heading_print(certification->compute->device, stdout);
     printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
            sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
            certification->reference_seconds);

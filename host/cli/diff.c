@@ -282,8 +282,8 @@ static void text_print(const DiffOptions *options, const ComparedImages *compari
     const ImageMetrics *metrics = &comparison->metrics;
     const Image *reference = &comparison->reference;
     size_t value_count = (size_t)reference->width * reference->height * reference->channels;
-    printf("%s, %s: %ux%u, %u %s of %s\n", options->reference_path, options->test_path, reference->width,
-           reference->height, reference->channels, reference->channels == 1 ? "channel" : "channels",
+    printf("%s, %s: %ux%u, %u channel%s of %s\n", options->reference_path, options->test_path,
+           reference->width, reference->height, reference->channels, text_plural(reference->channels),
            image_kind(reference));
     if (metrics->differing_count == 0)
         printf("  equal, bit for bit\n");

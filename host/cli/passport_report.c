@@ -104,8 +104,8 @@ void passports_print(const Device *device)
     double seconds = 0;
     for (size_t i = 0; i < passport_count(device); i++) {
         const Passport *passport = passport_at(device, i);
-        printf("%s %s (%u %s)", i ? "," : "", passport_mode_names[passport->mode], passport->lanes,
-               passport->lanes == 1 ? "lane" : "lanes");
+        printf("%s %s (%u lane%s)", i ? "," : "", passport_mode_names[passport->mode], passport->lanes,
+               text_plural(passport->lanes));
         seconds += passport->seconds;
     }
     printf(", measured in %.2f s\n", seconds);
@@ -124,4 +124,10 @@ void passports_remark(const Device *device, FILE *stream)
     Text text = {0};
     if (passports_abnormal(device, &text)) fprintf(stream, "%s\n", text_c(&text));
     text_free(&text);
+}
+
+void device_heading_print(const Device *device, FILE *stream)
+{
+    fprintf(stream, "%s, %s %s\n", device->name, device->platform_name, device->driver);
+    passports_remark(device, stream);
 }

@@ -5,7 +5,11 @@
 #include "host/opencl/passport.h"
 #include <stdio.h>
 
-void passports_json(Json *json, const Device *device);          // "passports"
-void passports_refusals_json(Json *json, const Device *device); // "refused"
-void passports_print(const Device *device);                     // a table, or nothing without a passport
-void passports_remark(const Device *device, FILE *stream);      // a line for each property that is not sound
+void passports_json(Json *json, const Device *device);          // adds the array "passports"
+void passports_refusals_json(Json *json, const Device *device); // adds the array "refused"
+// Prints each property of the device's arithmetic, or nothing if no passport is known.
+void passports_print(const Device *device);
+// Prints the properties that are not sound.
+void passports_remark(const Device *device, FILE *stream);
+// Prints the device, its platform and driver, and its properties that are not sound.
+void device_heading_print(const Device *device, FILE *stream);

@@ -53,12 +53,12 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     enum { SHOWN_MAX = 12 };
     LaunchSum sum = launches_sum(launches, count);
     char remark[160];
-    const char *commands = count == 1 ? "command" : "commands";
+    const char *plural = text_plural(count);
     if (sum.untrusted_count)
-        snprintf(remark, sizeof remark, "%zu %s, by the host's clock", count, commands);
+        snprintf(remark, sizeof remark, "%zu command%s, by the host's clock", count, plural);
     else
-        snprintf(remark, sizeof remark, "%zu %s, by the device's clock; %.3f ms by the host's", count,
-                 commands, 1e3 * sum.host_seconds);
+        snprintf(remark, sizeof remark, "%zu command%s, by the device's clock; %.3f ms by the host's", count,
+                 plural, 1e3 * sum.host_seconds);
     line_print(what, sum.untrusted_count ? sum.host_seconds : sum.event_seconds, remark);
     for (size_t i = 0; i < count && i < SHOWN_MAX; i++) {
         const LaunchTime *time = &launches[i].time;
@@ -85,8 +85,8 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
 // Prints a device's share of the rows and of the time if several devices render.
 static void share_print(const WorkerShare *share, const RenderSettings *settings)
 {
-    fprintf(stderr, "  %.1f%% of the rows in %u %s; busy %.3f ms, idle %.3f ms\n",
-            100.0 * share->rows / settings->region_height, share->bands, share->bands == 1 ? "band" : "bands",
+    fprintf(stderr, "  %.1f%% of the rows in %u band%s; busy %.3f ms, idle %.3f ms\n",
+            100.0 * share->rows / settings->region_height, share->bands, text_plural(share->bands),
             1e3 * share->busy_seconds, 1e3 * share->idle_seconds);
 }
 
@@ -133,24 +133,24 @@ static void rerenders_print(RerenderCounts counts, const RenderSettings *setting
 static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,
                        const RenderSettings *settings, const HostTimes *host)
 {
-    fprintf(stderr, "%ux%u, %u %s per pixel, precision %s\n", settings->region_width, settings->region_height,
-            settings->sample_count, settings->sample_count == 1 ? "sample" : "samples",
+    fprintf(stderr, "%ux%u, %u sample%s per pixel, precision %s\n", settings->region_width,
+            settings->region_height, settings->sample_count, text_plural(settings->sample_count),
             precision_names[settings->precision]);
     rerenders_print(host->rerenders, settings);
     line_print("parse", host->parse_seconds, "");
     if (host->pilot) pilot_print(host->pilot);
     for (size_t i = 0; i < count; i++) {
         const RenderReport *report = renderer_report(renderers[i]);
-        fprintf(stderr, "%s, %u %s (kernel %016llx)\n", report->device->name, report->lanes,
-                report->lanes == 1 ? "lane" : "lanes", (unsigned long long)report->kernel_hash);
+        fprintf(stderr, "%s, %u lane%s (kernel %016llx)\n", report->device->name, report->lanes,
+                text_plural(report->lanes), (unsigned long long)report->kernel_hash);
         passports_remark(report->device, stderr);
         if (count > 1 || ranks) share_print(&report->share, settings);
         device_print(report);
     }
     for (size_t i = 0; ranks && i < ranks->remote.count; i++) {
         const Rank *rank = &ranks->items[i];
-        fprintf(stderr, "rank %zu on %s: %s, %u %s\n", i + 1, rank->host, rank->device, rank->lanes[PASS_ALL],
-                rank->lanes[PASS_ALL] == 1 ? "lane" : "lanes");
+        fprintf(stderr, "rank %zu on %s: %s, %u lane%s\n", i + 1, rank->host, rank->device,
+                rank->lanes[PASS_ALL], text_plural(rank->lanes[PASS_ALL]));
         share_print(&ranks->remote.shares[i], settings);
     }
     line_print("render", host->render_seconds, "");
