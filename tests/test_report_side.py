@@ -75,7 +75,7 @@ class SideBySide(TestCase):
             self.assertTrue(cell["low"] < ratio < cell["high"] < 1.1 * ratio, cell)
         self.assertEqual([(letter, float(frame)) for letter, frame in figures(out)],
                          [("A", 10), ("B", 5), ("A", 20), ("B", 20.2), ("A", 5), ("B", 5.5)])  # fmt: skip
-        self.assertRegex(out, r"(?m)^ +B     5\.0000  4\.9900 to 5\.0100 +2\.5000  0\.500 \(0\.4\d\d to 0\.5\d\d\) faster$")
+        self.assertRegex(out, r"(?m)^ +B    5\.0000  4\.9900 to 5\.0100 +2\.5000  0\.500 \(0\.4\d\d to 0\.5\d\d\) faster$")
         self.assertIn("3 rows, 3 with times in A and here: 0.822 times A's frame time (geometric mean), 1 faster, 1 slower, 1 same", out)
         self.assertAlmostEqual(data["reports"][1]["mean_ratio"], (0.5 * 1.01 * 1.1) ** (1 / 3), places=9)
         self.assertIn("\nsize 64x48, lanes 16, BVH auto, samples 1, bounces 5\n", out)

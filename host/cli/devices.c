@@ -2,12 +2,12 @@
 // passports of their arithmetic.
 #include "host/base/fault.h"
 #include "host/base/json.h"
-#include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
+#include "host/cli/table.h"
 #include "host/opencl/device.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -75,84 +75,34 @@ static void devices_print_json(const DeviceList *list, const Device *chosen)
     json_print(json, stdout);
 }
 
-enum { COLUMN_COUNT = 12 };
-
-static const struct {
-    const char *head;
-    bool to_the_right;
-} columns[COLUMN_COUNT] = {
-    {"", false},       {"name", false},  {"type", false},  {"units", true},
-    {"MHz", true},     {"lanes", true},  {"fp64", false},  {"fma", false},
-    {"divide", false}, {"memory", true}, {"buffer", true}, {"platform, driver", false},
-};
-
-typedef struct {
-    Text cells[COLUMN_COUNT];
-} DeviceRow;
-
-static void size_append(Text *text, uint64_t bytes)
+static void row_append(Text *rows, const Device *device, bool is_chosen)
 {
-    double mebi = (double)bytes / (1024.0 * 1024.0);
-    if (bytes == 0)
-        text_appendf(text, "unknown");
-    else if (mebi < 1024)
-        text_appendf(text, "%.0f MiB", mebi);
-    else
-        text_appendf(text, "%.1f GiB", mebi / 1024);
-}
-
-static void row_fill(DeviceRow *row, const Device *device, bool is_chosen)
-{
-    Text *cell = row->cells;
     const char *why;
-    text_appendf(cell++, "%u%s", device->index, is_chosen ? "*" : "");
-    text_appendf(cell++, "%s", device->name);
-    text_appendf(cell++, "%s", device_type_name(device->type));
-    text_appendf(cell++, "%u", device->compute_units);
-    text_appendf(cell++, "%u", device->clock_mhz);
-    text_appendf(cell++, "%u", device_lanes(device, false, 0));
-    text_appendf(cell++, "%s", device->fp64 ? "yes" : "no");
-    text_appendf(cell++, "%s", device->fma_in_hardware ? "yes" : "no");
-    text_appendf(cell++, "%s", device->correctly_rounded ? "exact" : "loose");
-    size_append(cell++, device->memory_bytes);
-    size_append(cell++, device->largest_buffer_bytes);
-    text_appendf(cell, "%s, %s", device->platform_name, device->driver);
-    if (device->board[0]) text_appendf(cell, "; %s", device->board);
-    if (device->pci[0]) text_appendf(cell, "; PCI %s", device->pci);
-    if (device->same_name_index) text_appendf(cell, "; twin %u", device->same_name_index);
-    if (!device_usable(device, &why)) text_appendf(cell, "; unusable: %s", why);
-}
-
-static void rows_print(const DeviceRow *rows, size_t row_count)
-{
-    for (size_t i = 0; i < row_count; i++) {
-        for (size_t j = 0; j < COLUMN_COUNT; j++) {
-            size_t width = 0;
-            for (size_t k = 0; k < row_count; k++)
-                if (rows[k].cells[j].count > width) width = rows[k].cells[j].count;
-            bool is_last = j + 1 == COLUMN_COUNT;
-            printf("%*s%s",
-                   is_last                   ? 0
-                   : columns[j].to_the_right ? (int)width
-                                             : -(int)width,
-                   text_c(&rows[i].cells[j]), is_last ? "\n" : "  ");
-        }
+    text_appendf(rows, "%u%s\t%s\t%s\t%u\t%u\t%u\t%s\t%s\t%s\t", device->index, is_chosen ? "*" : "",
+                 device->name, device_type_name(device->type), device->compute_units, device->clock_mhz,
+                 device_lanes(device, false, 0), device->fp64 ? "yes" : "no",
+                 device->fma_in_hardware ? "yes" : "no", device->correctly_rounded ? "exact" : "loose");
+    for (size_t i = 0; i < 2; i++) {
+        const uint64_t bytes = i == 0 ? device->memory_bytes : device->largest_buffer_bytes;
+        text_appendf(rows, "%s\t", bytes > 0 ? text_size((double)bytes).text : "unknown");
     }
+    text_appendf(rows, "%s, %s", device->platform_name, device->driver);
+    if (device->board[0]) text_appendf(rows, "; %s", device->board);
+    if (device->pci[0]) text_appendf(rows, "; PCI %s", device->pci);
+    if (device->same_name_index) text_appendf(rows, "; twin %u", device->same_name_index);
+    if (!device_usable(device, &why)) text_appendf(rows, "; unusable: %s", why);
+    text_appendf(rows, "\n");
 }
 
 static void devices_print_table(const DeviceList *list, const Device *chosen)
 {
-    size_t row_count = list->count + 1;
-    DeviceRow *rows = memory_allocate_zeroed(row_count, sizeof *rows);
-    for (size_t j = 0; j < COLUMN_COUNT; j++)
-        text_appendf(&rows[0].cells[j], "%s", columns[j].head);
+    Text rows = {0};
+    text_appendf(&rows,
+                 "\tname\ttype\tunits\tMHz\tlanes\tfp64\tfma\tdivide\tmemory\tbuffer\tplatform, driver\n");
     for (size_t i = 0; i < list->count; i++)
-        row_fill(&rows[i + 1], &list->items[i], &list->items[i] == chosen);
-    rows_print(rows, row_count);
-    for (size_t i = 0; i < row_count; i++)
-        for (size_t j = 0; j < COLUMN_COUNT; j++)
-            text_free(&rows[i].cells[j]);
-    free(rows);
+        row_append(&rows, &list->items[i], &list->items[i] == chosen);
+    table_print(text_c(&rows), "lllrrrlllrr", stdout);
+    text_free(&rows);
     if (list->empty_platform_count)
         printf("%u of %u platforms: no device\n", list->empty_platform_count, list->platform_count);
 }

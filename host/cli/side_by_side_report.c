@@ -1,6 +1,7 @@
 // The text of a comparison of reports, and the JSON that its page draws.
 #include "host/cli/report_json.h"
 #include "host/cli/side_by_side.h"
+#include "host/cli/table.h"
 #include <string.h>
 
 static char report_letter(size_t report)
@@ -57,55 +58,39 @@ static void report_print(const SideBySide *side, size_t index, FILE *stream)
     if (report->why_not) fprintf(stream, "   no verdicts, since %s\n", report->why_not);
 }
 
-// Returns the widths of the columns of a row's name, 0 for those that are not shown.
-static void widths_find(const SideBySide *side, int widths[SIDE_COLUMNS])
-{
-    for (size_t column = 0; column < SIDE_COLUMNS; column++) {
-        widths[column] = side->is_shown[column] ? (int)strlen(bench_table.columns[column].heading) : 0;
-        for (size_t i = 0; side->is_shown[column] && i < side->row_count * side->report_count; i++) {
-            Text text = {0};
-            if (side->cells[i].row) side_column_append(&text, &side->cells[i].row->key, column);
-            if ((int)text.count > widths[column]) widths[column] = (int)text.count;
-            text_free(&text);
-        }
-    }
-}
-
-static void ratio_print(const SideCell *cell, const SideReport *report, FILE *stream)
+static void ratio_append(Text *rows, const SideCell *cell, const SideReport *report)
 {
     const RowComparison *comparison = &cell->comparison;
-    fprintf(stream, "  %.*f", cell->ratio < 0.01 ? 5 : cell->ratio < 0.1 ? 4 : 3, cell->ratio);
+    text_appendf(rows, "%.*f", cell->ratio < 0.01 ? 5 : cell->ratio < 0.1 ? 4 : 3, cell->ratio);
     if (comparison->why_not && !report->why_not)
-        fprintf(stream, ", no verdict since %s", comparison->why_not);
+        text_appendf(rows, ", no verdict since %s", comparison->why_not);
     if (!comparison->why_not)
-        fprintf(stream, " (%.3f to %.3f) %s", comparison->frame.low, comparison->frame.high,
-                verdict_names[comparison->verdict]);
+        text_appendf(rows, " (%.3f to %.3f) %s", comparison->frame.low, comparison->frame.high,
+                     verdict_names[comparison->verdict]);
 }
 
-static void cell_print(const SideCell *cell, const SideReport *report, FILE *stream)
+static void cell_append(Text *rows, const SideCell *cell, const SideReport *report)
 {
     if (!cell->row || cell->row->frame.count == 0) {
-        fprintf(stream, "%10s", "-");
+        text_appendf(rows, "-\t");
         if (cell->row)
-            fprintf(stream, "  %s", cell->row->failure[0] != '\0' ? cell->row->failure : "no times");
+            text_appendf(rows, "%s", cell->row->failure[0] != '\0' ? cell->row->failure : "no times");
         return;
     }
     const Summary *frame = &cell->row->frame, *kernel = &cell->row->kernel;
-    Text quartiles = {0};
+    text_appendf(rows, "%s\t", milliseconds(frame->median).text);
     if (frame->lower_quartile > 0)
-        text_appendf(&quartiles, "%s to %s", milliseconds(frame->lower_quartile).text,
+        text_appendf(rows, "%s to %s\t", milliseconds(frame->lower_quartile).text,
                      milliseconds(frame->upper_quartile).text);
-    fprintf(stream, "%10s  %-20s %10s", milliseconds(frame->median).text,
-            quartiles.count > 0 ? text_c(&quartiles) : "-",
-            kernel->count > 0 ? milliseconds(kernel->median).text : "-");
-    text_free(&quartiles);
-    if (cell->ratio > 0) ratio_print(cell, report, stream);
+    else
+        text_appendf(rows, "-\t");
+    text_appendf(rows, "%s\t", kernel->count > 0 ? milliseconds(kernel->median).text : "-");
+    if (cell->ratio > 0) ratio_append(rows, cell, report);
 }
 
-// Prints the name of a row before its first report. Before the others, only columns that differ from it are
-// printed, which are lanes.
-static void name_print(const SideBySide *side, const int widths[SIDE_COLUMNS], const BenchKey *key,
-                       const BenchKey *above, FILE *stream)
+// Appends the name of a row before its first report. Before the others, only columns that differ from it are
+// filled, which are lanes.
+static void name_append(Text *rows, const SideBySide *side, const BenchKey *key, const BenchKey *above)
 {
     for (size_t column = 0; column < SIDE_COLUMNS; column++) {
         if (!side->is_shown[column]) continue;
@@ -113,42 +98,46 @@ static void name_print(const SideBySide *side, const int widths[SIDE_COLUMNS], c
         side_column_append(&text, key, column);
         if (above) side_column_append(&text_above, above, column);
         const bool is_repeated = above && (column == 0 || strcmp(text_c(&text), text_c(&text_above)) == 0);
-        fprintf(stream, "%-*s  ", widths[column], is_repeated ? "" : text_c(&text));
+        text_appendf(rows, "%s\t", is_repeated ? "" : text_c(&text));
         text_free(&text);
         text_free(&text_above);
     }
 }
 
-static void row_print(const SideBySide *side, const int widths[SIDE_COLUMNS], size_t row, FILE *stream)
+static void row_append(Text *rows, const SideBySide *side, size_t row)
 {
     const BenchKey *first = &side_first(side, row)->row->key;
     for (size_t i = 0; i < side->report_count; i++) {
         const SideCell *cell = side_cell(side, row, i);
-        name_print(side, widths, cell->row ? &cell->row->key : first, i > 0 ? first : NULL, stream);
-        fprintf(stream, "%c ", report_letter(i));
-        cell_print(cell, &side->reports[i], stream);
-        fputc('\n', stream);
+        name_append(rows, side, cell->row ? &cell->row->key : first, i > 0 ? first : NULL);
+        text_appendf(rows, "%c\t", report_letter(i));
+        cell_append(rows, cell, &side->reports[i]);
+        text_appendf(rows, "\n");
     }
 }
 
 void side_by_side_print(const SideBySide *side, FILE *stream)
 {
-    int widths[SIDE_COLUMNS];
-    Text constants = {0};
+    Text constants = {0}, rows = {0}, alignment = {0};
     for (size_t i = 0; i < side->report_count; i++)
         report_print(side, i, stream);
     constants_append(&constants, side);
     if (constants.count > 0) fprintf(stream, "\n%s\n", text_c(&constants));
     text_free(&constants);
     fputc('\n', stream);
-    widths_find(side, widths);
-    for (size_t column = 0; column < SIDE_COLUMNS; column++)
-        if (side->is_shown[column])
-            fprintf(stream, "%-*s  ", widths[column], bench_table.columns[column].heading);
-    fprintf(stream, "  %10s  %-20s %10s%s\n", "frame ms", "quartiles", "kernel ms",
-            side->report_count > 1 ? "  times A's frame time" : "");
+    for (size_t column = 0; column < SIDE_COLUMNS; column++) {
+        if (!side->is_shown[column]) continue;
+        text_appendf(&rows, "%s\t", bench_table.columns[column].heading);
+        text_appendf(&alignment, "l");
+    }
+    text_appendf(&rows, "\tframe ms\tquartiles\tkernel ms\t%s\n",
+                 side->report_count > 1 ? "times A's frame time" : "");
+    text_appendf(&alignment, "lrlr");
     for (size_t row = 0; row < side->row_count; row++)
-        row_print(side, widths, row, stream);
+        row_append(&rows, side, row);
+    table_print(text_c(&rows), text_c(&alignment), stream);
+    text_free(&alignment);
+    text_free(&rows);
 }
 
 static void report_json(Json *json, const SideReport *report)
