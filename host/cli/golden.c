@@ -4,49 +4,20 @@
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
-#include "host/base/output.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/format.h"
+#include "host/cli/golden_file.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/image/image.h"
-#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 enum { BOUNCES_UNSET = BOUNCES_MAX + 1 };
-enum { TILE_COLUMNS = 12, TILE_ROWS = 8, TILES = TILE_COLUMNS * TILE_ROWS };
-
-static const char file_head[] = "# glint golden 1: images at strict; glint golden check compares them. "
-                                "Hashes are of the scene as the device gets it,\n"
-                                "# of the layers' values, and of 12 x 8 tiles of the color.\n";
-
-// The compared layers in the order in which an image is computed, since the first that differs explains the
-// others.
-static const struct {
-    const char *name;
-    Layer layer;
-} hashed[] = {{"object", LAYER_OBJECT}, {"t", LAYER_T},       {"normal", LAYER_NORMAL},
-              {"shadow", LAYER_SHADOW}, {"path", LAYER_PATH}, {"color", LAYER_COLOR}};
-enum { HASHED_COUNT = COUNT_OF(hashed) };
-
-// A line of the file.
-typedef struct {
-    char *scene;
-    uint32_t width, height, samples, bounces;
-    uint64_t scene_hash, hashes[HASHED_COUNT];
-    uint16_t tiles[TILES];
-} Golden;
-
-typedef struct {
-    Golden *items;
-    size_t count, capacity;
-    Text comments; // the user's
-} GoldenList;
 
 typedef struct {
     CommonOptions common;
@@ -57,15 +28,19 @@ typedef struct {
     bool writes;
 } GoldenOptions;
 
-// The comparison of a scene. `first` is the first layer that differs, or HASHED_COUNT. The rectangle contains
-// all tiles that differ.
+typedef struct {
+    uint32_t left, top, right, bottom; // in pixels; right and bottom are exclusive
+} PixelBox;
+
+// The comparison of a scene with its line.
 typedef struct {
     const char *scene;
     bool is_new, scene_differs;
-    size_t first, tile_count;
-    uint32_t left, top, right, bottom; // in pixels; right and bottom are exclusive
-    char *crop;                        // the file that shows it, or NULL
-} Finding;
+    size_t first;      // the index of the first layer that differs, or HASHED_COUNT
+    size_t tile_count; // tiles that differ
+    PixelBox box;      // contains all tiles that differ
+    char *crop;        // the file that shows the box, or NULL
+} GoldenCheck;
 
 static const Option options_own[] = {
     {"file", "FILE", "the file of hashes (default: golden.txt)", option_text, offsetof(GoldenOptions, file)},
@@ -135,122 +110,6 @@ static const CommandLine command_line = {
     OPERANDS(ANY, GoldenOptions, scenes),
     .check = options_check};
 
-static void golden_list_free(GoldenList *list)
-{
-    for (size_t i = 0; i < list->count; i++)
-        free(list->items[i].scene);
-    free(list->items);
-    text_free(&list->comments);
-    *list = (GoldenList){0};
-}
-
-static Golden *golden_find(const GoldenList *list, const char *scene)
-{
-    for (size_t i = 0; i < list->count; i++)
-        if (strcmp(list->items[i].scene, scene) == 0) return &list->items[i];
-    return NULL;
-}
-
-static void golden_append(Text *text, const Golden *golden)
-{
-    text_appendf(text, "size=%ux%u samples=%u bounces=%u scene=%016" PRIx64, golden->width, golden->height,
-                 golden->samples, golden->bounces, golden->scene_hash);
-    for (size_t i = 0; i < HASHED_COUNT; i++)
-        text_appendf(text, " %s=%016" PRIx64, hashed[i].name, golden->hashes[i]);
-    text_appendf(text, " tiles=");
-    for (size_t i = 0; i < TILES; i++)
-        text_appendf(text, "%04x", golden->tiles[i]);
-    text_appendf(text, " %s\n", golden->scene);
-}
-
-// Reads hexadecimal digits. Returns the position after them, or NULL if there are fewer.
-static const char *hex_read(const char *at, size_t digits, uint64_t *value)
-{
-    *value = 0;
-    for (size_t i = 0; i < digits; i++, at++) {
-        const char *all = "0123456789abcdef", *digit = *at ? strchr(all, *at) : NULL;
-        if (!digit) return NULL;
-        *value = *value << 4 | (uint64_t)(digit - all);
-    }
-    return at;
-}
-
-// Reads " NAME=" and 16 digits. Returns the position after them, or NULL if they are missing.
-static const char *hash_read(const char *at, const char *name, uint64_t *hash)
-{
-    const size_t length = strlen(name);
-    if (!at || *at != ' ' || strncmp(at + 1, name, length) != 0 || at[1 + length] != '=') return NULL;
-    return hex_read(at + 2 + length, 16, hash);
-}
-
-// Reads a prefix and a number of up to nine digits. Returns the position after them, or NULL if absent.
-static const char *line_count_read(const char *at, const char *prefix, uint32_t *value)
-{
-    const size_t length = strlen(prefix);
-    if (!at || strncmp(at, prefix, length) != 0) return NULL;
-    at += length;
-    const size_t digits = strspn(at, "0123456789");
-    if (digits == 0 || digits > 9) return NULL;
-    *value = (uint32_t)strtoul(at, NULL, 10);
-    return at + digits;
-}
-
-// Reads a line, which ends with a NUL. Returns false if it is not a line of the file's format.
-static bool golden_read(Golden *golden, const char *line)
-{
-    const char *at = line_count_read(line, "size=", &golden->width);
-    at = line_count_read(at, "x", &golden->height);
-    at = line_count_read(at, " samples=", &golden->samples);
-    at = line_count_read(at, " bounces=", &golden->bounces);
-    at = hash_read(at, "scene", &golden->scene_hash);
-    for (size_t i = 0; i < HASHED_COUNT; i++)
-        at = hash_read(at, hashed[i].name, &golden->hashes[i]);
-    if (!at || strncmp(at, " tiles=", 7) != 0) return false;
-    at += 7;
-    for (size_t i = 0; at && i < TILES; i++) {
-        uint64_t tile;
-        at = hex_read(at, 4, &tile);
-        golden->tiles[i] = (uint16_t)tile;
-    }
-    const bool is_sound = at && *at == ' ' && at[1] != '\0' && golden->width > 0 &&
-                          golden->width <= IMAGE_SIDE_MAX && golden->height > 0 &&
-                          golden->height <= IMAGE_SIDE_MAX && golden->samples > 0 &&
-                          golden->samples <= SAMPLES_MAX && golden->bounces <= BOUNCES_MAX;
-    if (is_sound) golden->scene = memory_copy_text(at + 1);
-    return is_sound;
-}
-
-// Reads the file. Returns false with messages if it cannot be read.
-static bool golden_list_read(GoldenList *list, const char *path, MessageList *messages)
-{
-    Text text = {0};
-    if (!text_read_file(&text, path, messages)) return false;
-    const Source source = {path, text_c(&text), text.count};
-    bool is_sound = true;
-    for (size_t start = 0, end; start < text.count; start = end + 1) {
-        const char *newline = memchr(text.items + start, '\n', text.count - start);
-        end = newline ? (size_t)(newline - text.items) : text.count;
-        char *line = text_format("%.*s", (int)(end - start), text.items + start);
-        Golden golden = {0};
-        if (end > start && text.items[end - 1] == '\r') line[end - start - 1] = '\0';
-        if (golden_read(&golden, line) && golden_find(list, golden.scene)) {
-            message_add_at(messages, MESSAGE_ERROR, &source, start, "a second line for \"%s\"", golden.scene);
-            is_sound = false;
-            free(golden.scene);
-        } else if (golden.scene) {
-            array_push(*list, golden);
-        } else if (*line == '#') {
-            if (!strstr(file_head, line)) text_appendf(&list->comments, "%s\n", line);
-        } else if (*line != '\0') {
-            message_add_at(messages, MESSAGE_ERROR, &source, start, "expected a line of glint golden write");
-            is_sound = false;
-        }
-        free(line);
-    }
-    text_free(&text);
-    return is_sound;
-}
-
 static uint64_t layer_hash(const Film *film, Layer layer)
 {
     const size_t size = film_layer_size(film, layer);
@@ -269,35 +128,38 @@ static uint32_t tile_edge(uint32_t side, uint32_t index, uint32_t count)
     return (uint32_t)((uint64_t)side * index / count);
 }
 
-static void tiles_hash(const Film *film, uint16_t tiles[TILES])
+static PixelBox tile_box(const Film *film, uint32_t tile)
 {
-    for (uint32_t row = 0; row < TILE_ROWS; row++)
-        for (uint32_t column = 0; column < TILE_COLUMNS; column++) {
-            uint64_t hash = HASH_START;
-            const uint32_t left = tile_edge(film->width, column, TILE_COLUMNS),
-                           right = tile_edge(film->width, column + 1, TILE_COLUMNS);
-            for (uint32_t y = tile_edge(film->height, row, TILE_ROWS);
-                 y < tile_edge(film->height, row + 1, TILE_ROWS); y++)
-                for (size_t i = 3 * ((size_t)y * film->width + left);
-                     i < 3 * ((size_t)y * film->width + right); i++) {
-                    const float value = (float)film->color[i];
-                    hash = hash_bytes(hash, &value, sizeof value);
-                }
-            tiles[row * TILE_COLUMNS + column] = (uint16_t)(hash ^ hash >> 16 ^ hash >> 32 ^ hash >> 48);
-        }
+    const uint32_t row = tile / TILE_COLUMNS, column = tile % TILE_COLUMNS;
+    return (PixelBox){.left = tile_edge(film->width, column, TILE_COLUMNS),
+                      .top = tile_edge(film->height, row, TILE_ROWS),
+                      .right = tile_edge(film->width, column + 1, TILE_COLUMNS),
+                      .bottom = tile_edge(film->height, row + 1, TILE_ROWS)};
 }
 
-// Writes the rectangle of the image as SCENE-golden.png. Returns NULL with a message if that fails.
-static char *crop_write(const Film *film, const Finding *finding)
+static uint16_t tile_hash(const Film *film, PixelBox box)
 {
-    const uint32_t width = finding->right - finding->left, height = finding->bottom - finding->top;
-    char *path = text_format("%s-golden.png", finding->scene + strspn(finding->scene, "./"));
+    uint64_t hash = HASH_START;
+    for (size_t y = box.top; y < box.bottom; y++)
+        for (size_t i = 3 * (y * film->width + box.left); i < 3 * (y * film->width + box.right); i++) {
+            const float value = (float)film->color[i];
+            hash = hash_bytes(hash, &value, sizeof value);
+        }
+    return (uint16_t)(hash ^ hash >> 16 ^ hash >> 32 ^ hash >> 48);
+}
+
+// Writes the box of the image as SCENE-golden.png. Returns NULL with a message if that fails.
+static char *crop_write(const Film *film, const char *scene, PixelBox box)
+{
+    const uint32_t width = box.right - box.left, height = box.bottom - box.top;
+    const size_t row_values = 3 * (size_t)width;
+    char *path = text_format("%s-golden.png", scene + strspn(scene, "./"));
     for (char *at = path; *at; at++)
         if (*at == '/') *at = '-'; // scenes in several folders may have the same name
-    float *pixels = memory_allocate(memory_product(3 * (size_t)width, height), sizeof *pixels);
-    for (size_t i = 0; i < 3 * (size_t)width * height; i++) {
-        const size_t y = finding->top + i / (3 * (size_t)width), in_row = i % (3 * (size_t)width);
-        pixels[i] = (float)film->color[3 * (y * film->width + finding->left) + in_row];
+    float *pixels = memory_allocate(memory_product(row_values, height), sizeof *pixels);
+    for (size_t i = 0; i < row_values * height; i++) {
+        const size_t y = box.top + i / row_values;
+        pixels[i] = (float)film->color[3 * (y * film->width + box.left) + i % row_values];
     }
     const ImageHeader header = {
         .format = IMAGE_PNG, .width = width, .height = height, .channels = 3, .bits = 8, .npy_type = 'f'};
@@ -310,33 +172,29 @@ static char *crop_write(const Film *film, const Finding *finding)
     return NULL;
 }
 
-static void findings_compare(Finding *finding, const Golden *golden, const Golden *now, const Film *film)
+static void lines_compare(GoldenCheck *check, const GoldenLine *golden, const GoldenLine *now,
+                          const Film *film)
 {
-    finding->scene_differs = golden->scene_hash != now->scene_hash;
-    while (finding->first < HASHED_COUNT && golden->hashes[finding->first] == now->hashes[finding->first])
-        finding->first++;
-    if (finding->first == HASHED_COUNT) return;
-    finding->left = film->width;
-    finding->top = film->height;
+    check->scene_differs = golden->scene_hash != now->scene_hash;
+    while (check->first < HASHED_COUNT && golden->hashes[check->first] == now->hashes[check->first])
+        check->first++;
+    if (check->first == HASHED_COUNT) return;
+    check->box = (PixelBox){film->width, film->height, 0, 0};
     for (uint32_t i = 0; i < TILES; i++) {
         if (golden->tiles[i] == now->tiles[i]) continue;
-        const uint32_t row = i / TILE_COLUMNS, column = i % TILE_COLUMNS;
-        const uint32_t left = tile_edge(film->width, column, TILE_COLUMNS),
-                       right = tile_edge(film->width, column + 1, TILE_COLUMNS),
-                       top = tile_edge(film->height, row, TILE_ROWS),
-                       bottom = tile_edge(film->height, row + 1, TILE_ROWS);
-        finding->tile_count++;
-        if (left < finding->left) finding->left = left;
-        if (top < finding->top) finding->top = top;
-        if (right > finding->right) finding->right = right;
-        if (bottom > finding->bottom) finding->bottom = bottom;
+        const PixelBox tile = tile_box(film, i);
+        check->tile_count++;
+        if (tile.left < check->box.left) check->box.left = tile.left;
+        if (tile.top < check->box.top) check->box.top = tile.top;
+        if (tile.right > check->box.right) check->box.right = tile.right;
+        if (tile.bottom > check->box.bottom) check->box.bottom = tile.bottom;
     }
-    if (finding->tile_count > 0) finding->crop = crop_write(film, finding);
+    if (check->tile_count > 0) check->crop = crop_write(film, check->scene, check->box);
 }
 
 // Renders a scene with the settings of `golden`, and sets its hashes. Returns EXIT_DONE or the exit status of
 // the failure.
-static int golden_render(Golden *golden, Film *film, const GoldenOptions *options, Compute *compute)
+static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *options, Compute *compute)
 {
     Scene scene = {0};
     if (!scene_open(&scene, golden->scene, &options->common)) return EXIT_USER;
@@ -349,7 +207,7 @@ static int golden_render(Golden *golden, Film *film, const GoldenOptions *option
     settings.stop = progress_stops;
     unsigned aovs = 0;
     for (size_t i = 0; i < HASHED_COUNT; i++)
-        if (hashed[i].layer != LAYER_COLOR) aovs |= 1U << hashed[i].layer;
+        if (hashed_layers[i] != LAYER_COLOR) aovs |= 1U << hashed_layers[i];
     MessageList messages = {0};
     Renderer *renderer = renderer_open(compute, &scene, &settings, &messages);
     messages_print(&messages, golden->scene);
@@ -359,83 +217,71 @@ static int golden_render(Golden *golden, Film *film, const GoldenOptions *option
     if (status == EXIT_DONE) {
         golden->scene_hash = renderer_scene_hash(renderer);
         for (size_t i = 0; i < HASHED_COUNT; i++)
-            golden->hashes[i] = layer_hash(film, hashed[i].layer);
-        tiles_hash(film, golden->tiles);
+            golden->hashes[i] = layer_hash(film, hashed_layers[i]);
+        for (uint32_t i = 0; i < TILES; i++)
+            golden->tiles[i] = tile_hash(film, tile_box(film, i));
     }
     renderer_close(renderer);
     scene_free(&scene);
     return status;
 }
 
-static Json *findings_json(const Device *device, const Finding *findings, size_t count)
+static Json *checks_json(const Device *device, const GoldenCheck *checks, size_t count)
 {
     Json *json = report_json_open(1, device);
     json_begin_array(json, "scenes");
     for (size_t i = 0; i < count; i++) {
-        const Finding *finding = &findings[i];
-        const bool same = finding->first == HASHED_COUNT;
+        const GoldenCheck *check = &checks[i];
+        const bool same = check->first == HASHED_COUNT;
         json_begin_object(json, NULL);
-        json_text(json, "scene", finding->scene);
+        json_text(json, "scene", check->scene);
         json_bool(json, "same", same);
         json_text(json, "verdict",
-                  finding->is_new          ? "no line"
-                  : same                   ? "same"
-                  : finding->scene_differs ? "another scene"
-                                           : "different");
-        json_text(json, "first", same ? NULL : hashed[finding->first].name);
-        json_count(json, "tiles", finding->tile_count);
-        if (finding->tile_count > 0) {
-            json_int64(json, "left", finding->left);
-            json_int64(json, "top", finding->top);
-            json_int64(json, "right", finding->right);
-            json_int64(json, "bottom", finding->bottom);
+                  check->is_new          ? "no line"
+                  : same                 ? "same"
+                  : check->scene_differs ? "another scene"
+                                         : "different");
+        json_text(json, "first", same ? NULL : layer_names[hashed_layers[check->first]]);
+        json_count(json, "tiles", check->tile_count);
+        if (check->tile_count > 0) {
+            json_int64(json, "left", check->box.left);
+            json_int64(json, "top", check->box.top);
+            json_int64(json, "right", check->box.right);
+            json_int64(json, "bottom", check->box.bottom);
         }
-        json_text(json, "crop", finding->crop);
+        json_text(json, "crop", check->crop);
         json_end(json);
     }
     json_end(json);
     return json;
 }
 
-static void finding_print(const Finding *finding)
+static void check_print(const GoldenCheck *check)
 {
-    if (finding->is_new) {
-        printf("%s: no line; glint golden write makes it\n", finding->scene);
+    if (check->is_new) {
+        printf("%s: no line; glint golden write makes it\n", check->scene);
         return;
     }
-    if (finding->first == HASHED_COUNT) {
-        printf("%s: same\n", finding->scene);
+    if (check->first == HASHED_COUNT) {
+        printf("%s: same\n", check->scene);
         return;
     }
-    printf("%s: different, first in %s", finding->scene, hashed[finding->first].name);
-    if (finding->scene_differs) fputs("; the scene has changed", stdout);
-    if (finding->tile_count > 0)
-        printf("; %zu of %d tiles, within pixels %u to %u, %u to %u", finding->tile_count, TILES,
-               finding->left, finding->right - 1, finding->top, finding->bottom - 1);
-    printf("%s%s\n", finding->crop ? ": " : "", finding->crop ? finding->crop : "");
-}
-
-static bool golden_list_write(const GoldenList *list, const char *path)
-{
-    Text text = {0};
-    text_appendf(&text, "%s%s", file_head, text_c(&list->comments));
-    for (size_t i = 0; i < list->count; i++)
-        golden_append(&text, &list->items[i]);
-    MessageList messages = {0};
-    const bool is_written = output_write_file(path, text.items, text.count, &messages);
-    messages_print(&messages, NULL);
-    text_free(&text);
-    return is_written;
+    printf("%s: different, first in %s", check->scene, layer_names[hashed_layers[check->first]]);
+    if (check->scene_differs) fputs("; the scene has changed", stdout);
+    if (check->tile_count > 0)
+        printf("; %zu of %d tiles, within pixels %u to %u, %u to %u", check->tile_count, TILES,
+               check->box.left, check->box.right - 1, check->box.top, check->box.bottom - 1);
+    printf("%s%s\n", check->crop ? ": " : "", check->crop ? check->crop : "");
 }
 
 // Adds the scenes to the lines, or replaces the lines that exist. Returns the exit status.
-static int scenes_write(GoldenList *list, const GoldenOptions *options, Compute *compute)
+static int scenes_write(GoldenFile *file, const GoldenOptions *options, Compute *compute)
 {
     for (size_t i = 0; i < options->scenes.count; i++) {
-        Golden *golden = golden_find(list, options->scenes.items[i]);
+        GoldenLine *golden = golden_file_find(file, options->scenes.items[i]);
         if (!golden) {
-            array_push(*list, (Golden){.scene = memory_copy_text(options->scenes.items[i])});
-            golden = &list->items[list->count - 1];
+            array_push(*file, (GoldenLine){.scene = memory_copy_text(options->scenes.items[i])});
+            golden = &file->items[file->count - 1];
         }
         golden->width = options->common.size[0];
         golden->height = options->common.size[1];
@@ -446,44 +292,47 @@ static int scenes_write(GoldenList *list, const GoldenOptions *options, Compute 
         film_free(&film);
         if (status != EXIT_DONE) return status;
     }
-    return golden_list_write(list, options->file) ? EXIT_DONE : EXIT_USER;
+    MessageList messages = {0};
+    const bool is_written = golden_file_write(file, options->file, &messages);
+    messages_print(&messages, NULL);
+    return is_written ? EXIT_DONE : EXIT_USER;
 }
 
-static int scene_check(Finding *finding, const GoldenList *list, const GoldenOptions *options,
+static int scene_check(GoldenCheck *check, const GoldenFile *file, const GoldenOptions *options,
                        Compute *compute)
 {
-    const Golden *golden = golden_find(list, finding->scene);
-    finding->is_new = !golden;
+    const GoldenLine *golden = golden_file_find(file, check->scene);
+    check->is_new = !golden;
     if (!golden) return EXIT_DONE;
-    Golden now = *golden;
+    GoldenLine now = *golden;
     Film film = {0};
     const int status = golden_render(&now, &film, options, compute);
-    if (status == EXIT_DONE) findings_compare(finding, golden, &now, &film);
+    if (status == EXIT_DONE) lines_compare(check, golden, &now, &film);
     film_free(&film);
     return status;
 }
 
-static int scenes_check(const GoldenList *list, const GoldenOptions *options, Compute *compute)
+static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Compute *compute)
 {
-    const size_t checked = options->scenes.count > 0 ? options->scenes.count : list->count;
+    const size_t checked = options->scenes.count > 0 ? options->scenes.count : file->count;
     if (checked == 0) {
         fprintf(stderr, "glint golden: '%s' has no lines\n", options->file);
         return EXIT_USER;
     }
-    Finding *findings = memory_allocate_zeroed(checked + 1, sizeof *findings);
+    GoldenCheck *checks = memory_allocate_zeroed(checked + 1, sizeof *checks);
     int status = EXIT_DONE, differing = 0;
     for (size_t i = 0; i < checked && status == EXIT_DONE; i++) {
-        findings[i].scene = options->scenes.count > 0 ? options->scenes.items[i] : list->items[i].scene;
-        status = scene_check(&findings[i], list, options, compute);
-        differing += findings[i].is_new || findings[i].first < HASHED_COUNT;
-        if (status == EXIT_DONE && report_has_text(&options->report)) finding_print(&findings[i]);
+        checks[i].scene = options->scenes.count > 0 ? options->scenes.items[i] : file->items[i].scene;
+        status = scene_check(&checks[i], file, options, compute);
+        differing += checks[i].is_new || checks[i].first < HASHED_COUNT;
+        if (status == EXIT_DONE && report_has_text(&options->report)) check_print(&checks[i]);
     }
     if (status == EXIT_DONE && options->report.format != FORMAT_TEXT &&
-        !report_write(findings_json(compute->device, findings, checked), &golden_table, &options->report))
+        !report_write(checks_json(compute->device, checks, checked), &golden_table, &options->report))
         status = EXIT_USER;
     for (size_t i = 0; i < checked; i++)
-        free(findings[i].crop);
-    free(findings);
+        free(checks[i].crop);
+    free(checks);
     return status == EXIT_DONE && differing > 0 ? EXIT_CHECK : status;
 }
 
@@ -493,21 +342,21 @@ int command_golden(int argument_count, char **arguments)
         .common.precision = PRECISION_STRICT, .common.bounce_count = BOUNCES_UNSET, .file = "golden.txt"};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    GoldenList list = {0};
+    GoldenFile file = {0};
     MessageList messages = {0};
     const bool is_new = options.writes && access(options.file, F_OK) != 0;
-    const bool is_read = is_new || golden_list_read(&list, options.file, &messages);
+    const bool is_read = is_new || golden_file_read(&file, options.file, &messages);
     messages_print(&messages, NULL);
     OpenDevice open;
     status = EXIT_USER;
     if (is_read && device_open(&open, &options.common)) {
         Progress progress;
         progress_open(&progress, true); // so that signals only set the flag
-        status = options.writes ? scenes_write(&list, &options, &open.compute)
-                                : scenes_check(&list, &options, &open.compute);
+        status = options.writes ? scenes_write(&file, &options, &open.compute)
+                                : scenes_check(&file, &options, &open.compute);
         progress_close(&progress);
         status = device_close(&open, status);
     }
-    golden_list_free(&list);
+    golden_file_free(&file);
     return status;
 }

@@ -1,0 +1,152 @@
+#include "host/cli/golden_file.h"
+
+#include "host/base/array.h"
+#include "host/base/memory.h"
+#include "host/base/output.h"
+#include "host/image/image.h"
+#include "host/render/renderer.h"
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char file_head[] = "# glint golden 1: images at strict; glint golden check compares them. "
+                                "Hashes are of the scene as the device gets it,\n"
+                                "# of the layers' values, and of 12 x 8 tiles of the color.\n";
+
+const Layer hashed_layers[] = {LAYER_OBJECT, LAYER_T, LAYER_NORMAL, LAYER_SHADOW, LAYER_PATH, LAYER_COLOR};
+
+void golden_file_free(GoldenFile *file)
+{
+    for (size_t i = 0; i < file->count; i++)
+        free(file->items[i].scene);
+    free(file->items);
+    text_free(&file->comments);
+    *file = (GoldenFile){0};
+}
+
+GoldenLine *golden_file_find(const GoldenFile *file, const char *scene)
+{
+    for (size_t i = 0; i < file->count; i++)
+        if (strcmp(file->items[i].scene, scene) == 0) return &file->items[i];
+    return NULL;
+}
+
+static void golden_append(Text *text, const GoldenLine *golden)
+{
+    text_appendf(text, "size=%ux%u samples=%u bounces=%u scene=%016" PRIx64, golden->width, golden->height,
+                 golden->samples, golden->bounces, golden->scene_hash);
+    for (size_t i = 0; i < HASHED_COUNT; i++)
+        text_appendf(text, " %s=%016" PRIx64, layer_names[hashed_layers[i]], golden->hashes[i]);
+    text_appendf(text, " tiles=");
+    for (size_t i = 0; i < TILES; i++)
+        text_appendf(text, "%04x", golden->tiles[i]);
+    text_appendf(text, " %s\n", golden->scene);
+}
+
+// Reads hexadecimal digits. Returns the position after them, or NULL if there are fewer.
+static const char *hex_read(const char *at, size_t digits, uint64_t *value)
+{
+    *value = 0;
+    for (size_t i = 0; i < digits; i++, at++) {
+        const char *all = "0123456789abcdef", *digit = *at ? strchr(all, *at) : NULL;
+        if (!digit) return NULL;
+        *value = *value << 4 | (uint64_t)(digit - all);
+    }
+    return at;
+}
+
+// Reads " NAME=" and 16 digits. Returns the position after them, or NULL if they are missing.
+static const char *hash_read(const char *at, const char *name, uint64_t *hash)
+{
+    const size_t length = strlen(name);
+    if (!at || *at != ' ' || strncmp(at + 1, name, length) != 0 || at[1 + length] != '=') return NULL;
+    return hex_read(at + 2 + length, 16, hash);
+}
+
+// Reads a prefix and a number of up to nine digits. Returns the position after them, or NULL if absent.
+static const char *count_read(const char *at, const char *prefix, uint32_t *value)
+{
+    const size_t length = strlen(prefix);
+    if (!at || strncmp(at, prefix, length) != 0) return NULL;
+    at += length;
+    const size_t digits = strspn(at, "0123456789");
+    if (digits == 0 || digits > 9) return NULL;
+    *value = (uint32_t)strtoul(at, NULL, 10);
+    return at + digits;
+}
+
+// Reads a line, which ends with a NUL. Returns false if it is not a line of the file's format.
+static bool golden_read(GoldenLine *golden, const char *line)
+{
+    const char *at = count_read(line, "size=", &golden->width);
+    at = count_read(at, "x", &golden->height);
+    at = count_read(at, " samples=", &golden->samples);
+    at = count_read(at, " bounces=", &golden->bounces);
+    at = hash_read(at, "scene", &golden->scene_hash);
+    for (size_t i = 0; i < HASHED_COUNT; i++)
+        at = hash_read(at, layer_names[hashed_layers[i]], &golden->hashes[i]);
+    if (!at || strncmp(at, " tiles=", 7) != 0) return false;
+    at += 7;
+    for (size_t i = 0; at && i < TILES; i++) {
+        uint64_t tile;
+        at = hex_read(at, 4, &tile);
+        golden->tiles[i] = (uint16_t)tile;
+    }
+    const bool is_sound = at && *at == ' ' && at[1] != '\0' && golden->width > 0 &&
+                          golden->width <= IMAGE_SIDE_MAX && golden->height > 0 &&
+                          golden->height <= IMAGE_SIDE_MAX && golden->samples > 0 &&
+                          golden->samples <= SAMPLES_MAX && golden->bounces <= BOUNCES_MAX;
+    if (is_sound) golden->scene = memory_copy_text(at + 1);
+    return is_sound;
+}
+
+// Adds a line of the file, which ends with a NUL. Returns what is wrong with it, or NULL. The caller frees
+// the text.
+static char *line_add(GoldenFile *file, const char *line)
+{
+    GoldenLine golden = {0};
+    if (*line == '#') {
+        if (!strstr(file_head, line)) text_appendf(&file->comments, "%s\n", line);
+    } else if (golden_read(&golden, line) && golden_file_find(file, golden.scene)) {
+        char *fault = text_format("a second line for \"%s\"", golden.scene);
+        free(golden.scene);
+        return fault;
+    } else if (golden.scene) {
+        array_push(*file, golden);
+    } else if (*line != '\0') {
+        return text_format("expected a line of glint golden write");
+    }
+    return NULL;
+}
+
+bool golden_file_read(GoldenFile *file, const char *path, MessageList *messages)
+{
+    Text text = {0};
+    if (!text_read_file(&text, path, messages)) return false;
+    const Source source = {path, text_c(&text), text.count};
+    bool is_sound = true;
+    for (size_t start = 0, end; start < text.count; start = end + 1) {
+        const char *newline = memchr(text.items + start, '\n', text.count - start);
+        end = newline ? (size_t)(newline - text.items) : text.count;
+        char *line = text_format("%.*s", (int)(end - start), text.items + start);
+        if (end > start && text.items[end - 1] == '\r') line[end - start - 1] = '\0';
+        char *fault = line_add(file, line);
+        if (fault) message_add_at(messages, MESSAGE_ERROR, &source, start, "%s", fault);
+        is_sound = is_sound && !fault;
+        free(fault);
+        free(line);
+    }
+    text_free(&text);
+    return is_sound;
+}
+
+bool golden_file_write(const GoldenFile *file, const char *path, MessageList *messages)
+{
+    Text text = {0};
+    text_appendf(&text, "%s%s", file_head, text_c(&file->comments));
+    for (size_t i = 0; i < file->count; i++)
+        golden_append(&text, &file->items[i]);
+    const bool is_written = output_write_file(path, text.items, text.count, messages);
+    text_free(&text);
+    return is_written;
+}
