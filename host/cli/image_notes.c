@@ -1,15 +1,18 @@
 #include "host/cli/image_notes.h"
 
 #include "host/api/version.h"
-#include "host/base/numbers.h"
+#include <inttypes.h>
 #include <string.h>
 
-static void note_add(ImageNotes *notes, const char *key, const char *value)
+// Ends the last note and begins one. The caller appends its value to the text that is returned.
+static Text *note_begin(ImageNotes *notes, const char *key)
 {
-    notes->starts[notes->count][0] = notes->text.count;
-    text_append(&notes->text, key, strlen(key) + 1);
-    notes->starts[notes->count++][1] = notes->text.count;
-    text_append(&notes->text, value, strlen(value) + 1);
+    Text *text = &notes->text;
+    if (notes->count > 0) text_append(text, "", 1);
+    notes->starts[notes->count][0] = text->count;
+    text_append(text, key, strlen(key) + 1);
+    notes->starts[notes->count++][1] = text->count;
+    return text;
 }
 
 // Returns whether the devices may round differently: the precision is not strict and the devices are not all
@@ -36,75 +39,91 @@ const char certified_key[] = "Certified";
 
 void counts_describe(Text *text, const RerenderCounts *counts)
 {
-    text_appendf(text, "%llu sample%s re-rendered in double, %llu uncertified",
-                 (unsigned long long)counts->rerendered, text_plural(counts->rerendered),
-                 (unsigned long long)counts->uncertified);
+    text_appendf(text, "%" PRIu64 " sample%s re-rendered in double, %" PRIu64 " uncertified",
+                 counts->rerendered, text_plural(counts->rerendered), counts->uncertified);
+}
+
+static void scene_notes_add(ImageNotes *notes, const ImageOrigin *origin)
+{
+    const Scene *scene = origin->scene;
+    const char *slash = strrchr(origin->scene_path, '/');
+    text_appendf(note_begin(notes, "Scene"), "%s", slash ? slash + 1 : origin->scene_path);
+    Text *text = scene->overrides ? note_begin(notes, "Set") : NULL;
+    for (const Source *set = scene->overrides; set; set = set->next)
+        text_appendf(text, "%s%s", set->bytes, set->next ? "\n" : "");
+    if (scene->is_animated) text_appendf(note_begin(notes, "Frame"), "%g", scene->frame);
+}
+
+typedef enum { NOTE_DEVICE, NOTE_DRIVER, NOTE_LANES, NOTE_KERNEL } DeviceNote;
+
+// Adds a note with a value of each device.
+static void device_note_add(ImageNotes *notes, DeviceNote note, const ImageOrigin *origin)
+{
+    static const char *const keys[] = {"Device", "Driver", "Lanes", "Kernel"};
+    Text *text = note_begin(notes, keys[note]);
+    for (size_t i = 0; i < origin->renderer_count; i++) {
+        const RenderReport *report = renderer_report(origin->renderers[i]);
+        if (i > 0) text_appendf(text, " + ");
+        if (note == NOTE_DEVICE)
+            text_appendf(text, "%s", report->device->name);
+        else if (note == NOTE_DRIVER)
+            text_appendf(text, "%s, %s", report->device->platform_name, report->device->driver);
+        else if (note == NOTE_LANES)
+            text_appendf(text, "%u", report->lanes);
+        else
+            text_appendf(text, "%016" PRIx64, renderer_kernel_hash(origin->renderers[i]));
+    }
+}
+
+static void precision_notes_add(ImageNotes *notes, Precision precision, const Pilot *pilot,
+                                const RerenderCounts *counts)
+{
+    text_appendf(note_begin(notes, "Precision"), "%s", precision_names[precision]);
+    if (pilot) {
+        text_appendf(note_begin(notes, "Budget"), "%g %s", pilot->budget.limit,
+                     error_metric_names[pilot->budget.metric]);
+        pilot_describe(note_begin(notes, "Pilot"), pilot);
+    }
+    if (counts) counts_describe(note_begin(notes, certified_key), counts);
+}
+
+static void settings_notes_add(ImageNotes *notes, const RenderSettings *settings)
+{
+    text_appendf(note_begin(notes, "Samples"), "%u", settings->sample_count);
+    text_appendf(note_begin(notes, "Bounces"), "%u", settings->bounce_count);
+    if (settings->min_contribution > 0)
+        text_appendf(note_begin(notes, "MinContribution"), "%.17g", settings->min_contribution);
+    text_appendf(note_begin(notes, "Size"), "%ux%u", settings->width, settings->height);
+    text_appendf(note_begin(notes, "Region"), "%u,%u,%u,%u", settings->region_x, settings->region_y,
+                 settings->region_width, settings->region_height);
+}
+
+static void format_notes_add(ImageNotes *notes, const ImageOutputOptions *options, ImageFormat format)
+{
+    const bool is_display = options->transfer == TRANSFER_SRGB && !image_format_holds_floats(format);
+    text_appendf(note_begin(notes, "Transfer"), "%s", is_display ? "srgb" : "none");
+    if (options->exposure != 0) text_appendf(note_begin(notes, "Exposure"), "%g", options->exposure);
+    if (options->tone != TONE_NONE) text_appendf(note_begin(notes, "Tone"), "%s", tone_names[options->tone]);
+    if (options->dither) text_appendf(note_begin(notes, "Dither"), "ordered");
+    if (options->alpha)
+        text_appendf(note_begin(notes, "Alpha"), "%s", format == IMAGE_EXR ? "premultiplied" : "straight");
 }
 
 void image_notes_add_all(ImageNotes *notes, const ImageOrigin *origin, const ImageOutputOptions *options,
                          ImageFormat format, const RerenderCounts *counts)
 {
-    const RenderSettings *settings = origin->settings;
-    const char *slash = strrchr(origin->scene_path, '/');
-    Text value = {0};
-#define NOTE(key, ...)                                                                                       \
-    (text_free(&value), text_appendf(&value, __VA_ARGS__), note_add(notes, key, text_c(&value)))
-// Adds the note with the devices' values.
-#define NOTE_EACH(key, ...)                                                                                  \
-    do {                                                                                                     \
-        text_free(&value);                                                                                   \
-        for (size_t i = 0; i < origin->renderer_count; i++) {                                                \
-            const Renderer *renderer = origin->renderers[i];                                                 \
-            const RenderReport *report = renderer_report(renderer);                                          \
-            (void)report;                                                                                    \
-            text_appendf(&value, "%s", i > 0 ? " + " : "");                                                  \
-            text_appendf(&value, __VA_ARGS__);                                                               \
-        }                                                                                                    \
-        note_add(notes, key, text_c(&value));                                                                \
-    } while (0)
-    NOTE("Software", "glint %s", glint_version());
-    NOTE("Scene", "%s", slash ? slash + 1 : origin->scene_path);
-    if (origin->scene->overrides) {
-        text_free(&value);
-        for (const Source *set = origin->scene->overrides; set; set = set->next)
-            text_appendf(&value, "%s%s", set->bytes, set->next ? "\n" : "");
-        note_add(notes, "Set", text_c(&value));
-    }
-    if (origin->scene->is_animated) NOTE("Frame", "%g", origin->scene->frame);
-    NOTE_EACH("Device", "%s", report->device->name);
-    NOTE_EACH("Driver", "%s, %s", report->device->platform_name, report->device->driver);
-    NOTE("Precision", "%s", precision_names[settings->precision]);
-    if (options->pilot) {
-        const Pilot *pilot = options->pilot;
-        NOTE("Budget", "%g %s", pilot->budget.limit, error_metric_names[pilot->budget.metric]);
-        text_free(&value);
-        pilot_describe(&value, pilot);
-        note_add(notes, "Pilot", text_c(&value));
-    }
-    if (counts) {
-        text_free(&value);
-        counts_describe(&value, counts);
-        note_add(notes, certified_key, text_c(&value));
-    }
-    NOTE_EACH("Lanes", "%u", report->lanes);
-    NOTE("Samples", "%u", settings->sample_count);
-    NOTE("Bounces", "%u", settings->bounce_count);
-    if (settings->min_contribution > 0) NOTE("MinContribution", "%.17g", settings->min_contribution);
-    NOTE("Size", "%ux%u", settings->width, settings->height);
-    NOTE("Region", "%u,%u,%u,%u", settings->region_x, settings->region_y, settings->region_width,
-         settings->region_height);
-    const bool is_display = options->transfer == TRANSFER_SRGB && !image_format_holds_floats(format);
-    NOTE("Transfer", "%s", is_display ? "srgb" : "none");
-    if (options->exposure != 0) NOTE("Exposure", "%g", options->exposure);
-    if (options->tone != TONE_NONE) NOTE("Tone", "%s", tone_names[options->tone]);
-    if (options->dither) NOTE("Dither", "ordered");
-    if (options->alpha) NOTE("Alpha", "%s", format == IMAGE_EXR ? "premultiplied" : "straight");
-    NOTE_EACH("Kernel", "%016llx", (unsigned long long)renderer_kernel_hash(renderer));
-    if (origin->ranks) NOTE("Ranks", "%zu", origin->ranks->remote.count + 1);
-    if (is_mixed(origin)) NOTE("Comment", "rendered by devices that may round differently");
-#undef NOTE
-#undef NOTE_EACH
-    text_free(&value);
+    text_appendf(note_begin(notes, "Software"), "glint %s", glint_version());
+    scene_notes_add(notes, origin);
+    device_note_add(notes, NOTE_DEVICE, origin);
+    device_note_add(notes, NOTE_DRIVER, origin);
+    precision_notes_add(notes, origin->settings->precision, options->pilot, counts);
+    device_note_add(notes, NOTE_LANES, origin);
+    settings_notes_add(notes, origin->settings);
+    format_notes_add(notes, options, format);
+    device_note_add(notes, NOTE_KERNEL, origin);
+    if (origin->ranks) text_appendf(note_begin(notes, "Ranks"), "%zu", origin->ranks->remote.count + 1);
+    if (is_mixed(origin))
+        text_appendf(note_begin(notes, "Comment"), "rendered by devices that may round differently");
 }
 
 void image_notes_list(const ImageNotes *notes, ImageNote list[NOTE_COUNT_MAX + 1])
