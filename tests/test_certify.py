@@ -214,7 +214,7 @@ define:
   row: {{objects: [{", ".join(["{instance: {of: bunny}}"] * 132)}]}}
 objects: [{", ".join(["{instance: {of: row}}"] * 132)}]
 """)
-        self.refuses("certify large.yaml", "no room for more than 67,108,864 objects and triangles")
+        self.refuses("certify large.yaml", "does not support more than 67,108,864 objects and triangles")
         self.refuses("render large.yaml --precision certified --size 8x8 -o x.png", "precision certified copies all")
 
 

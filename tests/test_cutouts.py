@@ -241,11 +241,11 @@ class Cutouts(TestCase):
         self.refuses("render half.yaml -o a.npy --precision certified", "a material has a 'cutout', which has no error bound")
         self.glint("render opaque.yaml -o a.npy --precision certified --size 4x4")
         self.glint("certify opaque.yaml --size 4x4" + (" --precision single" if not IS_LONG else ""))
-        self.refuses("certify half.yaml", "the exact reference has no cutouts, and so cannot judge this scene")
+        self.refuses("certify half.yaml", "the exact reference does not support cutouts, so this scene cannot be certified")
         write("bumps.yaml", scene.replace("image: %s.png, cutout: 0.5", "normal_map: half.png"))
         self.glint("check bumps.yaml")
         self.refuses("render bumps.yaml -o a.npy --precision certified", "a material has a normal map, which has no error bound")
-        self.refuses("certify bumps.yaml", "the exact reference has no normal maps, and so cannot judge this scene")
+        self.refuses("certify bumps.yaml", "the exact reference does not support normal maps, so this scene cannot be certified")
 
 
 def write_bytes(path, data):

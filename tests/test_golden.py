@@ -117,7 +117,7 @@ class Golden(TestCase):
         (scene,) = self.json("golden check --json")["scenes"]
         self.assertEqual((scene["scene"], scene["same"], scene["verdict"], scene["tiles"]), ("s.yaml", True, "same", 0))
         write("new.yaml", SPHERE)
-        self.assertEqual(self.glint("golden check new.yaml", status=3).stdout, "new.yaml: no line; glint golden write makes it\n")
+        self.assertEqual(self.glint("golden check new.yaml", status=3).stdout, "new.yaml: no line; glint golden write adds it\n")
         write("s.yaml", SPHERE.replace("radius: 1", "radius: 0.5"))
         out = self.glint("golden check --format csv", status=3).stdout.splitlines()
         self.assertRegex(out[1], r"^s\.yaml,another scene,object,\d+,\d+,\d+,\d+,\d+,s\.yaml-golden\.png$")

@@ -336,7 +336,7 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
     int status = pairs_run(&against, &progress);
     progress_close(&progress);
     if (status == EXIT_DONE) {
-        passports_recall(device); // the workers' have them
+        passports_recall(device); // the workers have cached them
         if (report_has_text(&options->report)) against_print_text(&against, device);
         if (options->report.format != FORMAT_TEXT &&
             !report_write(against_json(&against, device), &bench_table, &options->report))

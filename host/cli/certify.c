@@ -256,13 +256,12 @@ static int decided_check(const CertifyErrors *certified)
     return EXIT_CHECK;
 }
 
-// Returns the name of a feature of the scene that the exact reference does not compute, or NULL.
-static const char *reference_lacks(const Scene *scene)
+// Returns the name of a feature of the scene that the exact reference does not support, or NULL.
+static const char *unsupported_feature(const Scene *scene)
 {
     enum { OBJECTS_MAX = 1 << 26 }; // of 168 bytes each
     const FeatureSet features = features_of(scene);
-    if (scene_primitive_count(scene) > OBJECTS_MAX)
-        return "room for more than 67,108,864 objects and triangles";
+    if (scene_primitive_count(scene) > OBJECTS_MAX) return "more than 67,108,864 objects and triangles";
     if (features & FEATURE_CUTOUTS) return "cutouts";
     if (features & FEATURE_NORMAL_MAPS) return "normal maps";
     if (features & FEATURE_AREA_LIGHTS) return "lights with an area";
@@ -272,10 +271,11 @@ static const char *reference_lacks(const Scene *scene)
 
 static int scene_certify(const CertifyOptions *options, const Scene *scene, OpenDevice *open)
 {
-    const char *lacking = reference_lacks(scene);
-    if (lacking) {
-        fprintf(stderr, "glint certify: the exact reference has no %s, and so cannot judge this scene\n",
-                lacking);
+    const char *unsupported = unsupported_feature(scene);
+    if (unsupported) {
+        fprintf(stderr,
+                "glint certify: the exact reference does not support %s, so this scene cannot be certified\n",
+                unsupported);
         return EXIT_USER;
     }
     Compute *compute = &open->compute;

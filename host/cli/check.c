@@ -43,7 +43,7 @@ static const CommandLine command_line = {
     .command = "check",
     .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
-             "ignored. Of several scenes it prints one line each.\n",
+             "ignored. For several scenes it prints one line each.\n",
     .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CheckOptions, common),
                OPTION_WITHIN(common_options[COMMON_LENIENT], CheckOptions, common)},
     OPERANDS(SCENES, CheckOptions, scenes),
@@ -191,7 +191,7 @@ static bool object_print(const Scene *scene, const char *path, uint32_t id)
 {
     size_t primitive;
     if (!scene_find_object(scene, id, &primitive)) {
-        fprintf(stderr, "glint: --object: there is no object %u; %zu is the number of IDs\n", id,
+        fprintf(stderr, "glint: --object: there is no object %u; the scene has %zu\n", id,
                 scene_primitive_count(scene));
         return false;
     }

@@ -291,8 +291,8 @@ static bool operands_read(const CommandLine *line, void *options, Operands opera
     case OPERANDS_SCENE:
         *(const char **)field = operands.items[0];
         if (count > 1)
-            fprintf(stderr, "glint %s: takes one scene, not also '%s'; see glint %s --help\n", line->command,
-                    operands.items[1], line->command);
+            fprintf(stderr, "glint %s: takes one scene, but '%s' is a second; see glint %s --help\n",
+                    line->command, operands.items[1], line->command);
         return count == 1;
     case OPERANDS_SCENES:
     case OPERANDS_ANY:

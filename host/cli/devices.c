@@ -24,8 +24,8 @@ static const Option options_own[] = {
 static const CommandLine command_line = {
     .command = "devices",
     .usage = "usage: glint devices [OPTIONS]\n\n"
-             "Lists every OpenCL device of every platform; * marks the default. Then\n"
-             "what the arithmetic of each really does, where that was measured.\n",
+             "Lists every OpenCL device of every platform; * marks the default. Then prints\n"
+             "what the arithmetic of each device really does, if that was measured.\n",
     .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)}};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)

@@ -73,7 +73,7 @@ static bool options_check(void *diff_options)
     options->reference_path = options->images.items[0];
     options->test_path = options->images.items[1];
     if (options->heatmap_path && image_format_of(options->heatmap_path) == IMAGE_UNKNOWN)
-        return option_usage_fault("diff", "the heat map must end in .png, .ppm, .exr or .npy");
+        return option_usage_fault("diff", "the heat map's name must end in .png, .ppm, .exr or .npy");
     return report_options_check(&options->report, &diff_table);
 }
 

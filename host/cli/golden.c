@@ -96,11 +96,11 @@ static const CommandLine command_line = {
     .command = "golden",
     .usage = "usage: glint golden write SCENE... [OPTIONS]\n"
              "       glint golden check [SCENE...] [OPTIONS]\n\n"
-             "Renders scenes at strict, whose bits are the same on every device, and writes a line of hashes "
-             "per scene, or compares\n"
-             "them with their lines: all of the file without a SCENE. Where an image differs it names the "
-             "layer that differs first\n"
-             "and the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
+             "Renders scenes at strict, whose bits are the same on every device. Writes a line of hashes per "
+             "scene, or compares the\n"
+             "scenes with their lines, by default all scenes of the file. If an image differs, names the "
+             "layer that differs first and\n"
+             "the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
     .groups = {OPTIONS(options_own), OPTION_WITHIN(ray_options[RAY_BOUNCES], GoldenOptions, common),
                OPTIONS_WITHIN(device_option, GoldenOptions, common),
                OPTIONS_WITHIN(common_options, GoldenOptions, common),
@@ -259,7 +259,7 @@ static Json *checks_json(const Device *device, const GoldenCheck *checks, size_t
 static void check_print(const GoldenCheck *check)
 {
     if (check->is_new) {
-        printf("%s: no line; glint golden write makes it\n", check->scene);
+        printf("%s: no line; glint golden write adds it\n", check->scene);
         return;
     }
     if (check->first == HASHED_COUNT) {

@@ -62,17 +62,17 @@ void progress_end_at_once(void)
 
 double progress_seconds_left(Progress *progress, double fraction_done)
 {
-    static const double SECONDS_MIN = 1; // both before the extrapolated time and of it
+    static const double seconds_min = 1; // before the interval that is extrapolated, and its least length
     double now = clock_seconds();
-    if (progress->start_fraction == 0 || now - progress->opened_seconds < SECONDS_MIN) {
+    if (progress->start_fraction == 0 || now - progress->opened_seconds < seconds_min) {
         progress->start_seconds = now;
         progress->start_fraction = fraction_done;
     }
     double spent = now - progress->start_seconds, done = fraction_done - progress->start_fraction;
-    return spent < SECONDS_MIN || done <= 0 ? -1 : spent * (1 - fraction_done) / done;
+    return spent < seconds_min || done <= 0 ? -1 : spent * (1 - fraction_done) / done;
 }
 
-static const double SHOW_SECONDS = 0.25;
+static const double show_seconds = 0.25;
 
 static void line_show(Progress *progress, double fraction_done, double left)
 {
@@ -88,7 +88,7 @@ void progress_show(Progress *progress, double fraction_done)
 {
     const double left = progress_seconds_left(progress, fraction_done);
     // no progress for short renders, a few updates per second for long ones
-    if (progress->visible && clock_seconds() - progress->shown_seconds >= SHOW_SECONDS)
+    if (progress->visible && clock_seconds() - progress->shown_seconds >= show_seconds)
         line_show(progress, fraction_done, left);
 }
 
@@ -99,7 +99,7 @@ void progress_step(Progress *progress, double fraction_done, const char *format,
     va_start(arguments, format);
     vsnprintf(progress->step, sizeof progress->step, format, arguments);
     va_end(arguments);
-    if (progress->visible && clock_seconds() - progress->opened_seconds >= SHOW_SECONDS)
+    if (progress->visible && clock_seconds() - progress->opened_seconds >= show_seconds)
         line_show(progress, fraction_done, left);
 }
 

@@ -88,7 +88,7 @@ static void rest_print(const RenderOptions *options)
     if (progress_interrupted() && options->has_format)
         fprintf(stderr, "glint: interrupted: the image on standard output is incomplete\n");
     else if (progress_interrupted())
-        fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is as it was\n",
+        fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is unchanged\n",
                 options->output.path);
     if (options->checkpoint)
         fprintf(stderr, "glint: run the same command again to continue; finished bands are in '%s'\n",
@@ -247,10 +247,10 @@ static bool shutter_fits(const Shutter *shutter, const RenderOptions *options)
         fprintf(stderr, "glint: '%s': %s, but 'shutter' needs several; --set shutter=0 closes it\n",
                 options->scene, obstacle);
     if (shutter->is_open && options->sample_count == 1)
-        fprintf(
-            stderr,
-            "glint: warning: '%s': 'shutter' has an effect from --samples 2 on: each sample shows one time\n",
-            options->scene);
+        fprintf(stderr,
+                "glint: warning: '%s': 'shutter' has no effect at --samples 1, since each sample shows one "
+                "time\n",
+                options->scene);
     return !obstacle;
 }
 

@@ -100,11 +100,11 @@ static bool stdout_fits(const RenderOptions *options)
     if (is_stdout && !options->has_format)
         option_usage_fault("render", "--output - needs --format png, ppm or npy");
     else if (!is_stdout && options->has_format)
-        option_usage_fault("render", "--format is for --output -; the name of a file has its format");
+        option_usage_fault("render", "--format is for --output -; a file's name determines its format");
     else if (is_stdout && options->skips_existing)
         option_usage_fault("render", "--skip-existing is for files, but --output is -");
     else if (is_stdout && options->output.aovs)
-        option_usage_fault("render", "--aov writes more files than --output - can take");
+        option_usage_fault("render", "--aov writes several files, which --output - cannot hold");
     else if (is_stdout && timing_uses_stdout(options->timing))
         option_usage_fault("render",
                            "--timing=json and =trace print to standard output, which --output - takes");

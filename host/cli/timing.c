@@ -36,7 +36,8 @@ static LaunchSum launches_sum(const NamedLaunch *launches, size_t count)
     return sum;
 }
 
-// A longer wait before a command means that the driver did something else, such as compiling.
+// Returns how long a command waited before it ran, or 0 for a usual wait. After a long wait the driver has
+// done something else, such as compiling.
 static double launch_delay(const LaunchTime *time)
 {
     double delay = time->trusted ? time->host_seconds - time->event_seconds : 0;
@@ -78,7 +79,7 @@ static void launches_print(const char *what, const NamedLaunch *launches, size_t
     if (sum.untrusted_count)
         fprintf(
             stderr,
-            "    the events' own times disagree with the host's clock in %zu of %zu; the host's are used\n",
+            "    event times of %zu of %zu commands disagree with the host's clock, whose times are used\n",
             sum.untrusted_count, count);
 }
 

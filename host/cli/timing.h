@@ -13,7 +13,7 @@ static inline bool timing_uses_stdout(TimingStyle style)
     return style == TIMING_JSON || style == TIMING_TRACE;
 }
 
-OptionReader timing_style_read; // of a TimingStyle; without a value it is text
+OptionReader timing_style_read; // reads a TimingStyle, which is text without a value
 
 typedef struct {
     const char *scene;

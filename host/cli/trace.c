@@ -38,12 +38,13 @@ static bool options_check(void *trace_options)
 
 static const CommandLine command_line = {
     .command = "trace",
-    .usage = "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
-             "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays are not shifted to "
-             "the eye;\n"
-             "each number is rounded once to the precision. At certified also low,high,certainty: bounds of "
-             "the exact t,\n"
-             "and whether object and bounds are certain, certain in double, or uncertain.\n",
+    .usage =
+        "usage: glint trace SCENE --rays FILE [OPTIONS]\n\n"
+        "Writes object,t,nx,ny,nz per ray; an empty object is a miss. Scene and rays are not shifted to "
+        "the eye;\n"
+        "each number is rounded once to the precision. At certified, low,high,certainty follow: bounds of "
+        "the exact t,\n"
+        "and whether object and bounds are certain, certain in double, or uncertain.\n",
     .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precision_option, TraceOptions, common),
                SCENE_GROUPS(TraceOptions, common), OPTIONS_WITHIN(driver_options, TraceOptions, common),
                OPTIONS_WITHIN(perturb_option, TraceOptions, common)},

@@ -64,11 +64,12 @@ void variant_set_fit_lanes(VariantSet *set, const Device *device);
 bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress);
 // Runs every variant once. Returns false if the user interrupted or the device failed.
 bool variant_set_round(VariantSet *set, bool warm_up);
+// The fractions of a row's work that are done once it is open, and once it is measured.
+extern const double variants_opened_fraction, variants_measured_fraction;
 // Measures the variants interleaved (A B C A B C …), so that drift affects all alike, until the times
 // converge or a share of options->seconds passes. If `is_benchmark`, also times the builds unless
 // options->no_build_times, and calibrates each round. Returns false if the user interrupted or the device
 // failed.
-extern const double variants_opened_fraction, variants_measured_fraction; // of a row's work
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
 bool variant_set_any_measured(const VariantSet *set);

@@ -81,8 +81,7 @@ static const char *packages_add(EnergyMeter *meter)
         free(name_path);
     }
     globfree(&zones);
-    if (!are_read)
-        return "the processors' energy counters cannot be read, which most systems allow to root alone";
+    if (!are_read) return "most systems allow only root to read the processors' energy counters";
     return meter->count > 0 ? NULL : why_not;
 }
 

@@ -1,5 +1,5 @@
 // Reads the energy that a device has used: of NVIDIA's boards by NVML, the driver's library, and of CPUs by
-// the counters of RAPL that Linux shows below /sys/class/powercap, on many systems to root alone.
+// the counters of RAPL that Linux shows below /sys/class/powercap, on many systems only to root.
 #pragma once
 
 #include "host/opencl/device.h"

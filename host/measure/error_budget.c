@@ -73,7 +73,7 @@ static double largest_channel(const Film *film)
     return largest;
 }
 
-// Returns the error of one pixel within 0..1, of whose values the bound is computed.
+// Returns the error of one pixel, within 0..1. The bound is computed from these errors.
 static double pixel_share(const ErrorBudget *budget, const double reference[3], const double test[3],
                           double range, bool display_values)
 {

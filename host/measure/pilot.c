@@ -264,5 +264,5 @@ void pilot_describe(Text *text, const Pilot *pilot)
     if (pilot->color_max <= DBL_MAX)
         text_appendf(text, ", colors up to %.3g", pilot->color_max);
     else
-        text_appendf(text, ", which bounds no RMSE: a light that fades may be of any brightness");
+        text_appendf(text, ", which give no bound on the RMSE: a light that fades may have any brightness");
 }
