@@ -49,21 +49,6 @@ void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scen
         text_appendf(text, "-reference");
 }
 
-static void absent_json(Json *json, const char *key, const char *reason)
-{
-    json_begin_object(json, key);
-    unavailable_json(json, reason);
-    json_end(json);
-}
-
-static void color_json(Json *json, const char *key, const double color[3])
-{
-    json_begin_array(json, key);
-    for (size_t i = 0; i < 3; i++)
-        json_number(json, NULL, color[i]);
-    json_end(json);
-}
-
 static void saved_json(Json *json, const AccuracyReport *report, size_t scene, const AccuracyVariant *variant)
 {
     if (!report->folder) return;
@@ -98,10 +83,7 @@ static void reference_json(Json *json, const AccuracyReport *report, size_t inde
         unavailable_json(json, "the reference has colors only");
     } else {
         json_count(json, "silhouette", scene->edges.silhouette_pixels);
-        json_begin_array(json, "shadow");
-        for (uint32_t i = 0; i < scene->light_count; i++)
-            json_count(json, NULL, scene->edges.shadow_edge_pixels[i]);
-        json_end(json);
+        counts_json(json, "shadow", scene->edges.shadow_edge_pixels, scene->light_count);
         json_count(json, "path", scene->edges.path_pixels);
     }
     json_end(json);
@@ -137,7 +119,7 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
         json_number(json, "bias", errors->shading.bias);
         json_end(json);
     } else {
-        absent_json(json, "shading", "no pixel shows a surface in the same way");
+        missing_json(json, "shading", "no pixel shows a surface in the same way");
     }
     if (errors->surface_pixels > 0) {
         json_begin_object(json, "t");
@@ -150,8 +132,8 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
         extremes_json(json, NULL, errors->normal);
         json_end(json);
     } else {
-        absent_json(json, "t", "no pixel shows the same object");
-        absent_json(json, "normal", "no pixel shows the same object");
+        missing_json(json, "t", "no pixel shows the same object");
+        missing_json(json, "normal", "no pixel shows the same object");
     }
 }
 
@@ -162,7 +144,7 @@ static void errors_json(Json *json, const AccuracyErrors *errors)
     json_count(json, "negative", errors->negative);
     if (errors->why_colors_only)
         for (unsigned measure = 0; measure < ACCURACY_IMAGE; measure++)
-            absent_json(json, accuracy_measure_names[measure], errors->why_colors_only);
+            missing_json(json, accuracy_measure_names[measure], errors->why_colors_only);
     else
         kinds_json(json, errors);
     const ImageMetrics *display = &errors->display;
@@ -196,8 +178,8 @@ static void worst_json(Json *json, AccuracyMeasure measure, const AccuracyWorst 
         json_number(json, "reference", worst->reference);
         json_number(json, "variant", worst->variant);
     }
-    color_json(json, "reference_color", worst->reference_color);
-    color_json(json, "variant_color", worst->variant_color);
+    numbers_json(json, "reference_color", worst->reference_color, 3);
+    numbers_json(json, "variant_color", worst->variant_color, 3);
     json_end(json);
 }
 
@@ -267,9 +249,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
             json_begin_object(json, NULL);
             json_count(json, "variant", i);
             json_bool(json, "ties", accuracy_ties(pick, i));
-            json_number(json, "ratio", time->ratio);
-            json_number(json, "low", time->low);
-            json_number(json, "high", time->high);
+            ratio_json(json, time);
             json_end(json);
         }
         json_end(json);

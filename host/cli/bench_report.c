@@ -294,12 +294,10 @@ static void launches_json(Json *json, const RenderReport *report)
     json_end(json);
 }
 
-static void ratio_json(Json *json, const Comparison *result, Verdict verdict)
+static void verdict_json(Json *json, const Comparison *comparison, Verdict verdict)
 {
     json_text(json, "verdict", verdict_names[verdict]);
-    json_number(json, "ratio", result->ratio);
-    json_number(json, "low", result->low);
-    json_number(json, "high", result->high);
+    ratio_json(json, comparison);
 }
 
 void comparison_json(Json *json, const RowComparison *comparison)
@@ -308,10 +306,10 @@ void comparison_json(Json *json, const RowComparison *comparison)
     if (comparison->why_not) {
         unavailable_json(json, comparison->why_not);
     } else {
-        ratio_json(json, &comparison->frame, comparison->verdict);
+        verdict_json(json, &comparison->frame, comparison->verdict);
         if (comparison->has_processor) {
             json_begin_object(json, "processor");
-            ratio_json(json, &comparison->processor, comparison->processor.verdict);
+            verdict_json(json, &comparison->processor, comparison->processor.verdict);
             json_end(json);
         }
     }
@@ -368,9 +366,7 @@ static void first_json(Json *json, const BenchReport *report, size_t i)
     Comparison to_first;
     json_begin_object(json, "to_first");
     if (first_compare(report, i, &to_first)) {
-        json_number(json, "ratio", to_first.ratio);
-        json_number(json, "low", to_first.low);
-        json_number(json, "high", to_first.high);
+        ratio_json(json, &to_first);
     } else {
         unavailable_json(json, first_unavailable);
     }
@@ -401,7 +397,7 @@ static void results_json(Json *json, const BenchReport *report, size_t i)
     samples_json(json, "processor_samples_ms", &row->times.processor);
     json_begin_object(json, "drift");
     const Comparison drift = row_drift(report, row);
-    ratio_json(json, &drift, drift.verdict);
+    verdict_json(json, &drift, drift.verdict);
     json_end(json);
     json_begin_object(json, "energy");
     energy_json(json, &row->energy);

@@ -110,11 +110,7 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
 
 static void vector_json(Json *json, const char *key, Vector3 v)
 {
-    json_begin_array(json, key);
-    json_number(json, NULL, v.x);
-    json_number(json, NULL, v.y);
-    json_number(json, NULL, v.z);
-    json_end(json);
+    numbers_json(json, key, (const double[]){v.x, v.y, v.z}, 3);
 }
 
 static void messages_json(Json *json, const MessageList *messages)

@@ -24,15 +24,20 @@ void unavailable_json(Json *json, const char *reason)
     json_text(json, "reason", reason);
 }
 
+void missing_json(Json *json, const char *key, const char *reason)
+{
+    json_begin_object(json, key);
+    unavailable_json(json, reason);
+    json_end(json);
+}
+
 void figure_json(Json *json, const char *key, double scale, Figure figure)
 {
     if (!figure.why_not) {
         json_number(json, key, scale * figure.value);
         return;
     }
-    json_begin_object(json, key);
-    unavailable_json(json, figure.why_not);
-    json_end(json);
+    missing_json(json, key, figure.why_not);
 }
 
 static const char *null_if_empty(const char *text)
@@ -58,12 +63,27 @@ static double report_origin(const RenderReport *report, const Device *device)
                         report->reads.items, report->reads.count, device);
 }
 
-static void counts_json(Json *json, const char *key, const size_t *counts, cl_uint dimensions)
+void counts_json(Json *json, const char *key, const size_t *counts, size_t count)
 {
     json_begin_array(json, key);
-    for (cl_uint i = 0; i < dimensions; i++)
+    for (size_t i = 0; i < count; i++)
         json_count(json, NULL, counts[i]);
     json_end(json);
+}
+
+void numbers_json(Json *json, const char *key, const double *numbers, size_t count)
+{
+    json_begin_array(json, key);
+    for (size_t i = 0; i < count; i++)
+        json_number(json, NULL, numbers[i]);
+    json_end(json);
+}
+
+void ratio_json(Json *json, const Comparison *comparison)
+{
+    json_number(json, "ratio", comparison->ratio);
+    json_number(json, "low", comparison->low);
+    json_number(json, "high", comparison->high);
 }
 
 void command_json(Json *json, const RenderReport *report, const LaunchTime *time)

@@ -12,9 +12,14 @@ Json *report_json_open(int schema, const Device *device);
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
 // Adds the reason for a missing figure to the open object.
 void unavailable_json(Json *json, const char *reason);
+// Adds an object with the reason for a missing value.
+void missing_json(Json *json, const char *key, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
 // Adds board, place on the PCI bus and UUID, each null if unknown.
 void device_identity_json(Json *json, const Device *device);
+void counts_json(Json *json, const char *key, const size_t *counts, size_t count);
+void numbers_json(Json *json, const char *key, const double *numbers, size_t count);
+void ratio_json(Json *json, const Comparison *comparison); // adds ratio, low and high
 void size_json(Json *json, uint32_t width, uint32_t height);
 void hash_json(Json *json, const char *key, uint64_t hash);   // 16 hexadecimal digits
 void perturb_json(Json *json, uint32_t seed, uint32_t scale); // nothing for seed 0

@@ -2,7 +2,7 @@
 #include "host/cli/timing_trace.h"
 
 #include "host/api/version.h"
-#include "host/base/json.h"
+#include "host/cli/report_json.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -82,12 +82,7 @@ static void command_add(Json *json, const Commands *commands, const NamedLaunch 
         json_number(json, "queued_us", 1e6 * (time->queued_seconds + to_origin));
         json_number(json, "submitted_us", 1e6 * (time->submitted_seconds + to_origin));
     }
-    if (time->dimensions > 0) {
-        json_begin_array(json, "work_items");
-        for (cl_uint i = 0; i < time->dimensions; i++)
-            json_count(json, NULL, time->global[i]);
-        json_end(json);
-    }
+    if (time->dimensions > 0) counts_json(json, "work_items", time->global, time->dimensions);
     json_end(json);
     json_end(json);
 }
