@@ -20,6 +20,12 @@ static size_t value_count(const Image *image)
     return pixel_count(image) * image->channels;
 }
 
+double value_error(double reference, double test)
+{
+    if (isfinite(reference) && isfinite(test)) return fabs(test - reference);
+    return isfinite(reference) || isfinite(test) ? INFINITY : 0;
+}
+
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count)
 {
     ErrorSummary summary = {.psnr = INFINITY};
@@ -76,17 +82,11 @@ static double *linear_values(const Image *image)
     return values;
 }
 
-// Returns the largest difference among a pixel's channels. It is infinite where one value is finite and the
-// other is not, and 0 where neither is.
 static float pixel_error(const double *expected, const double *found, uint32_t channels)
 {
     float error = 0;
-    for (uint32_t i = 0; i < channels; i++) {
-        if (isfinite(expected[i]) && isfinite(found[i]))
-            error = fmaxf(error, (float)fabs(found[i] - expected[i]));
-        else if (isfinite(expected[i]) || isfinite(found[i]))
-            error = INFINITY;
-    }
+    for (uint32_t i = 0; i < channels; i++)
+        error = fmaxf(error, (float)value_error(expected[i], found[i]));
     return error;
 }
 

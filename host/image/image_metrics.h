@@ -15,6 +15,8 @@ typedef struct {
     double rel_mse;
 } ErrorSummary;
 
+// Returns the absolute difference of two values. It is infinite if only one is finite, and 0 if neither is.
+double value_error(double reference, double test);
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count);
 
 typedef struct {
@@ -47,6 +49,5 @@ bool image_comparable(const Image *reference, const Image *test, MessageList *me
 // whatever curve they were written with, as on a screen. An image with 1 channel of display values is gray.
 ImageMetrics image_metrics(const Image *reference, const Image *test);
 
-// Fills `errors` with the largest difference among each pixel's channels, as light. It is infinite where one
-// value is finite and the other is not, and 0 where neither is.
+// Fills `errors` with the largest value_error among each pixel's channels, as light.
 void image_errors(const Image *reference, const Image *test, float *errors);

@@ -96,12 +96,6 @@ typedef struct {
     float *t_relative, *t_ulps, *normal;
 } FilmComparison;
 
-static double value_error(double reference, double variant)
-{
-    if (isfinite(reference) && isfinite(variant)) return fabs(variant - reference);
-    return isfinite(reference) || isfinite(variant) ? INFINITY : 0;
-}
-
 // Returns the channel in which a pixel's colors differ most.
 static size_t worst_channel(const FilmComparison *comparison, size_t pixel)
 {
@@ -121,13 +115,13 @@ static double color_error(const FilmComparison *comparison, size_t pixel)
 
 // Keeps the error if it is the worst of its type so far. An error away from edges is worse than any at edges.
 static void worst_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel,
-                         const AccuracyWorst *offered)
+                         const AccuracyWorst *candidate)
 {
     AccuracyWorst *worst = &comparison->errors->worst[type];
-    if (worst->found &&
-        (worst->away > offered->away || (worst->away == offered->away && !(offered->error > worst->error))))
+    if (worst->found && (worst->away > candidate->away ||
+                         (worst->away == candidate->away && !(candidate->error > worst->error))))
         return;
-    *worst = *offered;
+    *worst = *candidate;
     worst->found = true;
     worst->x = (uint32_t)(pixel % comparison->reference->width);
     worst->y = (uint32_t)(pixel / comparison->reference->width);
@@ -220,10 +214,10 @@ static void surface_compare(const FilmComparison *comparison, size_t pixel)
 static void color_error_record(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel)
 {
     const size_t value = 3 * pixel + worst_channel(comparison, pixel);
-    AccuracyWorst offered = {.error = color_error(comparison, pixel),
-                             .reference = comparison->reference->color[value],
-                             .variant = comparison->variant->color[value]};
-    if (offered.error > 0) worst_record(comparison, type, pixel, &offered);
+    AccuracyWorst candidate = {.error = color_error(comparison, pixel),
+                               .reference = comparison->reference->color[value],
+                               .variant = comparison->variant->color[value]};
+    if (candidate.error > 0) worst_record(comparison, type, pixel, &candidate);
 }
 
 static void pixel_compare(const FilmComparison *comparison, size_t pixel)
