@@ -59,20 +59,15 @@ bool digits_read(const char *value, const char **end, uint64_t *result)
     return at > value;
 }
 
-bool count_read(const Option *option, const char *value, uint32_t *count)
+bool option_count(const Option *option, const char *value, void *options)
 {
     const char *end;
     uint64_t number;
     if (!digits_read(value, &end, &number) || *end != '\0' || (double)number < option->low ||
         (double)number > option->high)
         return option_fault(option, value, "an integer from %.0f to %.0f", option->low, option->high);
-    *count = (uint32_t)number;
+    *(uint32_t *)option_field(option, options) = (uint32_t)number;
     return true;
-}
-
-bool option_count(const Option *option, const char *value, void *options)
-{
-    return count_read(option, value, option_field(option, options));
 }
 
 bool option_number(const Option *option, const char *value, void *options)

@@ -105,8 +105,8 @@ OptionReader option_set;        // unsigned: one bit for each name of a comma-se
 OptionEffect effect_folder;
 OptionEffect effect_empty_folder; // which must also be empty
 
-// What option_count and option_choice read, for readers that store it elsewhere.
-bool count_read(const Option *option, const char *value, uint32_t *count);
+// Reads the index of a name, as option_choice does, for readers that store it elsewhere. On a mistake prints
+// the names and returns false.
 bool choice_read(const Option *option, const char *value, unsigned *index);
 // Returns the field of the option.
 void *option_field(const Option *option, void *options);

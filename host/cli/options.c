@@ -32,9 +32,8 @@ bool option_error_budget(const Option *option, const char *value, void *options)
 bool option_precision(const Option *option, const char *value, void *options)
 {
     CommonOptions *common = options;
-    const Option names = {option->name, .names = precision_names, .name_count = option->name_count};
     unsigned index;
-    if (!choice_read(&names, value, &index)) return false;
+    if (!choice_read(option, value, &index)) return false;
     common->precision = (Precision)index;
     common->has_precision = true;
     return true;

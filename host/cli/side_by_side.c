@@ -168,7 +168,9 @@ static void rows_check(const SideReport *report, MessageList *messages)
     }
 }
 
-bool side_by_side_open(SideBySide *side, char *const *paths, size_t count, MessageList *messages)
+// Reads and compares reports. Returns false with messages if one cannot be read. side_by_side_close frees
+// what was read in either case.
+static bool side_by_side_open(SideBySide *side, char *const *paths, size_t count, MessageList *messages)
 {
     size_t rows_max = 0;
     *side = (SideBySide){0};
@@ -192,7 +194,7 @@ bool side_by_side_open(SideBySide *side, char *const *paths, size_t count, Messa
     return true;
 }
 
-void side_by_side_close(SideBySide *side)
+static void side_by_side_close(SideBySide *side)
 {
     for (size_t i = 0; i < side->report_count; i++)
         baseline_close(side->reports[i].baseline);

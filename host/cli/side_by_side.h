@@ -38,10 +38,6 @@ typedef struct {
 // status.
 int side_by_side_run(char *const *paths, size_t count, const char *page);
 
-// Reads and compares reports. Returns false with messages if one cannot be read. side_by_side_close frees
-// what was read in either case.
-bool side_by_side_open(SideBySide *side, char *const *paths, size_t count, MessageList *messages);
-void side_by_side_close(SideBySide *side);
 // Returns the first cell of a row that has one.
 const SideCell *side_first(const SideBySide *side, size_t row);
 static inline SideCell *side_cell(const SideBySide *side, size_t row, size_t report)

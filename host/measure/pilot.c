@@ -181,12 +181,11 @@ static Precision fastest_choose(const Pilot *pilot)
         const PilotCandidate *candidate = &pilot->candidates[i];
         if (candidate->verdict.keeps) least = fmin(least, candidate->pixel_seconds);
     }
-    Precision chosen = PRECISION_DOUBLE;
     for (unsigned i = ARITHMETIC_COUNT; i-- > 0;) // from the most precise
         if (pilot->candidates[i].verdict.keeps &&
             pilot->candidates[i].pixel_seconds <= time_tolerance * least)
             return (Precision)i;
-    return chosen;
+    return PRECISION_DOUBLE;
 }
 
 static bool candidates_measure(const PilotRun *run, const Film *reference)
