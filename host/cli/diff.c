@@ -100,14 +100,6 @@ static double worst_value(const ComparedImages *comparison, const Image *image, 
     return image_value(image, pixel * image->channels + channel);
 }
 
-static void worst_json(Json *json, const char *key, const ComparedImages *comparison, const Image *image)
-{
-    json_begin_array(json, key);
-    for (uint32_t i = 0; i < image->channels; i++)
-        json_number(json, NULL, worst_value(comparison, image, i));
-    json_end(json);
-}
-
 // Returns the figure that the limit bounds. limit_applies must be true.
 static double limited_value(const ImageMetrics *metrics, LimitType type)
 {
@@ -188,6 +180,51 @@ static const char *kind_word(const Image *image)
     return image->data ? "data" : image->display ? "display" : "linear";
 }
 
+static void light_json(Json *json, const ErrorSummary *linear)
+{
+    json_begin_object(json, "linear");
+    json_count(json, "values", linear->count);
+    json_number(json, "max_abs", linear->largest);
+    json_number(json, "rmse", linear->rmse);
+    json_number(json, "bias", linear->bias);
+    json_number(json, "p99_9", linear->percentile_999);
+    json_number(json, "psnr", linear->psnr);
+    json_number(json, "rel_mse", linear->rel_mse);
+    json_end(json);
+}
+
+static void color_json(Json *json, const ImageMetrics *metrics)
+{
+    json_begin_object(json, "srgb8");
+    json_number(json, "psnr", metrics->srgb_psnr);
+    json_count(json, "off_by_1", metrics->off_by_1);
+    json_count(json, "off_by_2_or_more", metrics->off_by_more);
+    json_end(json);
+    json_begin_object(json, "flip");
+    json_number(json, "mean", metrics->flip_mean);
+    json_number(json, "max", metrics->flip_max);
+    json_int64(json, "pixels_per_degree", FLIP_PIXELS_PER_DEGREE);
+    json_end(json);
+}
+
+static void worst_json(Json *json, const ComparedImages *comparison)
+{
+    const struct {
+        const char *key;
+        const Image *image;
+    } images[] = {{"reference", &comparison->reference}, {"image", &comparison->test}};
+    json_begin_object(json, "worst");
+    json_int64(json, "x", comparison->metrics.worst_x);
+    json_int64(json, "y", comparison->metrics.worst_y);
+    for (size_t i = 0; i < COUNT_OF(images); i++) {
+        json_begin_array(json, images[i].key);
+        for (uint32_t channel = 0; channel < images[i].image->channels; channel++)
+            json_number(json, NULL, worst_value(comparison, images[i].image, channel));
+        json_end(json);
+    }
+    json_end(json);
+}
+
 static Json *diff_json(const DiffOptions *options, const ComparedImages *comparison)
 {
     const ImageMetrics *metrics = &comparison->metrics;
@@ -205,34 +242,10 @@ static Json *diff_json(const DiffOptions *options, const ComparedImages *compari
     json_count(json, "image", metrics->nonfinite_test);
     json_end(json);
     json_count(json, "unmatched_values", metrics->unmatched_count);
-    json_begin_object(json, "linear");
-    json_count(json, "values", metrics->linear.count);
-    json_number(json, "max_abs", metrics->linear.largest);
-    json_number(json, "rmse", metrics->linear.rmse);
-    json_number(json, "bias", metrics->linear.bias);
-    json_number(json, "p99_9", metrics->linear.percentile_999);
-    json_number(json, "psnr", metrics->linear.psnr);
-    json_number(json, "rel_mse", metrics->linear.rel_mse);
-    json_end(json);
+    light_json(json, &metrics->linear);
     if (metrics->has_ulp) json_number(json, "max_ulp", metrics->largest_ulp);
-    if (metrics->has_color) {
-        json_begin_object(json, "srgb8");
-        json_number(json, "psnr", metrics->srgb_psnr);
-        json_count(json, "off_by_1", metrics->off_by_1);
-        json_count(json, "off_by_2_or_more", metrics->off_by_more);
-        json_end(json);
-        json_begin_object(json, "flip");
-        json_number(json, "mean", metrics->flip_mean);
-        json_number(json, "max", metrics->flip_max);
-        json_int64(json, "pixels_per_degree", FLIP_PIXELS_PER_DEGREE);
-        json_end(json);
-    }
-    json_begin_object(json, "worst");
-    json_int64(json, "x", metrics->worst_x);
-    json_int64(json, "y", metrics->worst_y);
-    worst_json(json, "reference", comparison, reference);
-    worst_json(json, "image", comparison, &comparison->test);
-    json_end(json);
+    if (metrics->has_color) color_json(json, metrics);
+    worst_json(json, comparison);
     if (options->heatmap_path) {
         json_begin_object(json, "heatmap");
         json_text(json, "file", options->heatmap_path);

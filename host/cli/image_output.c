@@ -21,8 +21,8 @@ struct ImageOutput {
     ImageFormat format;
     ImageOrigin origin;
     bool opened;
-    ImageWriter *image, *aovs[LAYER_COUNT];
-    Scratch converted[LAYER_COUNT]; // a band's values in other types
+    ImageWriter *image, *aovs[LAYER_COUNT]; // of the files that are open
+    Scratch converted[LAYER_COUNT];         // a band's values in other types
     Scratch positions, foreground;
     double bytes; // the size of all files before compression
 
@@ -357,22 +357,18 @@ static void names_print(const ImageOutput *output)
 
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds)
 {
-    if (!kept_write(output, messages) || !band_written(output) || !late_notes_write(output, messages)) {
-        image_output_abandon(output);
-        return false;
-    }
-    double start = clock_seconds();
-    bool whole = image_writer_finish(output->image, messages);
+    bool whole = kept_write(output, messages) && band_written(output) && late_notes_write(output, messages);
+    const double start = clock_seconds();
+    whole = whole && image_writer_finish(output->image, messages);
     for (Layer i = 0; i < LAYER_COUNT && whole; i++)
-        if (output->aovs[i]) whole = image_writer_finish(output->aovs[i], messages);
+        whole = !output->aovs[i] || image_writer_finish(output->aovs[i], messages);
     if (!whole) {
         image_output_abandon(output);
         return false;
     }
     whole = image_writer_commit(output->image, messages);
     for (Layer i = 0; i < LAYER_COUNT; i++) {
-        if (!output->aovs[i]) continue;
-        if (whole)
+        if (whole && output->aovs[i])
             whole = image_writer_commit(output->aovs[i], messages);
         else
             image_writer_abandon(output->aovs[i]);
@@ -391,8 +387,8 @@ void image_output_abandon(ImageOutput *output)
 {
     band_written(output);
     for (Layer i = 0; i < LAYER_COUNT; i++)
-        if (output->aovs[i]) image_writer_abandon(output->aovs[i]);
-    if (output->image) image_writer_abandon(output->image);
+        image_writer_abandon(output->aovs[i]);
+    image_writer_abandon(output->image);
     image_output_free(output);
 }
 

@@ -131,18 +131,15 @@ static bool files_write(ImageRender *render, bool is_whole)
     return is_whole;
 }
 
-// Renders one image, or one of the shutter's times. With the last, writes the files and reports how long it
-// took.
-static int image_render(ImageRender *render)
+// Renders the bands of one image, or of one of the shutter's times. With the last time, opens the output.
+static bool bands_render(ImageRender *render)
 {
     RenderOptions *options = render->options;
     OpenDevices *devices = &render->open->devices;
     Renderer *const *renderers = render->open->renderers;
     Ranks *ranks = render->ranks;
-    Shutter *shutter = &render->shutter;
     HostTimes *times = render->times;
-    const bool is_last = shutter_is_last(shutter);
-    if (shutter->time == 0) progress_open(&shutter->progress, options->quiet);
+    const bool is_last = shutter_is_last(&render->shutter);
     if (is_last)
         render->output = image_output_open(&options->output,
                                            &(ImageOrigin){options->scene, render->scene, &render->settings,
@@ -158,25 +155,37 @@ static int image_render(ImageRender *render)
                            .checkpoint = render->checkpoint,
                            .remote = ranks ? &ranks->remote : NULL};
     stage_begin(times->stage, "rendering", NULL, 0);
-    double start = clock_seconds();
-    bool whole = render_job_run(&job);
+    const double start = clock_seconds();
+    const bool is_whole = render_job_run(&job);
     times->render_seconds += clock_seconds() - start;
     if (is_last) times->rerenders = image_output_rerenders(render->output);
+    return is_whole;
+}
+
+// Renders one image, or one of the shutter's times. With the last, writes the files and reports how long it
+// took.
+static int image_render(ImageRender *render)
+{
+    RenderOptions *options = render->options;
+    Shutter *shutter = &render->shutter;
+    const bool is_last = shutter_is_last(shutter);
+    if (shutter->time == 0) progress_open(&shutter->progress, options->quiet);
+    const bool are_rendered = bands_render(render);
     progress_close(&shutter->progress);
-    whole = files_write(render, whole);
-    if (whole) warnings_add(render);
-    bool faulty = message_count(&render->messages, MESSAGE_ERROR) > 0;
+    const bool is_whole = files_write(render, are_rendered);
+    if (is_whole) warnings_add(render);
+    const bool is_faulty = message_count(&render->messages, MESSAGE_ERROR) > 0;
     messages_print_once(&render->messages, render->printed, NULL);
-    int status = whole                    ? EXIT_DONE
-                 : faulty                 ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
-                 : progress_interrupted() ? EXIT_INTERRUPTED
-                                          : EXIT_MACHINE;
-    if (!whole) rest_print(options);
-    if (ranks && is_last && options->timing == TIMING_TRACE)
-        fprintf(stderr, "glint: --timing=trace has the first rank's devices only\n");
-    if (whole && is_last && options->timing != TIMING_NONE)
-        timing_print(options->timing, renderers, devices->count, ranks, &render->settings, times);
-    return status;
+    if (!is_whole) rest_print(options);
+    if (render->ranks && is_last && options->timing == TIMING_TRACE)
+        fprintf(stderr, "glint: --timing=trace covers only the first rank's devices\n");
+    if (is_whole && is_last && options->timing != TIMING_NONE)
+        timing_print(options->timing, render->open->renderers, render->open->devices.count, render->ranks,
+                     &render->settings, render->times);
+    return is_whole                 ? EXIT_DONE
+           : is_faulty              ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
+           : progress_interrupted() ? EXIT_INTERRUPTED
+                                    : EXIT_MACHINE;
 }
 
 // Stores the precision that --max-error chooses in the settings.
@@ -290,46 +299,55 @@ static int shutter_render(ImageRender *render)
     return status;
 }
 
+// Opens the devices and renders the scene.
+static int scene_render(ImageRender *render)
+{
+    const RenderOptions *options = render->options;
+    RenderDevices *open = render->open;
+    if (options->frame_count > 0 && !render->scene->is_animated && !open->has_warned_of_frames)
+        fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options->scene);
+    open->has_warned_of_frames = true;
+    open->reference_selector = options->common.reference_device;
+    stage_begin(render->times->stage, "opening the devices", NULL, 0);
+    if (!render_devices_open(open, &options->common)) return EXIT_USER;
+    if (options->common.capture_folder && open->devices.count > 1) {
+        option_usage_fault("render", "--capture needs a single device");
+        return EXIT_USER;
+    }
+    return shutter_render(render);
+}
+
 int image_file_render(RenderOptions options, const char *path, RenderDevices *open, Ranks *ranks)
 {
     Scene scene = {0};
-    options.output.path = path;
-    double start = clock_seconds();
+    const CommonOptions *common = &options.common;
+    const double start = clock_seconds();
     int status = EXIT_USER;
-    if (ranks &&
-        (options.common.work_group[0] > 0 || options.common.build_options || options.common.capture_folder)) {
+    options.output.path = path;
+    if (ranks && (common->work_group[0] > 0 || common->build_options || common->capture_folder)) {
         option_usage_fault("render",
                            "--work-group, --build-options and --capture need glint render, a single process");
         return EXIT_USER;
     }
     if (options.timing == TIMING_TRACE) options.common.stage = stage_open(true);
     MessageList printed = {0};
-    if (image_output_path_known(path) && scene_open_once(&scene, options.scene, &options.common, &printed) &&
+    if (image_output_path_known(path) && scene_open_once(&scene, options.scene, common, &printed) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
         HostTimes times = {.scene = options.scene,
-                           .frame = options.frame_count > 0 ? options.common.frame : NAN,
+                           .frame = options.frame_count > 0 ? common->frame : NAN,
                            .is_several = options.has_several,
                            .parse_seconds = clock_seconds() - start,
-                           .stage = options.common.stage};
-        if (options.frame_count > 0 && !scene.is_animated && !open->has_warned_of_frames)
-            fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options.scene);
-        open->has_warned_of_frames = true;
-        open->reference_selector = options.common.reference_device;
-        stage_begin(times.stage, "opening the devices", NULL, 0);
+                           .stage = common->stage};
         ImageRender render = {.options = &options,
                               .scene = &scene,
                               .open = open,
                               .ranks = ranks,
                               .times = &times,
                               .printed = &printed};
-        const bool is_open = render_devices_open(open, &options.common);
-        if (is_open && options.common.capture_folder && open->devices.count > 1)
-            option_usage_fault("render", "--capture needs a single device");
-        else if (is_open)
-            status = shutter_render(&render);
+        status = scene_render(&render);
     }
     message_list_free(&printed);
     scene_free(&scene);
-    stage_close(options.common.stage);
+    stage_close(common->stage);
     return status;
 }
