@@ -16,7 +16,7 @@
 
 typedef struct {
     VariantOptions variants;
-    Operands scenes;
+    CommandOperands scenes;
     const char *reference_path, *folder, *page_path;
     AccuracyBudgets budgets;
     ReportOptions report;

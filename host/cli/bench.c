@@ -16,7 +16,7 @@ enum { VARIANTS_MAX = 32 };
 
 typedef struct {
     VariantOptions variants;
-    Operands scenes;
+    CommandOperands scenes;
     double tolerance; // 0 if not given
     const char *baseline, *against;
     ReportOptions report;
@@ -63,7 +63,7 @@ static const Option precisions_option[] = {
 
 typedef struct {
     VariantOptions options;
-    Operands operands; // there must be none
+    CommandOperands operands; // there must be none
 } VariantLine;
 
 // The options that --variant accepts.

@@ -19,7 +19,7 @@
 
 typedef struct {
     CommonOptions common;
-    Operands scenes;
+    CommandOperands scenes;
     bool as_json;
     uint32_t object; // UINT32_MAX if not given
 } CheckOptions;

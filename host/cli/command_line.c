@@ -273,7 +273,7 @@ static int help_print(const CommandLine *line)
 }
 
 // Stores the operands. Returns false with a message if one is missing or superfluous.
-static bool operands_read(const CommandLine *line, void *options, Operands operands)
+static bool operands_read(const CommandLine *line, void *options, CommandOperands operands)
 {
     void *field = (char *)options + line->operands_offset;
     const size_t count = operands.count;
@@ -293,7 +293,7 @@ static bool operands_read(const CommandLine *line, void *options, Operands opera
     case OPERANDS_ANY:
         break;
     }
-    *(Operands *)field = operands;
+    *(CommandOperands *)field = operands;
     return true;
 }
 
@@ -334,7 +334,7 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
         if (!listed[i].option->read(listed[i].option, optarg, listed[i].fields)) return EXIT_USER;
         listed[i].is_given = true;
     }
-    const Operands operands = {arguments + optind, (size_t)(argument_count - optind)};
+    const CommandOperands operands = {arguments + optind, (size_t)(argument_count - optind)};
     bool is_accepted = operands_read(line, options, operands) && (!line->check || line->check(options));
     for (size_t i = 0; i < count && is_accepted; i++)
         if (listed[i].is_given && listed[i].option->effect)

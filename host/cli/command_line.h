@@ -62,14 +62,14 @@ enum { OPTION_GROUPS_MAX = 16 };
 typedef struct {
     char **items;
     size_t count;
-} Operands;
+} CommandOperands;
 
 // How many arguments may follow the options, and the type of the field that stores them.
 typedef enum {
     OPERANDS_NONE,   // none, the default
     OPERANDS_SCENE,  // one, in a const char *
-    OPERANDS_SCENES, // at least one, in an Operands
-    OPERANDS_ANY     // any number, in an Operands
+    OPERANDS_SCENES, // at least one, in an CommandOperands
+    OPERANDS_ANY     // any number, in an CommandOperands
 } OperandRule;
 
 typedef struct {

@@ -26,7 +26,7 @@ static const struct {
 
 typedef struct {
     uint32_t input_pixels_max;
-    Operands images;
+    CommandOperands images;
     const char *reference_path, *test_path, *heatmap_path, *layer;
     ReportOptions report;
     double limits[LIMIT_COUNT]; // below 0 if not given

@@ -23,8 +23,8 @@ typedef struct {
     CommonOptions common;
     ReportOptions report;
     const char *file;
-    Operands scenes;  // at first with the verb before them
-    uint32_t samples; // 0 if not given
+    CommandOperands scenes; // at first with the verb before them
+    uint32_t samples;       // 0 if not given
     bool writes;
 } GoldenOptions;
 

@@ -7,7 +7,7 @@
 
 typedef struct {
     CommonOptions common;
-    Operands scenes;
+    CommandOperands scenes;
     const char *scene;         // the current scene
     const char *checkpoint;    // with several frames, their pattern
     ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern

@@ -41,7 +41,7 @@ typedef struct {
     const char *output, *page; // NULL if not given
     char *passed[PASSED_MAX];  // options for verify and bench
     size_t passed_count;
-    Operands operands; // cases, or reports to compare
+    CommandOperands operands; // cases, or reports to compare
     bool compares;
     double seconds; // 0 if not given
 } ReportChoice;

@@ -46,8 +46,8 @@ static const ResultTable verify_table = {
 typedef struct {
     CommonOptions common;
     ReportOptions report;
-    bool quick, lean; // see VerifySettings
-    Operands names;   // of the cases, all if none is named
+    bool quick, lean;      // see VerifySettings
+    CommandOperands names; // of the cases, all if none is named
 } VerifyOptions;
 
 static const Option options_own[] = {
@@ -106,6 +106,7 @@ typedef struct {
     VerifyJournal *journal;
     const Compute *compute;
     Progress progress;
+    bool has_text;
     size_t case_count, row_count; // the cases of one precision, and of all that are requested
     // The current state:
     Precision precision;
@@ -225,8 +226,7 @@ static bool case_start(void *context, const VerifyResult *result)
 {
     Verification *verification = context;
     CaseRecord *record = record_of(verification, result->name);
-    if (record->state == CASE_CRASHED && !record->is_printed &&
-        report_has_text(&verification->options->report)) {
+    if (record->state == CASE_CRASHED && !record->is_printed && verification->has_text) {
         line_begin(verification);
         record_print(record, verification->tier);
     }
@@ -247,7 +247,7 @@ static bool case_receive(void *context, const VerifyResult *result)
     record->result = *result;
     record->seconds = clock_seconds() - record->start_seconds;
     record->state = CASE_DONE;
-    if (!report_has_text(&verification->options->report)) return true;
+    if (!verification->has_text) return true;
     line_begin(verification);
     record_print(record, verification->tier);
     return true;
@@ -277,7 +277,7 @@ static void precision_verify(Verification *verification, Compute *compute)
                     "glint: verify: the reference has %d bits here: tier D is checked against numbers of its "
                     "own precision\n",
                     verify_reference_bits());
-        if (report_has_text(&options->report)) {
+        if (verification->has_text) {
             line_begin(verification);
             printf("%s\n", precision_names[verification->precision]);
             fflush(stdout);
@@ -290,7 +290,7 @@ static void precision_verify(Verification *verification, Compute *compute)
     record->seconds = clock_seconds() - record->start_seconds;
     if (!compute_ok(compute)) return;
     record->is_ended = true;
-    if (!report_has_text(&options->report)) return;
+    if (!verification->has_text) return;
     const size_t count = records_count(record, has_ended);
     line_begin(verification);
     printf("  tier %c: %zu of %zu case%s passed, in %.1f s; kernels: trace %016" PRIx64 ", render %016" PRIx64
@@ -365,7 +365,7 @@ static int device_verify(Verification *verification, Compute *compute)
     if (options->common.has_precision && !journal->is_headed &&
         !arithmetic_is_suitable(compute, options, first))
         return EXIT_USER;
-    if (report_has_text(&options->report) && !journal->is_headed) {
+    if (verification->has_text && !journal->is_headed) {
         printf("%s; reference of %d bits%s\n", compute->device->name, verify_reference_bits(),
                options->quick ? "; quick" : "");
         fflush(stdout);
@@ -383,7 +383,7 @@ static int device_verify(Verification *verification, Compute *compute)
         failed += records_count(record, has_failed);
     }
     progress_close(&verification->progress);
-    if (report_has_text(&options->report)) passports_remark(compute->device, stdout);
+    if (verification->has_text) passports_remark(compute->device, stdout);
     if (options->report.format != FORMAT_TEXT &&
         !report_write(journal_json(verification), &verify_table, &options->report))
         return EXIT_USER;
@@ -437,7 +437,8 @@ int command_verify(int argument_count, char **arguments)
     VerifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    Verification verification = {.options = &options, .journal = verify_journal_open()};
+    Verification verification = {
+        .options = &options, .journal = verify_journal_open(), .has_text = report_has_text(&options.report)};
     for (size_t i = 0; verify_case_name(i); i++)
         verification.case_count += is_chosen(&options, verify_case_name(i));
     const CommonOptions *common = &options.common;
