@@ -1,11 +1,11 @@
 #include "host/cli/options.h"
-#include "host/cli/progress.h"
-#include "host/image/image.h"
 
 #include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/cli/progress.h"
+#include "host/image/image.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -1,6 +1,6 @@
-#include "host/base/array.h"
 #include "host/image/codec.h"
 
+#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
