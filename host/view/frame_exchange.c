@@ -1,4 +1,23 @@
-// Passes data between the thread of the window and that of the loop. All of it is under the mutex.
+// Passes data between the window's thread and the loop's thread. These invariants hold:
+//
+//  1. `shared` is accessed only in this file and only with the mutex. No thread reads or writes files,
+//  renders
+//     or notifies the other while it holds the mutex, so the window never waits for the renderer.
+//  2. The loop's thread alone accesses the members of FrameLoop that it owns, and `options` never change.
+//  3. Everything allocated has one owner. Publishing moves a text to `shared`, and acquiring moves it out. A
+//     frame is exchanged for another: of the three, the loop fills one, `shared` has the newest complete one,
+//     and the window shows the third.
+//  4. Requests are numbered from 1. A request replaces one that was not read. `current_number` is that of the
+//     last one read, and a frame has the number of the request that it shows.
+//  5. `has_news` is set, with the mutex, by each request and each change of a file, and is cleared when both
+//     have been read. Renderers poll it between launches without the mutex.
+//  6. `first_is_due` is set only by a request for a moving camera, until its first frame is published or its
+//     work ends. News do not end the render meanwhile, so that each drag of the mouse shows frames.
+//  7. `ends` and `quits` are set once, in this order, and never cleared.
+//  8. Each change for which the loop may wait signals `changed`. Each one for which the window may wait calls
+//     `notify`.
+//  9. `written` is not empty only while the watch may still report the window's own write of the scene's
+//     file. `update.camera` is the camera of that file, as read or as written.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/file.h"
@@ -6,24 +25,151 @@
 #include <stdlib.h>
 #include <string.h>
 
+void exchange_open(FrameLoop *loop)
+{
+    loop->shared.reloads = true;
+    pthread_mutex_init(&loop->mutex, NULL);
+    pthread_condattr_t steady;
+    pthread_condattr_init(&steady);
+    pthread_condattr_setclock(&steady, CLOCK_MONOTONIC);
+    pthread_cond_init(&loop->changed, &steady);
+    pthread_condattr_destroy(&steady);
+}
+
+void exchange_close(FrameLoop *loop)
+{
+    pthread_mutex_destroy(&loop->mutex);
+    pthread_cond_destroy(&loop->changed);
+    frame_free(&loop->shared.ready);
+    free(loop->shared.save_path);
+    free(loop->shared.message);
+    free(loop->shared.facts);
+    text_free(&loop->shared.written);
+}
+
+static SharedState *shared_lock(FrameLoop *loop)
+{
+    pthread_mutex_lock(&loop->mutex);
+    return &loop->shared;
+}
+
+static void shared_unlock(FrameLoop *loop)
+{
+    pthread_mutex_unlock(&loop->mutex);
+}
+
+// Ends a change for the window.
+static void shared_publish(FrameLoop *loop)
+{
+    shared_unlock(loop);
+    loop->options.notify(loop->options.notify_context);
+}
+
+// Ends a change for the loop.
+static void shared_signal(FrameLoop *loop)
+{
+    pthread_cond_signal(&loop->changed);
+    shared_unlock(loop);
+}
+
+// Moves a text of the shared state to the caller and sets it to NULL.
+static char *text_acquire(FrameLoop *loop, char **text)
+{
+    shared_lock(loop);
+    char *taken = *text;
+    *text = NULL;
+    shared_unlock(loop);
+    return taken;
+}
+
+// The loop's thread.
+
 bool render_stops(void *context)
 {
     const FrameLoop *loop = context;
     return atomic_load(&loop->ends) || (atomic_load(&loop->has_news) && !atomic_load(&loop->first_is_due));
 }
 
+// Returns the state of the most urgent work, or LOOP_WAIT if there is none.
+static LoopState work_choose(const FrameLoop *loop)
+{
+    const SharedState *shared = &loop->shared;
+    const bool can_save = loop->is_complete && loop->renderer && loop->current.view == VIEW_COLOR;
+    if (shared->quits) return LOOP_END;
+    if (shared->reloads) return LOOP_RELOAD;
+    if (shared->request_number != loop->current_number) return LOOP_BEGIN;
+    if (loop->renderer && shared->has_probe) return LOOP_PROBE;
+    return can_save && shared->save_path ? LOOP_SAVE : LOOP_WAIT;
+}
+
+LoopState work_wait(FrameLoop *loop)
+{
+    SharedState *shared = shared_lock(loop);
+    atomic_store(&loop->first_is_due, false);
+    LoopState work;
+    while ((work = work_choose(loop)) == LOOP_WAIT)
+        pthread_cond_wait(&loop->changed, &loop->mutex);
+    if (work == LOOP_RELOAD) shared->reloads = false;
+    if (work == LOOP_BEGIN) {
+        loop->current = shared->request;
+        if (loop->current.follows_scene) loop->current.camera = shared->update.camera;
+        loop->current_number = shared->request_number;
+    }
+    atomic_store(&loop->has_news, shared->reloads || shared->request_number != loop->current_number);
+    shared_unlock(loop);
+    return work;
+}
+
+bool news_are_absent(FrameLoop *loop, long nanoseconds)
+{
+    struct timespec until;
+    clock_gettime(CLOCK_MONOTONIC, &until);
+    until.tv_nsec += nanoseconds;
+    until.tv_sec += until.tv_nsec / 1000000000;
+    until.tv_nsec %= 1000000000;
+    shared_lock(loop);
+    while (!render_stops(loop) && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
+        continue;
+    shared_unlock(loop);
+    return !render_stops(loop);
+}
+
+bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])
+{
+    SharedState *shared = shared_lock(loop);
+    const bool has_probe = shared->has_probe;
+    memcpy(pixel, shared->probe, sizeof shared->probe);
+    shared->has_probe = false;
+    shared_unlock(loop);
+    return has_probe;
+}
+
+char *save_path_acquire(FrameLoop *loop)
+{
+    return text_acquire(loop, &loop->shared.save_path);
+}
+
+Text written_acquire(FrameLoop *loop)
+{
+    Text written = {0};
+    SharedState *shared = shared_lock(loop);
+    const Text taken = shared->written;
+    shared->written = written;
+    shared_unlock(loop);
+    return taken;
+}
+
 void message_publish(FrameLoop *loop, char *message)
 {
-    pthread_mutex_lock(&loop->mutex);
-    char *waiting = loop->shared.message;
-    loop->shared.message = message;
+    SharedState *shared = shared_lock(loop);
+    char *waiting = shared->message;
+    shared->message = message;
     if (waiting && *waiting && *message) {
-        loop->shared.message = text_format("%s%s", waiting, message);
+        shared->message = text_format("%s%s", waiting, message);
         free(message);
     }
     free(waiting);
-    pthread_mutex_unlock(&loop->mutex);
-    loop->options.notify(loop->options.notify_context);
+    shared_publish(loop);
 }
 
 void messages_publish(FrameLoop *loop, MessageList *messages)
@@ -33,18 +179,26 @@ void messages_publish(FrameLoop *loop, MessageList *messages)
     if (text) message_publish(loop, text);
 }
 
+void facts_publish(FrameLoop *loop, char *facts)
+{
+    SharedState *shared = shared_lock(loop);
+    free(shared->facts);
+    shared->facts = facts;
+    shared_publish(loop);
+}
+
 void frame_publish(FrameLoop *loop, uint32_t samples)
 {
     loop->frame.number = loop->current_number;
     loop->frame.samples = samples;
-    pthread_mutex_lock(&loop->mutex);
-    Frame taken = loop->shared.ready;
-    loop->shared.ready = loop->frame;
-    loop->shared.has_ready = true;
-    pthread_mutex_unlock(&loop->mutex);
-    loop->frame = taken;
     stage_end(loop->stage);
-    loop->options.notify(loop->options.notify_context);
+    SharedState *shared = shared_lock(loop);
+    const Frame taken = shared->ready;
+    shared->ready = loop->frame;
+    shared->has_ready = true;
+    loop->frame = taken;
+    atomic_store(&loop->first_is_due, false);
+    shared_publish(loop);
 }
 
 void scene_publish(FrameLoop *loop)
@@ -52,135 +206,82 @@ void scene_publish(FrameLoop *loop)
     const Camera *camera = &loop->scene.camera;
     ImageSize size = {0};
     scene_choose_image_size(&loop->scene, &size.width, &size.height);
-    pthread_mutex_lock(&loop->mutex);
-    SceneUpdate *update = &loop->shared.update;
-    update->has_new_camera |= loop->shared.scene_state == SCENE_LOADING ||
+    const bool can_reread = !file_obstacle(loop->options.scene_path);
+    if (loop->current.follows_scene) loop->current.camera = *camera;
+    SharedState *shared = shared_lock(loop);
+    SceneUpdate *update = &shared->update;
+    update->has_new_camera |= shared->scene_state == SCENE_LOADING ||
                               (update->frame == loop->scene_frame && !cameras_equal(&update->camera, camera));
     update->camera = *camera;
     update->frame = loop->scene_frame;
-    update->frame_count = file_obstacle(loop->options.scene_path) ? 0 : loop->scene.frame_count;
+    update->frame_count = can_reread ? loop->scene.frame_count : 0;
     update->frame_rate = loop->scene.frame_rate;
-    loop->shared.has_update = true;
-    if (loop->current.follows_scene) loop->current.camera = *camera;
-    loop->shared.scene_state = SCENE_LOADED;
-    loop->shared.scene_size = size;
-    pthread_mutex_unlock(&loop->mutex);
-    loop->options.notify(loop->options.notify_context);
+    shared->has_update = true;
+    shared->scene_state = SCENE_LOADED;
+    shared->scene_size = size;
+    shared_publish(loop);
 }
 
 void refusal_publish(FrameLoop *loop)
 {
-    pthread_mutex_lock(&loop->mutex);
-    if (loop->shared.scene_state == SCENE_LOADING) loop->shared.scene_state = SCENE_REFUSED;
-    pthread_mutex_unlock(&loop->mutex);
-    loop->options.notify(loop->options.notify_context);
+    SharedState *shared = shared_lock(loop);
+    if (shared->scene_state == SCENE_LOADING) shared->scene_state = SCENE_REFUSED;
+    shared_publish(loop);
 }
+
+// The thread that watches the scene's files.
 
 void files_changed(void *context)
 {
     FrameLoop *loop = context;
-    pthread_mutex_lock(&loop->mutex);
-    loop->shared.reloads = true;
+    shared_lock(loop)->reloads = true;
     atomic_store(&loop->has_news, true);
-    pthread_cond_signal(&loop->changed);
-    pthread_mutex_unlock(&loop->mutex);
+    shared_signal(loop);
 }
 
-bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])
-{
-    pthread_mutex_lock(&loop->mutex);
-    const bool has_probe = loop->shared.has_probe;
-    memcpy(pixel, loop->shared.probe, sizeof loop->shared.probe);
-    loop->shared.has_probe = false;
-    pthread_mutex_unlock(&loop->mutex);
-    return has_probe;
-}
+// The window's thread.
 
-void facts_publish(FrameLoop *loop, char *facts)
+void exchange_quit(FrameLoop *loop)
 {
-    pthread_mutex_lock(&loop->mutex);
-    free(loop->shared.facts);
-    loop->shared.facts = facts;
-    pthread_mutex_unlock(&loop->mutex);
-    loop->options.notify(loop->options.notify_context);
-}
-
-Work work_wait(FrameLoop *loop, bool can_save, char **save_path)
-{
-    pthread_mutex_lock(&loop->mutex);
-    while (!loop->shared.quits && !loop->shared.reloads &&
-           loop->shared.request_number == loop->current_number && !(can_save && loop->shared.save_path) &&
-           !(loop->renderer && loop->shared.has_probe))
-        pthread_cond_wait(&loop->changed, &loop->mutex);
-    Work work = WORK_SAVE;
-    if (loop->shared.quits) {
-        work = WORK_END;
-    } else if (loop->shared.reloads) {
-        work = WORK_RELOAD;
-        loop->shared.reloads = false;
-    } else if (loop->shared.request_number != loop->current_number) {
-        work = WORK_RENDER;
-        loop->current = loop->shared.request;
-        if (loop->current.follows_scene) loop->current.camera = loop->shared.update.camera;
-        loop->current_number = loop->shared.request_number;
-    } else if (loop->renderer && loop->shared.has_probe) {
-        work = WORK_PROBE;
-    } else {
-        *save_path = loop->shared.save_path;
-        loop->shared.save_path = NULL;
-    }
-    atomic_store(&loop->has_news, loop->shared.request_number != loop->current_number);
-    pthread_mutex_unlock(&loop->mutex);
-    return work;
+    atomic_store(&loop->ends, true);
+    shared_lock(loop)->quits = true;
+    shared_signal(loop);
 }
 
 SceneState frame_loop_scene(FrameLoop *loop, ImageSize *size)
 {
-    pthread_mutex_lock(&loop->mutex);
-    SceneState state = loop->shared.scene_state;
-    *size = loop->shared.scene_size;
-    pthread_mutex_unlock(&loop->mutex);
+    const SharedState *shared = shared_lock(loop);
+    const SceneState state = shared->scene_state;
+    *size = shared->scene_size;
+    shared_unlock(loop);
     return state;
 }
 
 unsigned frame_loop_request(FrameLoop *loop, const FrameRequest *request)
 {
-    pthread_mutex_lock(&loop->mutex);
-    loop->shared.request = *request;
-    unsigned number = ++loop->shared.request_number;
+    SharedState *shared = shared_lock(loop);
+    shared->request = *request;
+    const unsigned number = ++shared->request_number;
     atomic_store(&loop->has_news, true);
-    pthread_cond_signal(&loop->changed);
-    pthread_mutex_unlock(&loop->mutex);
+    shared_signal(loop);
     return number;
 }
 
 void frame_loop_save(FrameLoop *loop, const char *path)
 {
-    pthread_mutex_lock(&loop->mutex);
-    free(loop->shared.save_path);
-    loop->shared.save_path = memory_copy_text(path);
-    pthread_cond_signal(&loop->changed);
-    pthread_mutex_unlock(&loop->mutex);
+    SharedState *shared = shared_lock(loop);
+    free(shared->save_path);
+    shared->save_path = memory_copy_text(path);
+    shared_signal(loop);
 }
 
 void frame_loop_probe(FrameLoop *loop, uint32_t x, uint32_t y)
 {
-    pthread_mutex_lock(&loop->mutex);
-    loop->shared.probe[0] = x;
-    loop->shared.probe[1] = y;
-    loop->shared.has_probe = true;
-    pthread_cond_signal(&loop->changed);
-    pthread_mutex_unlock(&loop->mutex);
-}
-
-// Moves a text of the loop to the caller and sets it to NULL.
-static char *text_acquire(FrameLoop *loop, char **text)
-{
-    pthread_mutex_lock(&loop->mutex);
-    char *taken = *text;
-    *text = NULL;
-    pthread_mutex_unlock(&loop->mutex);
-    return taken;
+    SharedState *shared = shared_lock(loop);
+    shared->probe[0] = x;
+    shared->probe[1] = y;
+    shared->has_probe = true;
+    shared_signal(loop);
 }
 
 char *frame_loop_acquire_facts(FrameLoop *loop)
@@ -188,34 +289,46 @@ char *frame_loop_acquire_facts(FrameLoop *loop)
     return text_acquire(loop, &loop->shared.facts);
 }
 
+char *frame_loop_acquire_message(FrameLoop *loop)
+{
+    return text_acquire(loop, &loop->shared.message);
+}
+
 bool frame_loop_acquire(FrameLoop *loop, Frame *frame)
 {
-    pthread_mutex_lock(&loop->mutex);
-    bool is_new = loop->shared.has_ready;
+    SharedState *shared = shared_lock(loop);
+    const bool is_new = shared->has_ready;
     if (is_new) {
-        Frame shown = *frame;
-        *frame = loop->shared.ready;
-        loop->shared.ready = shown;
-        loop->shared.has_ready = false;
+        const Frame shown = *frame;
+        *frame = shared->ready;
+        shared->ready = shown;
+        shared->has_ready = false;
     }
-    pthread_mutex_unlock(&loop->mutex);
+    shared_unlock(loop);
     return is_new;
 }
 
 bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update)
 {
-    pthread_mutex_lock(&loop->mutex);
-    bool is_new = loop->shared.has_update;
-    loop->shared.has_update = false;
-    if (is_new) *update = loop->shared.update;
-    loop->shared.update.has_new_camera = false;
-    pthread_mutex_unlock(&loop->mutex);
+    SharedState *shared = shared_lock(loop);
+    const bool is_new = shared->has_update;
+    shared->has_update = false;
+    if (is_new) *update = shared->update;
+    shared->update.has_new_camera = false;
+    shared_unlock(loop);
     return is_new;
 }
 
-char *frame_loop_acquire_message(FrameLoop *loop)
+void written_exchange(FrameLoop *loop, Text *written, Camera *camera)
 {
-    return text_acquire(loop, &loop->shared.message);
+    SharedState *shared = shared_lock(loop);
+    const Text old_text = shared->written;
+    const Camera old_camera = shared->update.camera;
+    shared->written = *written;
+    shared->update.camera = *camera;
+    *written = old_text;
+    *camera = old_camera;
+    shared_unlock(loop);
 }
 
 bool frame_loop_stage(FrameLoop *loop, Text *text, double *seconds)

@@ -7,7 +7,31 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-// The data that the window's thread and the loop's thread exchange. Every access holds the mutex.
+// The states of the loop's thread. Each does its work and names the next one, as loop_run has it:
+//
+//     WAIT ──files changed──▶ RELOAD ──image due──▶ BEGIN
+//       ├────request────────▶ BEGIN ──moving──▶ PREVIEW ──▶ REST ──▶ PASSES
+//       │                       └─────at rest───────────────────────▶ PASSES ──error view──▶ ERRORS
+//       ├────question───────▶ PROBE
+//       ├────complete image─▶ SAVE
+//       └────closed─────────▶ END
+//
+// Every state but END returns to WAIT when its work is done, when the device failed, and, from BEGIN to
+// ERRORS, when there is other work: a request, a changed file or the end.
+typedef enum {
+    LOOP_WAIT,    // reports a failure of the device, and waits for work
+    LOOP_RELOAD,  // re-reads the scene, because one of its files changed
+    LOOP_BEGIN,   // starts on the request, and reads the scene if the request is for another of its frames
+    LOOP_PREVIEW, // renders a coarse frame
+    LOOP_REST,    // waits until the camera rests
+    LOOP_PASSES,  // renders the image in passes
+    LOOP_ERRORS,  // replaces the image by its heat map of errors
+    LOOP_PROBE,   // answers a question about a pixel
+    LOOP_SAVE,    // saves the image
+    LOOP_END
+} LoopState;
+
+// The data that the threads exchange, by the invariants of frame_exchange.c.
 typedef struct {
     FrameRequest request;
     unsigned request_number;
@@ -32,12 +56,13 @@ struct FrameLoop {
 
     // used by both threads without the mutex
     Stage *stage;
-    atomic_bool has_news;     // a request that was not yet read
-    atomic_bool first_is_due; // new requests do not end the render
+    atomic_bool has_news;     // a request or a changed file that was not yet read
+    atomic_bool first_is_due; // a moving camera's first frame, for which news do not end the render
     atomic_bool ends;         // the current render and all later ones
 
     // owned by the loop's thread
     bool is_mistaken;     // whether the scene's file, as it is now, has a mistake
+    bool is_complete;     // the current request's image of the scene has all samples
     bool has_preview;     // the request's first frame is coarse, or of arrays that another eye saw
     uint32_t divisor;     // the coarse frame's
     uint32_t scene_frame; // of the animation, at which the scene was read last
@@ -58,16 +83,24 @@ struct FrameLoop {
 
 // frame_exchange.c
 
+void exchange_open(FrameLoop *loop);
+// Ends the current render and the loop.
+void exchange_quit(FrameLoop *loop);
+// Frees what was not acquired. The loop's thread must have ended.
+void exchange_close(FrameLoop *loop);
+
 // Returns whether the current render should end. It is the renderers' `stop`, whose context is the loop.
 bool render_stops(void *context);
 
 // Called by the thread that watches the scene's files.
 void files_changed(void *context);
 
-typedef enum { WORK_RENDER, WORK_SAVE, WORK_PROBE, WORK_RELOAD, WORK_END } Work;
-
-// Waits for the next work and returns it. WORK_SAVE sets the path, which the caller frees.
-Work work_wait(FrameLoop *loop, bool can_save, char **save_path);
+// Waits for the next work and returns its state. LOOP_BEGIN has then read the request.
+LoopState work_wait(FrameLoop *loop);
+// Waits for news for that long. Returns false if there are some.
+bool news_are_absent(FrameLoop *loop, long nanoseconds);
+// Returns the path to which the image is to be saved. The caller frees it.
+char *save_path_acquire(FrameLoop *loop);
 // Sets the pixel of a question that has no answer yet. Returns false if there is none.
 bool probe_acquire(FrameLoop *loop, uint32_t pixel[2]);
 // Takes ownership of the facts.
@@ -82,6 +115,11 @@ void frame_publish(FrameLoop *loop, uint32_t samples);
 void scene_publish(FrameLoop *loop);
 // Publishes that the scene cannot be read or rendered.
 void refusal_publish(FrameLoop *loop);
+// Exchanges the text that is being written into the scene's file, and the camera that it has, for the shared
+// ones.
+void written_exchange(FrameLoop *loop, Text *written, Camera *camera);
+// Returns the text that was written into the scene's file since the last call. The caller frees it.
+Text written_acquire(FrameLoop *loop);
 
 // frame_fill.c
 
@@ -92,8 +130,15 @@ void distances_fill(FrameLoop *loop);
 
 // frame_render.c
 
-// Renders the current request until another comes. Returns true if its image is complete.
-bool request_render(FrameLoop *loop);
+// Chooses how the current request begins. Returns true if that is by a preview.
+bool request_begin(FrameLoop *loop);
+// Return false if the render was ended or failed. errors_render follows passes_render.
+bool preview_render(FrameLoop *loop);
+bool passes_render(FrameLoop *loop);
+bool errors_render(FrameLoop *loop);
+// Waits until no request has come for a while if a move to another eye takes long, as in a large scene.
+// Returns false if one came.
+bool camera_rests(FrameLoop *loop);
 // Answers the question about a pixel, if there is one.
 void probe_answer(FrameLoop *loop);
 void renderers_close(FrameLoop *loop);

@@ -54,7 +54,6 @@ static bool pass_receive(void *context, const Film *band)
     frame_fill(loop, samples);
     if (!is_first) distances_fill(loop);
     frame_publish(loop, samples);
-    atomic_store(&loop->first_is_due, false);
     return true;
 }
 
@@ -118,32 +117,28 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
         start = clock_seconds();
     }
     messages_publish(loop, &messages);
-    if (!compute_ok(&loop->compute)) failure_publish(loop);
     loop->render_start = clock_seconds();
     loop->move_seconds = loop->render_start - start;
     if (!is_preview) loop->expected_move = fmax(0.7 * loop->expected_move, loop->move_seconds);
     return prepared;
 }
 
-// Waits until no request has come for a while, because moving a large scene to another eye takes long.
-// Returns false if one came.
-static bool camera_rests(FrameLoop *loop)
+bool camera_rests(FrameLoop *loop)
 {
-    if (loop->expected_move > PREVIEW_SECONDS) {
-        struct timespec until;
-        clock_gettime(CLOCK_MONOTONIC, &until);
-        until.tv_nsec += REST_NANOSECONDS;
-        until.tv_sec += until.tv_nsec / 1000000000;
-        until.tv_nsec %= 1000000000;
-        pthread_mutex_lock(&loop->mutex);
-        while (!render_stops(loop) && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
-            continue;
-        pthread_mutex_unlock(&loop->mutex);
-    }
+    if (loop->expected_move > PREVIEW_SECONDS) return news_are_absent(loop, REST_NANOSECONDS);
     return !render_stops(loop);
 }
 
-static bool preview_render(FrameLoop *loop)
+bool request_begin(FrameLoop *loop)
+{
+    const FrameRequest *request = &loop->current;
+    loop->divisor =
+        request->is_moving ? preview_divisor(&loop->preview, request->size.width, request->size.height) : 1;
+    loop->has_preview = request->is_moving && (loop->divisor > 1 || loop->expected_move > PREVIEW_SECONDS);
+    return loop->has_preview;
+}
+
+bool preview_render(FrameLoop *loop)
 {
     const unsigned aovs = view_aovs[loop->current.view];
     if (!renderer_prepare(loop, loop->divisor, 1, true)) return false;
@@ -154,8 +149,18 @@ static bool preview_render(FrameLoop *loop)
                    (double)film_pixel_count(&loop->film));
     frame_fill(loop, 1);
     frame_publish(loop, 0);
-    atomic_store(&loop->first_is_due, false);
-    return camera_rests(loop);
+    return true;
+}
+
+bool passes_render(FrameLoop *loop)
+{
+    const View view = loop->current.view;
+    const unsigned aovs = AOV_T | view_aovs[view];
+    const uint32_t samples = view == VIEW_COLOR ? loop->options.settings.sample_count : 1;
+    if (!renderer_prepare(loop, 1, samples, false)) return false;
+    film_fit(loop, aovs);
+    atomic_store(&loop->first_is_due, loop->current.is_moving && !loop->has_preview);
+    return renderer_accumulate(loop->renderer, aovs, pass_receive, loop);
 }
 
 typedef struct {
@@ -171,8 +176,7 @@ static bool reference_receive(void *context, const Film *band)
     return true;
 }
 
-// Replaces the image by the heat map of its errors. Returns false if it was stopped or failed.
-static bool errors_render(FrameLoop *loop)
+bool errors_render(FrameLoop *loop)
 {
     RenderSettings settings = loop->settings;
     settings.precision = PRECISION_DOUBLE;
@@ -196,25 +200,4 @@ static bool errors_render(FrameLoop *loop)
     }
     film_free(&reference.film);
     return done;
-}
-
-bool request_render(FrameLoop *loop)
-{
-    const ImageSize size = loop->current.size;
-    const View view = loop->current.view;
-    const unsigned aovs = AOV_T | view_aovs[view];
-    const bool is_moving = loop->current.is_moving;
-    loop->divisor = is_moving ? preview_divisor(&loop->preview, size.width, size.height) : 1;
-    loop->has_preview = is_moving && (loop->divisor > 1 || loop->expected_move > PREVIEW_SECONDS);
-    const uint32_t samples = view == VIEW_COLOR ? loop->options.settings.sample_count : 1;
-    bool complete = (!loop->has_preview || preview_render(loop)) && renderer_prepare(loop, 1, samples, false);
-    if (complete) {
-        film_fit(loop, aovs);
-        atomic_store(&loop->first_is_due, is_moving && !loop->has_preview);
-        complete = renderer_accumulate(loop->renderer, aovs, pass_receive, loop) &&
-                   (view != VIEW_ERROR || errors_render(loop));
-        atomic_store(&loop->first_is_due, false);
-    }
-    if (loop->renderer && !compute_ok(&loop->compute)) failure_publish(loop);
-    return complete;
 }

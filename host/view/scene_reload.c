@@ -44,11 +44,7 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
 
 bool is_own_write(FrameLoop *loop)
 {
-    pthread_mutex_lock(&loop->mutex);
-    Text written = loop->shared.written;
-    loop->shared.written = (Text){0};
-    pthread_mutex_unlock(&loop->mutex);
-    Text text = {0};
+    Text written = written_acquire(loop), text = {0};
     MessageList messages = {0};
     bool same = written.count > 0 && text_read_file(&text, camera_path(&loop->options), &messages) &&
                 text.count == written.count && memcmp(text.items, written.items, text.count) == 0;
@@ -110,16 +106,11 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
         return false;
     }
     // before the change is visible, so that the loop recognizes it as its own
-    pthread_mutex_lock(&loop->mutex);
-    text_free(&loop->shared.written);
-    loop->shared.written = text;
-    const Camera file_camera = loop->shared.update.camera;
-    loop->shared.update.camera = *camera;
-    pthread_mutex_unlock(&loop->mutex);
-    if (output_commit(&output, messages)) return true;
-    pthread_mutex_lock(&loop->mutex);
-    text_free(&loop->shared.written);
-    loop->shared.update.camera = file_camera;
-    pthread_mutex_unlock(&loop->mutex);
-    return false;
+    Camera file_camera = *camera;
+    written_exchange(loop, &text, &file_camera);
+    text_free(&text);
+    done = output_commit(&output, messages);
+    if (!done) written_exchange(loop, &text, &file_camera);
+    text_free(&text);
+    return done;
 }
