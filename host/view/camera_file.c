@@ -112,18 +112,18 @@ static size_t indentation(const Source *source, size_t offset)
     return offset - start;
 }
 
-// Returns whether a key is quoted. The offset of a quoted key is behind its quote.
-static bool is_quoted(const Source *source, const YamlNode *key)
+// Returns the quote of a key like this one, or "". The offset of a quoted key is behind its quote.
+static const char *quote_of(const Source *source, const YamlNode *key)
 {
     const char before = source->bytes[key->offset - 1];
-    return before == '"' || before == '\'';
+    return before == '"' || before == '\'' ? "\"" : "";
 }
 
 // Inserts a key in front of another of a mapping.
 static void pair_insert(Copy *copy, const YamlNode *mapping, const YamlNode *next, const char *key,
                         const Text *value)
 {
-    const char *quote = is_quoted(copy->source, next) ? "\"" : "";
+    const char *quote = quote_of(copy->source, next);
     const size_t offset = next->offset - strlen(quote);
     copy_until(copy, offset);
     text_appendf(copy->text, "%s%s%s: %s", quote, key, quote, text_c(value));
@@ -138,7 +138,7 @@ static void pair_append(Copy *copy, const YamlNode *mapping, const YamlNode *las
                         const char *key, const Text *value)
 {
     const Source *source = copy->source;
-    const char *quote = is_quoted(source, last) ? "\"" : "";
+    const char *quote = quote_of(source, last);
     const bool is_block = source->bytes[mapping->offset] != '{';
     while (is_block && end < source->length && source->bytes[end] != '\n')
         end++;
@@ -160,7 +160,8 @@ static void value_replace(Copy *copy, const YamlNode *key, const YamlNode *value
     copy->next = value->end;
 }
 
-// Records the new value of an animated key, or of one that becomes animated.
+// Records the new value of an animated key, or of one that becomes animated. Returns false with a message if
+// the keys have no separate place in the file.
 static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, const YamlNode *animated,
                          uint32_t frame, const Text *value)
 {
@@ -168,7 +169,7 @@ static bool value_record(Copy *copy, CameraFile *file, const YamlNode *name, con
     char key[16];
     snprintf(key, sizeof key, "%u", frame);
     if (!yaml_has_keys(reader, animated)) {
-        const char *quote = is_quoted(copy->source, name) ? "\"" : "";
+        const char *quote = quote_of(copy->source, name);
         Text text = {0};
         text_appendf(&text, "{%skeys%s: {%s%s%s: %s}}", quote, quote, quote, key, quote, text_c(value));
         value_replace(copy, name, animated, text_c(&text));

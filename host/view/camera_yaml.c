@@ -1,10 +1,8 @@
 #include "host/view/camera_yaml.h"
 
 #include "host/scene/portable.h"
-
 #include <stdlib.h>
 
-// Uses the fewest digits that read back as the same number.
 void number_write_yaml(Text *text, double value)
 {
     char word[32];
@@ -15,21 +13,31 @@ void number_write_yaml(Text *text, double value)
     text_appendf(text, "%s", word);
 }
 
+static void list_write(Text *text, const double *values, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        text_appendf(text, "%s", i == 0 ? "[" : ", ");
+        number_write_yaml(text, values[i]);
+    }
+    text_appendf(text, "]");
+}
+
 void vector_write_yaml(Text *text, Vector3 v)
 {
-    text_appendf(text, "[");
-    number_write_yaml(text, v.x);
-    text_appendf(text, ", ");
-    number_write_yaml(text, v.y);
-    text_appendf(text, ", ");
-    number_write_yaml(text, v.z);
-    text_appendf(text, "]");
+    list_write(text, (const double[]){v.x, v.y, v.z}, 3);
 }
 
 static void vector_write(Text *text, const char *name, Vector3 v)
 {
     text_appendf(text, "%s: ", name);
     vector_write_yaml(text, v);
+    text_appendf(text, ", ");
+}
+
+static void number_write(Text *text, const char *name, double value)
+{
+    text_appendf(text, "%s: ", name);
+    number_write_yaml(text, value);
     text_appendf(text, ", ");
 }
 
@@ -66,22 +74,14 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
     vector_write(text, "look_at", camera->look_at);
     vector_write(text, "up", camera->up);
     if (camera->shift[0] != 0 || camera->shift[1] != 0) {
-        text_appendf(text, "shift: [");
-        number_write_yaml(text, camera->shift[0]);
+        text_appendf(text, "shift: ");
+        list_write(text, camera->shift, 2);
         text_appendf(text, ", ");
-        number_write_yaml(text, camera->shift[1]);
-        text_appendf(text, "], ");
     }
     if (camera->lens_radius > 0) {
-        text_appendf(text, "aperture: ");
-        number_write_yaml(text, 2 * camera->lens_radius);
-        text_appendf(text, ", ");
+        number_write(text, "aperture", 2 * camera->lens_radius);
         if (camera->has_focus) vector_write(text, "focus", camera->focus);
-    }
-    if (camera->lens_radius > 0 && camera->focal_distance > 0) {
-        text_appendf(text, "focus: ");
-        number_write_yaml(text, camera->focal_distance);
-        text_appendf(text, ", ");
+        if (camera->focal_distance > 0) number_write(text, "focus", camera->focal_distance);
     }
     if (camera->orthographic) {
         text_appendf(text, "height: ");
@@ -92,12 +92,9 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
         text_appendf(text, "fov: ");
         number_write_yaml(text, field_of_view(camera->half_tangent));
     } else {
-        double width = 2 * camera->half_tangent;
-        text_appendf(text, "focal_length: 1, frame: [");
-        number_write_yaml(text, width);
-        text_appendf(text, ", ");
-        number_write_yaml(text, width / aspect);
-        text_appendf(text, "]");
+        const double width = 2 * camera->half_tangent;
+        text_appendf(text, "focal_length: 1, frame: ");
+        list_write(text, (const double[]){width, width / aspect}, 2);
     }
     text_appendf(text, "}\n");
 }

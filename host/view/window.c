@@ -27,7 +27,7 @@ void message_show(Window *window, char *message)
 
 void request_send(Window *window)
 {
-    if (!window->is_loaded ||
+    if (window->scene_state != SCENE_LOADED ||
         (!window->camera_changed && !window->scene_frame_changed && !window->image_changed))
         return;
     const FrameRequest request = {.camera = window->camera,
@@ -92,7 +92,7 @@ static bool needs_scene(const SDL_Event *event)
 
 static void event_handle(Window *window, const SDL_Event *event)
 {
-    if (!window->is_loaded && needs_scene(event)) return;
+    if (window->scene_state != SCENE_LOADED && needs_scene(event)) return;
     switch (event->type) {
     case SDL_QUIT:
         window->closes = true;
@@ -142,21 +142,15 @@ static ImageSize size_fit(ImageSize size)
     return (ImageSize){(uint32_t)fmax(1, size.width * factor), (uint32_t)fmax(1, size.height * factor)};
 }
 
-// Receives the loaded scene. The size is the scene's own unless another was asked for.
+// Receives the scene's state. Once it is loaded, the size is the scene's own unless another was asked for.
 static void scene_receive(Window *window)
 {
     ImageSize size;
-    window->is_loaded = frame_loop_scene(window->frames, &size) == SCENE_LOADED;
-    if (!window->is_loaded || window->options->size.width > 0) return;
+    window->scene_state = frame_loop_scene(window->frames, &size);
+    if (window->scene_state != SCENE_LOADED || window->options->size.width > 0) return;
     size = size_fit(size);
     SDL_SetWindowSize(window->screen.window, (int)size.width, (int)size.height);
     size_read(window);
-}
-
-static bool is_refused(const Window *window)
-{
-    ImageSize size;
-    return frame_loop_scene(window->frames, &size) == SCENE_REFUSED;
 }
 
 static void scene_acquire(Window *window)
@@ -175,7 +169,7 @@ static void scene_acquire(Window *window)
 
 static void work_exchange(Window *window)
 {
-    if (!window->is_loaded) scene_receive(window);
+    if (window->scene_state != SCENE_LOADED) scene_receive(window);
     scene_acquire(window);
     key_record(window);
     request_send(window);
@@ -201,10 +195,7 @@ static WindowEnd events_run(Window *window)
         if (window->mouse.drag == DRAG_LOOK) fly(window);
         if (window->play.is_running) play(window);
         work_exchange(window);
-        if (!window->is_loaded && is_refused(window)) {
-            message_acquire(window); // it may have come since the last look, together with the refusal
-            return WINDOW_REFUSED;
-        }
+        if (window->scene_state == SCENE_REFUSED) return WINDOW_REFUSED;
         if (window->redraws) window_draw(window);
     }
     return WINDOW_CLOSED;

@@ -59,7 +59,7 @@ typedef struct {
     unsigned image_request; // the last one for another view, precision or size
 
     // what the loop has delivered
-    bool is_loaded; // the scene
+    SceneState scene_state;
     SceneUpdate scene;
     Frame frame;
 
