@@ -31,11 +31,9 @@ static bool ranks_begin(Ranks *ranks, const RenderSettings *settings, unsigned a
                         const char *device_selector, MessageList *messages)
 {
     Job job = {.type = JOB_IMAGE,
-               .settings = *settings,
+               .settings = job_settings_of(settings),
                .aovs = aovs,
                .selector_size = device_selector ? strlen(device_selector) + 1 : 0};
-    job.settings.stop = NULL;
-    job.settings.stage = NULL;
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
     broadcast((void *)(uintptr_t)device_selector, job.selector_size, MPI_COMM_WORLD);
     Rank *all = memory_allocate_zeroed(ranks->remote.count + 1, sizeof *all);

@@ -77,7 +77,8 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
         return;
     }
     Compute *compute = worker->devices.items[0].compute;
-    worker->renderer = renderer_open_empty(compute, &job->settings, worker->renderer, &worker->messages);
+    const RenderSettings settings = settings_of_job(&job->settings);
+    worker->renderer = renderer_open_empty(compute, &settings, worker->renderer, &worker->messages);
     rank_set_device(own, compute->device);
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
         own->lanes[pass] = renderer_lanes(worker->renderer, pass);
