@@ -1,4 +1,4 @@
-// Lists the OpenCL devices of all platforms and selects among them.
+// Lists the OpenCL devices of all platforms, and chooses among them (device_choose.c).
 #pragma once
 
 #define CL_TARGET_OPENCL_VERSION 120
