@@ -97,7 +97,7 @@ class Images(unittest.TestCase):
             path = Path(folder, "scene.json")
             path.write_text(json.dumps(moving))
             np.testing.assert_array_equal(image(glint.load(path, frame=2)), large)
-            np.testing.assert_array_equal(image(glint.load(path, {"objects[0].sphere.radius": 1.5})), large)
+            np.testing.assert_array_equal(image(glint.load(path, overrides={"objects[0].sphere.radius": 1.5})), large)
             shot = Path(folder, "shot.json")
             shot.write_text(json.dumps({"camera": {**SPHERE["camera"], "fov": 20}, "frames": 3}))
             np.testing.assert_array_equal(image(glint.load(path, camera=shot)), image(glint.Scene(SPHERE, overrides={"camera.fov": 20})))
@@ -133,19 +133,19 @@ class Rays(unittest.TestCase):
         for dtype in np.float32, np.float64:
             for precision in glint.PRECISIONS:
                 hits = scene.trace(np.array([[0, 0, -4], [0, 5, -4], [0, 0, 0]], dtype), np.array([[0, 0, 2], [0, 0, 1], [0, 3, 0]], dtype),
-                                   precision)
+                                   precision=precision)
                 self.assertEqual(hits.object.tolist(), [0, glint.MISS, 0])
                 np.testing.assert_allclose(hits.t, [1.5, np.inf, 1 / 3], rtol=1e-6)
                 np.testing.assert_allclose(hits.normal, [[0, 0, -1], [0, 0, 0], [0, -1, 0]], atol=1e-6)
                 np.testing.assert_allclose(hits.position, [[0, 0, -1], [0, 0, 0], [0, 1, 0]], atol=1e-6)
                 self.assertEqual(hits.certain.all(), precision == "certified")
                 self.assertTrue(np.all((hits.low <= hits.t) & (hits.t <= hits.high)))
-        hits = scene.trace([[0, 0, -4]] * 3, [0, 0, 1], "double", tmin=[0, 3, 3.5], tmax=[2.5, np.inf, np.inf])
+        hits = scene.trace([[0, 0, -4]] * 3, [0, 0, 1], precision="double", tmin=[0, 3, 3.5], tmax=[2.5, np.inf, np.inf])
         np.testing.assert_allclose(hits.t, [np.inf, 5, 5])
         # an end that float32 would round to beyond the hit
         origins, directions = np.float32([[0, 0, -4]]), np.float32([[0, 0, 10]])
-        self.assertEqual(scene.trace(origins, directions, "certified", tmax=0.3 - 1e-10).hit.tolist(), [False])
-        self.assertEqual(scene.trace(np.zeros((0, 3)), np.zeros((0, 3)), "certified").t.shape, (0,))
+        self.assertEqual(scene.trace(origins, directions, precision="certified", tmax=0.3 - 1e-10).hit.tolist(), [False])
+        self.assertEqual(scene.trace(np.zeros((0, 3)), np.zeros((0, 3)), precision="certified").t.shape, (0,))
         self.assertEqual(scene.trace(np.array([[0, 0, -4.0]] * 4)[::2], [0, 0, 1]).object.tolist(), [0, 0])
 
     def test_bounds_hold(self):
@@ -156,7 +156,7 @@ class Rays(unittest.TestCase):
         targets = random.integers(0, 5, (count, 3)) / 4
         origins = random.normal(size=(count, 3)) * 3
         directions = targets - origins
-        hits = glint.load_mesh(CUBE_VERTICES, CUBE_FACES).trace(origins, directions, "certified")
+        hits = glint.load_mesh(CUBE_VERTICES, CUBE_FACES).trace(origins, directions, precision="certified")
         certain = 0
         for origin, direction, t, low, high, is_certain in zip(origins, directions, hits.t, hits.low, hits.high, hits.certain):
             origin, direction = [Fraction(x) for x in origin], [Fraction(x) for x in direction]
@@ -205,10 +205,10 @@ class Occlusion(unittest.TestCase):
         for dtype in np.float32, np.float64:
             for precision in glint.PRECISIONS:
                 rays = points.astype(dtype), (light - points).astype(dtype)
-                occluded, certain = scene.occluded(*rays, precision, tmax=dtype(1), return_certain=True)
+                occluded, certain = scene.occluded(*rays, precision=precision, tmax=dtype(1), return_certain=True)
                 self.assertEqual((occluded.dtype, certain.dtype), (bool, bool))
                 np.testing.assert_array_equal(occluded[clear], offset[clear] < 1)
-                hits = scene.trace(*rays, precision, tmax=dtype(1))
+                hits = scene.trace(*rays, precision=precision, tmax=dtype(1))
                 np.testing.assert_array_equal(occluded, hits.hit)
                 np.testing.assert_array_equal(certain, hits.certain)
                 self.assertTrue(certain.mean() > 0.99 if precision == "certified" else not certain.any())
@@ -223,7 +223,7 @@ class Occlusion(unittest.TestCase):
         points, shadow = layers["position"][hit], layers["shadow"][hit][:, 0] == 1
         light = np.broadcast_to([3.0, 4.0, -5.0], points.shape)
         for precision in "double", "certified":
-            np.testing.assert_array_equal(scene.occluded(light, points - light, precision, tmax=1 - 1e-6), shadow)
+            np.testing.assert_array_equal(scene.occluded(light, points - light, precision=precision, tmax=1 - 1e-6), shadow)
         facing = (layers["object"][hit] == 0) & (np.einsum("ij,ij->i", points, light) > 1.1)
         self.assertTrue(0 < (shadow & facing).sum() < facing.sum(), "the small sphere shades a part of the large one")
 
@@ -232,10 +232,10 @@ class Occlusion(unittest.TestCase):
         scene = glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
         below, above = np.nextafter((1, 2), 0), np.nextafter((1, 2), 3)
         tmin, tmax = [0, 0, 0, 1, below[1], 2], [below[0], 1, above[0], 2, above[1], 3]
-        occluded = scene.occluded([[0.25, 0.5, -1]] * 6, [0, 0, 1], "double", tmin, tmax)
+        occluded = scene.occluded([[0.25, 0.5, -1]] * 6, [0, 0, 1], precision="double", tmin=tmin, tmax=tmax)
         self.assertEqual(occluded.tolist(), [False, False, True, False, True, False])
         # certified compares the bounds of t with the end
-        occluded, certain = scene.occluded([[0.25, 0.5, -1]] * 3, [0, 0, 1], "certified", tmax=[0.999, 1, 1.001], return_certain=True)
+        occluded, certain = scene.occluded([[0.25, 0.5, -1]] * 3, [0, 0, 1], precision="certified", tmax=[0.999, 1, 1.001], return_certain=True)
         self.assertEqual((occluded.tolist(), certain.tolist()), ([False, False, True], [True, False, True]))
         self.assertEqual(scene.occluded(np.zeros((0, 3)), np.zeros((0, 3))).shape, (0,))
         directions = np.tile([0.0, 0, 1], (300000, 1))
@@ -352,7 +352,7 @@ class AllHits(unittest.TestCase):
         np.testing.assert_allclose(found.t, (0.5 * (depths - origins[:, 2:]))[is_hit], atol=1e-6)
         np.testing.assert_allclose(found.position, np.stack([origins[found.ray, 0], 0 * found.t, depths[is_hit]], 1), atol=1e-6)
         self.assertTrue(np.all(found.normal[:, 2] < 0))  # they face the rays
-        nearest = self.scene.trace(origins, [0, 0, 2], "double")
+        nearest = self.scene.trace(origins, [0, 0, 2], precision="double")
         firsts = np.unique(found.ray, return_index=True)[1]
         np.testing.assert_array_equal(found.t[firsts], nearest.t[nearest.hit])
 
@@ -370,14 +370,14 @@ class AllHits(unittest.TestCase):
                 away = np.stack([np.cos(angle), 0.05 * slope, np.sin(angle)], 1)
                 origins = distance * away
                 for precision in "single", "strict", "double":
-                    found = scene.trace_all(origins, -away, precision)
+                    found = scene.trace_all(origins, -away, precision=precision)
                     self.assertTrue(np.all(np.bincount(found.ray, minlength=1000) == hits), (shape, distance, precision))
 
     def test_limits(self):
         origins, directions = np.array([[0, 0, -8], [9, 0, 0]], np.float32), np.array([[0, 0, 1], [0, 0, 1]], np.float32)
         for precision in "single", "strict", "double":
-            self.assertEqual(self.scene.trace_all(origins, directions, precision).ray.tolist(), [0] * 10)
-            found = self.scene.trace_all(origins, directions, precision, hits_max=3)
+            self.assertEqual(self.scene.trace_all(origins, directions, precision=precision).ray.tolist(), [0] * 10)
+            found = self.scene.trace_all(origins, directions, precision=precision, hits_max=3)
             self.assertEqual((found.ray.tolist(), found.object.tolist(), found.t.tolist()), ([0] * 3, [4, 3, 2], [3, 4, 5]))
         found = self.scene.trace_all(origins, directions, tmin=3.5, tmax=7.5)
         self.assertEqual(found.object.tolist(), [3, 2, 1, 0])
@@ -385,7 +385,7 @@ class AllHits(unittest.TestCase):
                      self.scene.trace_all(origins[:0], directions[:0])):
             self.assertEqual([array.shape for array in none], [(0,), (0,), (0,), (0, 3), (0, 3)])
         with self.assertRaisesRegex(glint.SceneError, "all hits have no bounds"):
-            self.scene.trace_all(origins, directions, "certified")
+            self.scene.trace_all(origins, directions, precision="certified")
         with self.assertRaisesRegex(glint.SceneError, "ray 1: a ray.s direction cannot be 0 0 0"):
             self.scene.trace_all(origins, [[0, 0, 1], [0, 0, 0]])
 
@@ -448,12 +448,16 @@ class Errors(unittest.TestCase):
                 (lambda: glint.Scene(SPHERE).render(8, 6, lanes=3), "lanes"),
                 (lambda: glint.Scene(SPHERE).render(1 << 21, 6), "pixels per side"),
                 (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 0]]), "ray 0"),
-                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], "certified", tmin=1), "tmin 0")):
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], precision="certified", tmin=1), "tmin 0")):
             with self.assertRaisesRegex(glint.SceneError, words):
                 make()
         for make in (lambda: glint.Scene(SPHERE).trace([0, 0, 0], [0, 0, 1]), lambda: glint.load_mesh(CUBE_VERTICES, [[0.5] * 3]),
                      lambda: glint.Scene(SPHERE).render(8, 6, precision="fast"), lambda: glint.Scene(SPHERE).render_layers(["depth"])):
             with self.assertRaises(ValueError):
+                make()
+        for make in (lambda: glint.Scene(SPHERE).render(8, 6, 2), lambda: glint.Scene(SPHERE).render_layers(["t"], 8, 6, 2),
+                     lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], "double"), lambda: glint.load("scene.yaml", {})):
+            with self.assertRaisesRegex(TypeError, "positional"):
                 make()
 
     def test_callbacks_and_lifetimes(self):

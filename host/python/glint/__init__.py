@@ -6,7 +6,7 @@
     hits = scene.trace(origins, directions, precision="certified")
     hits.object[hits.certain]                   # proven equal to the result of exact arithmetic
 
-Every call that computes releases Python's global lock. A wrong scene or argument raises SceneError, and a device failure raises
+Settings are keyword arguments. Every call that computes releases Python's global lock. A wrong scene or argument raises SceneError, and a device failure raises
 DeviceError. Warnings have the category GlintWarning.
 """
 from __future__ import annotations
@@ -206,7 +206,7 @@ def _options(overrides: Optional[Mapping[str, Any]], frame: float, camera: Optio
 class Scene:
     """A scene made from a dict or text in glint's YAML format. glint.load and glint.load_mesh make scenes from files and arrays."""
 
-    def __init__(self, description: Union[str, Mapping[str, Any]], name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
+    def __init__(self, description: Union[str, Mapping[str, Any]], *, name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
                  frame: float = 0):
         """Reads the description. overrides: values to replace, such as {"camera.fov": 60}; a string is YAML, and an empty one
         removes the key. frame: the frame of an animated scene. name: the prefix of the scene's messages."""
@@ -241,14 +241,14 @@ class Scene:
         """The number of frames that an animated scene names, or 0."""
         return _c.library.glint_scene_frame_count(self._handle)
 
-    def render(self, width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5, precision: str = "single",
+    def render(self, width: int = 0, height: int = 0, *, samples: int = 1, bounces: int = 5, precision: str = "single",
                device: Union[None, int, str] = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None,
                min_contribution: float = 0) -> np.ndarray:
         """Returns the image, (height, width, 3), in linear light. The arguments are those of render_layers."""
-        return self.render_layers(("color",), width, height, samples, bounces, precision, device, lanes, progress,
-                                  min_contribution)["color"]
+        return self.render_layers(("color",), width, height, samples=samples, bounces=bounces, precision=precision, device=device,
+                                  lanes=lanes, progress=progress, min_contribution=min_contribution)["color"]
 
-    def render_layers(self, layers: Sequence[str], width: int = 0, height: int = 0, samples: int = 1, bounces: int = 5,
+    def render_layers(self, layers: Sequence[str], width: int = 0, height: int = 0, *, samples: int = 1, bounces: int = 5,
                       precision: str = "single", device: Union[None, int, str] = None, lanes: int = 0,
                       progress: Optional[Callable[[float], Any]] = None, min_contribution: float = 0) -> dict[str, np.ndarray]:
         """Renders the named layers of glint.LAYERS and returns their arrays, of shape (height, width[, values]).
@@ -297,7 +297,7 @@ class Scene:
         _check(status, messages)
         return {name: arrays[name] for name in layers}
 
-    def trace(self, origins: Any, directions: Any, precision: str = "single", tmin: Any = None, tmax: Any = None,
+    def trace(self, origins: Any, directions: Any, *, precision: str = "single", tmin: Any = None, tmax: Any = None,
               device: Union[None, int, str] = None, lanes: int = 0) -> Hits:
         """Finds the nearest hit of each ray strictly between tmin and tmax, in lengths of the direction.
 
@@ -314,15 +314,15 @@ class Scene:
         return hits
 
     @overload
-    def occluded(self, origins: Any, directions: Any, precision: str = ..., tmin: Any = ..., tmax: Any = ...,
-                 device: Union[None, int, str] = ..., lanes: int = ..., *, return_certain: Literal[False] = ...) -> np.ndarray: ...
+    def occluded(self, origins: Any, directions: Any, *, precision: str = ..., tmin: Any = ..., tmax: Any = ...,
+                 device: Union[None, int, str] = ..., lanes: int = ..., return_certain: Literal[False] = ...) -> np.ndarray: ...
 
     @overload
-    def occluded(self, origins: Any, directions: Any, precision: str = ..., tmin: Any = ..., tmax: Any = ...,
-                 device: Union[None, int, str] = ..., lanes: int = ..., *, return_certain: Literal[True]) -> tuple[np.ndarray, np.ndarray]: ...
+    def occluded(self, origins: Any, directions: Any, *, precision: str = ..., tmin: Any = ..., tmax: Any = ...,
+                 device: Union[None, int, str] = ..., lanes: int = ..., return_certain: Literal[True]) -> tuple[np.ndarray, np.ndarray]: ...
 
-    def occluded(self, origins: Any, directions: Any, precision: str = "single", tmin: Any = None, tmax: Any = None,
-                 device: Union[None, int, str] = None, lanes: int = 0, *, return_certain: bool = False) -> Any:
+    def occluded(self, origins: Any, directions: Any, *, precision: str = "single", tmin: Any = None, tmax: Any = None,
+                 device: Union[None, int, str] = None, lanes: int = 0, return_certain: bool = False) -> Any:
         """Returns whether anything lies strictly between tmin and tmax of each ray, as an array of bool.
 
         For shadows, trace from the light, or from outside the scene if it is directional, to the points at "double" or
@@ -337,7 +337,7 @@ class Scene:
         del keep
         return occluded if certainty is None else (occluded, certainty != 0)
 
-    def trace_all(self, origins: Any, directions: Any, precision: str = "double", tmin: Any = None, tmax: Any = None,
+    def trace_all(self, origins: Any, directions: Any, *, precision: str = "double", tmin: Any = None, tmax: Any = None,
                   hits_max: Optional[int] = None, device: Union[None, int, str] = None, lanes: int = 0) -> AllHits:
         """Finds all hits of each ray, or the nearest hits_max, sorted by ray and then by t. If several hits have the same t, it
         finds one. The other arguments are those of `trace`, but precision must not be "certified"."""
@@ -434,7 +434,7 @@ class ImageMetrics:
     flip_max: float
 
 
-def compare(reference: Any, image: Any, color: Optional[bool] = None) -> ImageMetrics:
+def compare(reference: Any, image: Any, *, color: Optional[bool] = None) -> ImageMetrics:
     """Compares an image with its reference. Both arrays have the same shape, (height, width, channels) or fewer dimensions.
 
     color: whether they are colors in linear light, by default if there are 3 channels. Set it to False for data, such as
@@ -460,7 +460,7 @@ def compare(reference: Any, image: Any, color: Optional[bool] = None) -> ImageMe
     return ImageMetrics(*(getattr(found, field.name) for field in fields(ImageMetrics)))
 
 
-def load(path: Union[str, os.PathLike[str]], overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,
+def load(path: Union[str, os.PathLike[str]], *, overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,
          camera: Union[None, str, os.PathLike[str]] = None) -> Scene:
     """Reads a scene, mesh or glTF file. overrides, frame: for YAML scenes, as in Scene. camera: the path of another scene,
     whose camera replaces the scene's."""

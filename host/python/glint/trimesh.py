@@ -15,15 +15,15 @@ class RayMeshIntersector:
     Queries for all hits are traced in double and are not certified. If the mesh changes, create a new intersector.
     """
 
-    def __init__(self, mesh: Any, precision: str = "certified", device: Union[None, int, str] = None):
+    def __init__(self, mesh: Any, *, precision: str = "certified", device: Union[None, int, str] = None):
         self.mesh = mesh
         self._precision, self._device = precision, device
         self._scene = load_mesh(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces))
 
     def hits(self, origins: Any, directions: Any) -> Hits:
         """Returns the nearest hits with their bounds and certainty."""
-        return self._scene.trace(np.asarray(origins, np.float64), np.asarray(directions, np.float64), self._precision,
-                                 device=self._device)
+        return self._scene.trace(np.asarray(origins, np.float64), np.asarray(directions, np.float64),
+                                 precision=self._precision, device=self._device)
 
     def intersects_first(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
         """Returns the index of the first triangle that each ray hits, -1 where it hits none."""
@@ -32,8 +32,8 @@ class RayMeshIntersector:
 
     def intersects_any(self, ray_origins: Any, ray_directions: Any) -> np.ndarray:
         """Returns whether each ray hits anything."""
-        return self._scene.occluded(np.asarray(ray_origins, np.float64), np.asarray(ray_directions, np.float64), self._precision,
-                                    device=self._device)
+        return self._scene.occluded(np.asarray(ray_origins, np.float64), np.asarray(ray_directions, np.float64),
+                                    precision=self._precision, device=self._device)
 
     def intersects_location(self, ray_origins: Any, ray_directions: Any, multiple_hits: bool = True) \
             -> tuple[np.ndarray, np.ndarray, np.ndarray]:
