@@ -96,8 +96,7 @@ void capture_launch(Compute *compute, const Launch *launch)
 {
     if (!compute->device->capture_folder || !compute_ok(compute)) return;
     const ProgramRequest *request = launch->request;
-    char *text =
-        program_text(request->root, launch->is_out_of_line ? request->out_of_line_prelude : request->prelude);
+    char *text = program_request_text(request, launch->is_out_of_line);
     Text options = {0};
     program_options_append(&options, compute->device, request->options);
     Json *json = json_open();

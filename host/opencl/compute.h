@@ -114,9 +114,11 @@ void program_close(Program *program);
 // Returns the key of the cache for a request's program. The caller frees it.
 char *program_key(const Device *device, const ProgramRequest *request);
 
-// Composes the text for tests and hashes. Returns NULL if `root` or an include is not embedded. The caller
+// Returns the prelude followed by the text of `root` with its includes, as kernel_compose does. The caller
 // frees it.
 char *program_text(const char *root, const char *prelude);
+// Returns the text of a request's program. The caller frees it.
+char *program_request_text(const ProgramRequest *request, bool is_out_of_line);
 
 // Creates a buffer of at least one byte, uninitialized if `bytes` is NULL. Returns NULL on failure, with a
 // detail that compares the size with the device's memory. buffer_release releases it.

@@ -25,6 +25,12 @@ void program_options_append(Text *text, const Device *device, const char *option
     if (device->build_options) text_appendf(text, " %s", device->build_options);
 }
 
+char *program_request_text(const ProgramRequest *request, bool is_out_of_line)
+{
+    return program_text(request->root,
+                        or_empty(is_out_of_line ? request->out_of_line_prelude : request->prelude));
+}
+
 // Returns a key of everything that the compiled program depends on. The native width distinguishes
 // processors of the same name. The caller frees it.
 static char *request_key(const Device *device, const ProgramRequest *request, const char *text)
@@ -45,8 +51,7 @@ static char *request_key(const Device *device, const ProgramRequest *request, co
 
 char *program_key(const Device *device, const ProgramRequest *request)
 {
-    char *text = program_text(request->root, or_empty(request->prelude));
-    char *key = request_key(device, request, text);
+    char *text = program_request_text(request, false), *key = request_key(device, request, text);
     free(text);
     return key;
 }
@@ -135,6 +140,13 @@ static void build_report(Compute *compute, Build *build, const char *text, const
     build_release(build);
 }
 
+static bool build_run(Build *build, const Device *device, const Text *options)
+{
+    fault_record_call("clBuildProgram");
+    cl_int status = clBuildProgram(build->program, 1, &device->id, text_c(options), NULL, NULL);
+    return build_check(build, "clBuildProgram", status, true);
+}
+
 // Adds a unique option, which makes PoCL build, because the key of its cache contains the options.
 static void append_unused_option(Text *options)
 {
@@ -167,17 +179,17 @@ static void kernel_file_write(const Device *device, const char *text, const char
 }
 
 // Appends a build to the log of its kernel.
-static void build_log_keep(const Compute *compute, cl_program program, const char *text, const char *options,
-                           cl_int status, double seconds)
+static void build_log_keep(const Compute *compute, const Build *build, const char *text, const char *options,
+                           double seconds)
 {
     const Device *device = compute->device;
     if (!device->kernel_folder) return;
     Text entry = {0};
     fault_record_call("clGetProgramBuildInfo");
-    char *log = build_log(compute, program);
+    char *log = build_log(compute, build->program);
     fault_record_call(NULL);
     text_appendf(&entry, "device: %s, %s\noptions: %s\nbuild: %s, %.3f s\n%s\n", device->name, device->driver,
-                 options, cl_status_name(status), seconds, log);
+                 options, cl_status_name(build->status), seconds, log);
     kernel_file_write(device, text, "log", "a", text_c(&entry));
     free(log);
     text_free(&entry);
@@ -197,10 +209,8 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     // before the build, which may crash
     if (compute->device->kernel_folder) kernel_file_write(compute->device, text, "cl", "wx", text);
     const double start = clock_seconds();
-    fault_record_call("clBuildProgram");
-    status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
-    const bool is_built = build_check(&build, "clBuildProgram", status, true);
-    build_log_keep(compute, build.program, text, text_c(&options), status, clock_seconds() - start);
+    const bool is_built = build_run(&build, compute->device, &options);
+    build_log_keep(compute, &build, text, text_c(&options), clock_seconds() - start);
     text_free(&options);
     if (is_built) kernel_create(&build, request->kernel);
     return build;
@@ -231,10 +241,8 @@ static Build build_from_binary(const Compute *compute, const Text *binary, const
     if (build_check(&build, "clCreateProgramWithBinary", status, build.program)) {
         Text options = {0};
         program_options_append(&options, compute->device, request->options);
-        fault_record_call("clBuildProgram");
-        status = clBuildProgram(build.program, 1, &compute->device->id, text_c(&options), NULL, NULL);
+        if (build_run(&build, compute->device, &options)) kernel_create(&build, request->kernel);
         text_free(&options);
-        if (build_check(&build, "clBuildProgram", status, true)) kernel_create(&build, request->kernel);
     }
     if (build.failed_call) build_release(&build);
     return build;
@@ -252,35 +260,47 @@ static Build build_from_cache(const Compute *compute, const ProgramRequest *requ
     return build;
 }
 
+// Loads the program of the first text or, if that one could not be built, of the second, out-of-line one,
+// which may be NULL. The build has no program if neither is in the cache.
+static Build load_any(const Compute *compute, const ProgramRequest *request, char *const texts[2],
+                      bool *is_out_of_line)
+{
+    Build build = build_from_cache(compute, request, texts[0]);
+    *is_out_of_line = !build.program;
+    return build.program ? build : build_from_cache(compute, request, texts[1]);
+}
+
+// Builds the program of the first text or, if that fails, of the second. If both fail, returns the first
+// failure.
+static Build build_any(Compute *compute, const ProgramRequest *request, char *const texts[2],
+                       bool *is_out_of_line)
+{
+    Build build = build_with_retry(compute, texts[0], request);
+    *is_out_of_line = false;
+    if (!build.failed_call || !texts[1]) return build;
+    Build out_of_line = build_with_retry(compute, texts[1], request);
+    *is_out_of_line = !out_of_line.failed_call;
+    build_release(*is_out_of_line ? &build : &out_of_line);
+    return *is_out_of_line ? out_of_line : build;
+}
+
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program)
 {
     *program = (Program){0};
     if (!compute_ok(compute)) return false;
     const double start = clock_seconds();
-    char *text = program_text(request->root, or_empty(request->prelude)),
-         *out_of_line_text =
-             request->out_of_line_prelude ? program_text(request->root, request->out_of_line_prelude) : NULL;
-    Build build = build_from_cache(compute, request, text);
-    if (!build.program) {
-        // the cache has it if the normal text could not be built
-        build = build_from_cache(compute, request, out_of_line_text);
-        program->is_out_of_line = build.program != NULL;
-    }
+    char *const texts[] = {program_request_text(request, false),
+                           request->out_of_line_prelude ? program_request_text(request, true) : NULL};
+    Build build = load_any(compute, request, texts, &program->is_out_of_line);
     program->from_cache = build.program != NULL;
-    if (!build.program) build = build_with_retry(compute, text, request);
-    if (build.failed_call && out_of_line_text) {
-        Build out_of_line = build_with_retry(compute, out_of_line_text, request);
-        program->is_out_of_line = !out_of_line.failed_call;
-        build_release(program->is_out_of_line ? &build : &out_of_line);
-        if (program->is_out_of_line) build = out_of_line;
-    }
-    const char *built_text = program->is_out_of_line ? out_of_line_text : text;
-    program->text_hash = hash_bytes(HASH_START, built_text, strlen(built_text));
+    if (!program->from_cache) build = build_any(compute, request, texts, &program->is_out_of_line);
+    const char *text = texts[program->is_out_of_line];
+    program->text_hash = hash_bytes(HASH_START, text, strlen(text));
     if (build.failed_call) build_report(compute, &build, text, or_empty(request->options));
     program->program = build.program;
     program->kernel = build.kernel;
-    free(out_of_line_text);
-    free(text);
+    free(texts[0]);
+    free(texts[1]);
     program->build_seconds = clock_seconds() - start;
     return compute_ok(compute);
 }
@@ -314,8 +334,7 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
         free(bytes);
         return;
     }
-    const char *prelude = program->is_out_of_line ? request->out_of_line_prelude : request->prelude;
-    char *text = program_text(request->root, or_empty(prelude)),
+    char *text = program_request_text(request, program->is_out_of_line),
          *key = request_key(compute->device, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};
     cache_store(key, &binary);
