@@ -15,6 +15,20 @@ static void roundings_narrow(bool is_double, bool *modes, Exact exact, double re
         modes[mode] = modes[mode] && result == exact_rounded(is_double, exact, mode);
 }
 
+// Returns whether a probe yields the nearest real of each result and the exact rest.
+static bool is_exact_pair(Measurement *measurement, cl_uint probe, const Reals *reals,
+                          const Operands *operands, Exact (*operation)(bool is_double, double a, double b))
+{
+    Results results[OPERANDS_MAX];
+    bool is_exact = probe_run(measurement, probe, operands, OPERANDS_MAX, results);
+    for (size_t i = 0; i < OPERANDS_MAX; i++) {
+        const Exact exact = operation(measurement->is_double, reals[i].a, reals[i].b);
+        is_exact &= value_of(measurement, results[i].first) == exact.nearest &&
+                    value_of(measurement, results[i].second) == exact.rest;
+    }
+    return is_exact;
+}
+
 static void sums_measure(Measurement *measurement)
 {
     Passport *passport = measurement->passport;
@@ -36,19 +50,9 @@ static void sums_measure(Measurement *measurement)
     while (passport->rounding < ROUNDING_OTHER && !modes[passport->rounding])
         passport->rounding++;
 
-    passport->two_sum_is_exact = probe_run(measurement, PROBE_TWO_SUM, operands, OPERANDS_MAX, results);
-    for (size_t i = 0; i < OPERANDS_MAX; i++) {
-        const Exact exact = exact_sum(is_double, reals[i].a, reals[i].b);
-        passport->two_sum_is_exact &= value_of(measurement, results[i].first) == exact.nearest &&
-                                      value_of(measurement, results[i].second) == exact.rest;
-    }
+    passport->two_sum_is_exact = is_exact_pair(measurement, PROBE_TWO_SUM, reals, operands, exact_sum);
     passport->two_product_is_exact =
-        probe_run(measurement, PROBE_TWO_PRODUCT, operands, OPERANDS_MAX, results);
-    for (size_t i = 0; i < OPERANDS_MAX; i++) {
-        const Exact exact = exact_product(is_double, reals[i].a, reals[i].b);
-        passport->two_product_is_exact &= value_of(measurement, results[i].first) == exact.nearest &&
-                                          value_of(measurement, results[i].second) == exact.rest;
-    }
+        is_exact_pair(measurement, PROBE_TWO_PRODUCT, reals, operands, exact_product);
 }
 
 // Measures whether products and sums are contracted. The sum of a product and its rounded negative is then
