@@ -150,7 +150,8 @@ TEST(test_folder_of_others)
         } else {
             continue;
         }
-        static const char *const reasons[] = {"others may access it", "a symbolic link", "of another user"};
+        static const char *const reasons[] = {"others may access it", "it is a symbolic link",
+                                              "it belongs to another user"};
         assert_refused(reasons[type]);
         assert_int_equal(unlink(path), 0);
         bool used = true;
@@ -179,7 +180,7 @@ TEST(test_key_of_the_hash)
     assert_refused("the key of its hash cannot be read");
     store("another key");
     assert_true(loads("another key"));
-    assert_refused("damaged"); // written with the earlier key
+    assert_refused("it is damaged"); // written with the earlier key
     assert_int_equal(truncate("hash-key", 31), 0);
     store(key);
     assert_true(loads(key));
@@ -194,7 +195,7 @@ TEST(test_too_large)
     store("another key");
     char *path = cache_entry_path(key);
     assert_int_equal(truncate(path, (off_t)20 << 30), 0);
-    assert_refused("larger than the limit");
+    assert_refused("it is larger than the limit");
     entry_set_used(key, 1u << 31);
     cache_trim(CACHE_BYTES_MAX);
     assert_int_equal(access(path, F_OK), -1);
@@ -264,7 +265,7 @@ TEST(test_list)
     assert_int_equal(entries.count, 2);
     assert_null(entries.items[0].fault);
     assert_string_equal(entries.items[0].device, "y");
-    assert_string_equal(entries.items[1].fault, "damaged");
+    assert_string_equal(entries.items[1].fault, "it is damaged");
     assert_string_equal(entries.items[1].name, strrchr(path, '/') + 1);
     assert_int_equal(entries.size, entries.items[0].size + CODE_LENGTH);
     cache_entries_free(&entries);

@@ -42,6 +42,7 @@ static CacheHeader header_of(uint64_t key_length, uint64_t binary_length)
     return header;
 }
 
+// Computes the keyed hash of an entry.
 static void entry_tag(unsigned char *tag, const Secret *secret, const CacheHeader *header, const char *key,
                       const char *binary)
 {
@@ -87,15 +88,16 @@ char *cache_entry_path(const char *key)
 // Returns why a file or folder cannot be trusted, or NULL if it can.
 static const char *distrust(const struct stat *status, mode_t type)
 {
-    if ((status->st_mode & S_IFMT) != type) return type == S_IFDIR ? "not a folder" : "not a regular file";
-    if (status->st_uid != geteuid()) return "of another user";
+    if ((status->st_mode & S_IFMT) != type)
+        return type == S_IFDIR ? "it is not a folder" : "it is not a regular file";
+    if (status->st_uid != geteuid()) return "it belongs to another user";
     if ((status->st_mode & 077) != 0) return "others may access it";
     return NULL;
 }
 
 // Creates the folder and every one above it, private to their owner (XDG Base Directory Specification 0.8,
 // "Referencing this specification"). A failure is reported when the folder is opened.
-static void make_folders(char *path)
+static void folders_make(char *path)
 {
     for (char *slash = strchr(path + 1, '/'); slash; slash = strchr(slash + 1, '/')) {
         *slash = '\0';
@@ -110,15 +112,15 @@ static int folder_open(bool makes, MessageList *messages)
 {
     char *path = cache_folder_path();
     if (!path) return -1;
-    if (makes) make_folders(path);
+    if (makes) folders_make(path);
     struct stat status;
     const char *why = NULL;
     int folder = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     const int error = errno;
     if (folder >= 0)
-        why = fstat(folder, &status) == 0 ? distrust(&status, S_IFDIR) : "it has no status";
+        why = fstat(folder, &status) == 0 ? distrust(&status, S_IFDIR) : "its status cannot be read";
     else if (lstat(path, &status) == 0 && S_ISLNK(status.st_mode))
-        why = "a symbolic link";
+        why = "it is a symbolic link";
     else if (error != ENOENT)
         why = strerror(error);
     if (why) {
@@ -138,10 +140,11 @@ static const char *file_read(Text *content, int folder, const char *name, uint64
 {
     int descriptor = openat(folder, name, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW);
     if (descriptor < 0)
-        return errno == ENOENT ? absent : errno == ELOOP ? "a symbolic link" : "it cannot be opened";
+        return errno == ENOENT ? absent : errno == ELOOP ? "it is a symbolic link" : "it cannot be opened";
     struct stat status;
-    const char *why = fstat(descriptor, &status) == 0 ? distrust(&status, S_IFREG) : "it has no status";
-    if (!why && (uint64_t)status.st_size > bytes_max) why = "larger than the limit";
+    const char *why =
+        fstat(descriptor, &status) == 0 ? distrust(&status, S_IFREG) : "its status cannot be read";
+    if (!why && (uint64_t)status.st_size > bytes_max) why = "it is larger than the limit";
     FILE *file = why ? NULL : fdopen(descriptor, "rb");
     if (!file) {
         close(descriptor);
@@ -156,14 +159,15 @@ static const char *file_read(Text *content, int folder, const char *name, uint64
 
 static const char secret_name[] = "hash-key";
 
-static const char *secret_read(Secret *secret, int folder)
+// Reads the hash's key. Returns false if it is absent or cannot be trusted.
+static bool secret_read(Secret *secret, int folder)
 {
     Text content = {0};
-    const char *why = file_read(&content, folder, secret_name, SECRET_BYTES);
-    if (!why && content.count != SECRET_BYTES) why = "not as long as it should be";
-    if (!why) memcpy(secret->bytes, content.items, SECRET_BYTES);
+    const bool is_read =
+        !file_read(&content, folder, secret_name, SECRET_BYTES) && content.count == SECRET_BYTES;
+    if (is_read) memcpy(secret->bytes, content.items, SECRET_BYTES);
     text_free(&content);
-    return why;
+    return is_read;
 }
 
 // Locks the folder, so that one process at a time makes or removes the hash's key and writes entries with
@@ -176,10 +180,11 @@ static int folder_lock(int folder)
     return locked;
 }
 
-// Reads the hash's key. Replaces a key that is absent or cannot be trusted. The folder must be locked.
+// Reads the hash's key, after replacing one that is absent or cannot be trusted. Returns false if there is
+// none then. The folder must be locked.
 static bool secret_make(Secret *secret, int folder)
 {
-    bool has_secret = secret_read(secret, folder) == NULL;
+    bool has_secret = secret_read(secret, folder);
     if (!has_secret && getrandom(secret->bytes, SECRET_BYTES, 0) == SECRET_BYTES) {
         MessageList ignored = {0};
         OutputFile output;
@@ -208,7 +213,7 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
     Text *content = &entry->content;
     const char *why = file_read(content, folder, name, CACHE_ENTRY_BYTES_MAX);
     if (why) return why;
-    static const char damaged[] = "damaged";
+    static const char damaged[] = "it is damaged";
     CacheHeader header, expected;
     if (content->count < sizeof header) return damaged;
     memcpy(&header, content->items, sizeof header);
@@ -222,7 +227,7 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
     entry->binary_length = rest - entry->key_length;
     expected = header_of(entry->key_length, entry->binary_length);
     Secret secret;
-    if (secret_read(&secret, folder) != NULL) return "the key of its hash cannot be read";
+    if (!secret_read(&secret, folder)) return "the key of its hash cannot be read";
     entry_tag(expected.tag, &secret, &expected, entry->key, entry->binary);
     return memcmp(&header, &expected, sizeof header) == 0 ? NULL : damaged;
 }
@@ -406,6 +411,7 @@ void cache_store(const char *key, const Text *binary)
     warnings_print(&messages);
 }
 
+// Sets the entry's fault or its device.
 static void entry_describe(CacheEntry *entry, int folder)
 {
     Entry read;
