@@ -123,7 +123,7 @@ static int named_open(OutputFile *output, mode_t mode)
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
         int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
-        // not locked: lost to a process that removes stale temporaries
+        // a process that removes stale temporaries may have locked it first
         if (descriptor >= 0 && file_lock(descriptor) == FILE_LOCKED) {
             output->temporary = name;
             pending_add(output->folder, name);

@@ -127,7 +127,7 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
         text->count += got;
         text->items[text->count] = '\0';
     } while (got == chunk && text->count - start <= largest);
-    // of the exact size, so that sanitizers find what reads beyond its end
+    // with the exact size, sanitizers find reads beyond the end
     text->capacity = text->count + 1;
     text->items = memory_resize(text->items, text->capacity, 1);
 

@@ -234,7 +234,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
     int status = EXIT_USER;
     if (argument_count < 2 || strcmp(arguments[1], "render") != 0) {
         fprintf(stderr, "usage: mpirun -n RANKS glint-mpi render SCENE... [OPTIONS]\n"
-                        "The options are those of glint render; each rank renders on a device of its own.\n");
+                        "The options are those of glint render; each rank renders on a separate device.\n");
     } else {
         static char name[] = "glint-mpi render"; // getopt's messages begin with it
         arguments[1] = name;

@@ -123,8 +123,9 @@ static size_t frame_acquire(Deal *deal)
     return frame;
 }
 
-// Records a frame's status. Returns false if the worker's device failed or does not fit the frame. Others
-// then render it, and all that are left. A frame that does not fit the last worker either is skipped.
+// Records a frame's status. Returns false if the worker's device failed or does not fit the frame. The other
+// workers then render it and all frames that are left. A frame that does not fit the last worker either is
+// skipped.
 static bool frame_record(Deal *deal, size_t frame, int status)
 {
     pthread_mutex_lock(&deal->mutex);
@@ -143,7 +144,7 @@ static bool frame_record(Deal *deal, size_t frame, int status)
     return works;
 }
 
-// Returns whether no frame will become free any more.
+// Returns whether no frame is left and none that is being rendered may return from a rank that fails.
 static bool deal_is_over(Deal *deal)
 {
     pthread_mutex_lock(&deal->mutex);

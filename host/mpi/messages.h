@@ -15,7 +15,7 @@ enum {
     TAG_BAND,    // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,
     TAG_END,        // to a rank that renders: the render has ended
-    TAG_DONE,       // a rank's last: why its device failed, or an empty text
+    TAG_DONE,       // a rank's last message: why its device failed, or an empty text
     TAG_FRAME_DONE, // the exit status of a rank's frame; EXIT_DONE before the first
     TAG_FRAME,      // the answer: the next frame's index, or NO_FRAME
 };

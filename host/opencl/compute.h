@@ -14,7 +14,7 @@
 
 typedef struct {
     char call[40];   // the OpenCL function, or the host's work; empty: none failed
-    cl_int status;   // CL_SUCCESS: the call returned NULL in spite of it, unless is_of_host
+    cl_int status;   // CL_SUCCESS: the call nevertheless returned NULL, unless is_of_host
     bool is_of_host; // no call failed, and the detail names the failure
     char *detail;    // more about the failure, such as a build log; NULL: nothing
 } ComputeFailure;
@@ -56,8 +56,8 @@ static inline bool compute_ok(const Compute *compute)
     return compute->failure.call[0] == '\0';
 }
 
-// Makes a call, as in `compute_try(compute, clFinish(compute->queue))`, unless an earlier one failed. False
-// if either failed.
+// Makes a call, as in `compute_try(compute, clFinish(compute->queue))`, unless an earlier one failed. The
+// result is false if either failed.
 #define compute_try(compute, call)                                                                           \
     (compute_ok(compute) ? (fault_record_call(#call), compute_check((compute), (call), #call)) : false)
 // Records a call's failure if it is the first. The function's name is `call` up to a parenthesis. Returns
@@ -79,7 +79,7 @@ typedef struct {
     const char *prelude; // definitions placed before the text (features, LANES, precision)
     // Definitions that keep functions out of line, for a second build if the first fails. NULL: none.
     const char *out_of_line_prelude;
-    const char *kernel;  // a program from which it cannot be created is not built; NULL: none is created
+    const char *kernel;  // the build fails if it cannot be created; NULL: none is created
     const char *options; // compiler flags only
     const char *launch;  // kernel and work-group size, such as "render 8x1"; may be NULL; see program_store
     bool no_cache;

@@ -218,7 +218,7 @@ static void arithmetic_query(DeviceList *list, Device *device)
     device->rounds_toward_zero = fp32 != 0 && !(fp32 & CL_FP_ROUND_TO_NEAREST);
     device->lacks_infinity = fp32 != 0 && !(fp32 & CL_FP_INF_NAN);
     device->fp64 = fp64 != 0 || extensions_have(device->extensions, "cl_khr_fp64");
-    // kernels in double use 64-bit integers, an extension there
+    // kernels in double use 64-bit integers, which are an extension of that profile
     if (device->embedded_profile && !extensions_have(device->extensions, "cles_khr_int64"))
         device->fp64 = false;
 

@@ -22,14 +22,14 @@ typedef struct {
     char *uuid;  // 32 hexadecimal digits
     unsigned compute_units, clock_mhz, address_bits;
     unsigned native_float_width, native_double_width; // at least 1; double 0 without fp64
-    // 0: unknown; of a device with 32-bit addresses less than 4 GiB
+    // 0: unknown; below 4 GiB if addresses have 32 bits
     uint64_t memory_bytes, largest_buffer_bytes, local_memory_bytes;
     size_t largest_work_group, longest_group_sides[3];
     double timer_resolution_seconds;
     bool fp64, denormals, fma_in_hardware;
     bool correctly_rounded; // supports -cl-fp32-correctly-rounded-divide-sqrt
     bool embedded_profile;
-    // only devices of the embedded profile may be so
+    // Only devices of the embedded profile may have these limits.
     bool rounds_toward_zero, lacks_infinity;
     bool compiler, available, little_endian;
     struct DevicePassports *passports; // host/opencl/passport.h

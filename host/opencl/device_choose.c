@@ -90,7 +90,7 @@ static void advice_write(Text *text, const DeviceList *list)
                            "XDG_CACHE_HOME or POCL_CACHE_DIR");
 }
 
-static void report_no_match(const DeviceList *list, const char *selector, MessageList *messages)
+static void no_match_report(const DeviceList *list, const char *selector, MessageList *messages)
 {
     char *failure = device_list_failure_text(list);
     Text text = {0};
@@ -123,7 +123,7 @@ const Device *device_choose(const DeviceList *list, const char *selector, Messag
         if (!device_usable(device, NULL)) continue;
         if (!best || device_rank(device) > device_rank(best)) best = device;
     }
-    if (!best) report_no_match(list, selector, messages);
+    if (!best) no_match_report(list, selector, messages);
     return best;
 }
 
@@ -152,7 +152,7 @@ static size_t devices_choose_all(const DeviceList *list, const Device **chosen, 
     size_t count = 0;
     for (size_t i = 0; i < list->count; i++)
         if (device_usable(&list->items[i], NULL)) chosen[count++] = &list->items[i];
-    if (count == 0) report_no_match(list, NULL, messages);
+    if (count == 0) no_match_report(list, NULL, messages);
     return count;
 }
 
@@ -176,7 +176,7 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
         char *part = at ? memory_copy_part(at, end ? (size_t)(end - at) : strlen(at)) : NULL;
         const Device *device = NULL;
         if (part && part[0] == '\0')
-            report_no_match(list, part, messages);
+            no_match_report(list, part, messages);
         else
             device = device_choose(list, part, messages);
         free(part);

@@ -105,8 +105,8 @@ static Passport *passport_keep(const Device *device, const Passport *passport)
     return known;
 }
 
-static const Passport *measure_and_keep(Compute *compute, PassportMode mode, uint32_t lanes, bool is_thorough,
-                                        bool no_cache)
+static const Passport *passport_renew(Compute *compute, PassportMode mode, uint32_t lanes, bool is_thorough,
+                                      bool no_cache)
 {
     Passport passport;
     if (!passport_measure(&passport, compute, mode, lanes, is_thorough, no_cache)) return NULL;
@@ -123,7 +123,7 @@ const Passport *passport_acquire(Compute *compute, PassportMode mode, uint32_t l
     if (!known && !no_cache && passport_load(&passport, device, mode, lanes))
         known = passport_keep(device, &passport);
     if (known && (known->is_thorough || !is_thorough)) return known;
-    return measure_and_keep(compute, mode, lanes, is_thorough, no_cache);
+    return passport_renew(compute, mode, lanes, is_thorough, no_cache);
 }
 
 bool passports_measure(Compute *compute)
@@ -131,7 +131,7 @@ bool passports_measure(Compute *compute)
     for (PassportMode mode = 0; mode < PASSPORT_MODE_COUNT; mode++) {
         const bool is_double = mode == PASSPORT_DOUBLE;
         if (is_double && !compute->device->fp64) continue;
-        if (!measure_and_keep(compute, mode, device_lanes(compute->device, is_double, 0), true, false))
+        if (!passport_renew(compute, mode, device_lanes(compute->device, is_double, 0), true, false))
             return false;
     }
     return true;

@@ -59,8 +59,8 @@ typedef struct {
 // Three measurements, one of each mode, take less than a second.
 #define PASSPORT_SECONDS_MAX 0.3
 // Fused hardware takes about half the time of a product and a sum, an emulation dozens of times that. The
-// second limit is for devices that do not report the hardware. Intel's runtime for CPUs does not report it,
-// and rusticl's emulation once measured 7.9 on a busy machine.
+// second limit is for devices that do not report the hardware. Intel's runtime for CPUs does not report it.
+// On a busy machine, rusticl's emulation was measured at 7.9.
 #define PASSPORT_FMA_COST_MAX           8.0
 #define PASSPORT_UNCLAIMED_FMA_COST_MAX 2.0
 

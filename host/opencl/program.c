@@ -68,7 +68,7 @@ static char *build_log(const Compute *compute, cl_program program)
 
 // Saves the text for readers of the build log. Returns its path, or a replacement for messages. The caller
 // frees it.
-static char *save_text(const char *text)
+static char *text_save(const char *text)
 {
     char path[4096];
     const char *folder = getenv("TMPDIR");
@@ -82,7 +82,7 @@ static char *save_text(const char *text)
 
 // Describes the disk of the drivers' caches, found by PoCL's variable, then by the XDG Base Directory
 // Specification.
-static void describe_cache_disk(Text *text)
+static void cache_disk_describe(Text *text)
 {
     const char *pocl = getenv("POCL_CACHE_DIR"), *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
     const char *folder = pocl ? pocl : cache ? cache : or_empty(home);
@@ -123,12 +123,12 @@ static bool build_check(Build *build, const char *call, cl_int status, bool is_t
 static void build_report(Compute *compute, Build *build, const char *text, const char *options)
 {
     if (build->program && strcmp(build->failed_call, "clBuildProgram") == 0) {
-        char *log = build_log(compute, build->program), *path = save_text(text);
+        char *log = build_log(compute, build->program), *path = text_save(text);
         Text reason = {0};
         text_appendf(&reason, "options \"");
         program_options_append(&reason, compute->device, options);
         text_appendf(&reason, "\"\n%s", log[strspn(log, " \n")] ? log : "the driver gives no build log");
-        describe_cache_disk(&reason);
+        cache_disk_describe(&reason);
         compute_fail(compute, build->failed_call, build->status, "%s\nthe composed text: %s", text_c(&reason),
                      path);
         text_free(&reason);
@@ -148,7 +148,7 @@ static bool build_run(Build *build, const Device *device, const Text *options)
 }
 
 // Adds a unique option, which makes PoCL build, because the key of its cache contains the options.
-static void append_unused_option(Text *options)
+static void unused_option_append(Text *options)
 {
     struct timespec now;
     clock_gettime(CLOCK_REALTIME, &now);
@@ -205,7 +205,7 @@ static Build build_from_source(Compute *compute, const char *text, const Program
     if (!build_check(&build, "clCreateProgramWithSource", status, build.program)) return build;
     Text options = {0};
     program_options_append(&options, compute->device, request->options);
-    if (afresh) append_unused_option(&options);
+    if (afresh) unused_option_append(&options);
     // before the build, which may crash
     if (compute->device->kernel_folder) kernel_file_write(compute->device, text, "cl", "wx", text);
     const double start = clock_seconds();

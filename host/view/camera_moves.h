@@ -14,7 +14,7 @@ typedef struct {
 
 bool cameras_equal(const Camera *a, const Camera *b);
 
-// Returns the ray through a pixel's center, from the lens' center.
+// Returns the ray through a pixel's center, from the center of the lens.
 CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y);
 
 // Turns the camera about a point, which stays where it is in the image: about `up`, then about the image's

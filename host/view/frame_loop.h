@@ -22,7 +22,7 @@ typedef struct {
     const char *scene_path;
     SceneOptions scene_options;
     RenderSettings settings; // of everything but the size
-    // Called on the loop's thread when there is something to take.
+    // Called on the loop's thread when there is something to acquire.
     void (*notify)(void *context);
     void *notify_context;
     // Writes the color of a complete image in the precision of its render. Returns false with a message if
@@ -41,7 +41,8 @@ typedef struct {
     unsigned number; // of the request
     uint32_t width, height;
     uint8_t *pixels; // display values, RGB, from the top left
-    // Distance from the eye to each pixel's hit point, infinite where nothing is hit; NULL: not known yet.
+    // The distance from the eye to each pixel's hit point, infinite where nothing is hit; NULL: not known
+    // yet.
     float *distances;
     uint32_t samples;     // per pixel; 0: a coarse frame
     double largest_error; // of a heat map of errors; negative for other frames
@@ -91,8 +92,9 @@ char *frame_loop_acquire_facts(FrameLoop *loop);
 bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32_t *frame,
                              MessageList *messages);
 
-// Exchanges `frame` for the newest one. Returns false if that was already taken.
+// Exchanges `frame` for the newest one. Returns false if there is none since the last call.
 bool frame_loop_acquire(FrameLoop *loop, Frame *frame);
+
 // The scene that was read last.
 typedef struct {
     Camera camera;        // the scene's own
@@ -101,8 +103,8 @@ typedef struct {
     uint32_t frame_count; // 0: not given, or the file cannot be read again, as standard input
     double frame_rate;    // 0: not given
 } SceneUpdate;
-// Returns false if none was read since the last call.
+// Sets `update` to the scene. Returns false if none was read since the last call.
 bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update);
-// Returns what went wrong, or was saved, since the last call, "" if a mistake was fixed, or NULL. The caller
-// frees it.
+// Returns the messages since the last call, about mistakes, failures and saved images. Returns "" if a
+// mistake was fixed, and NULL if there are no messages. The caller frees them.
 char *frame_loop_acquire_message(FrameLoop *loop);

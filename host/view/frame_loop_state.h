@@ -92,7 +92,7 @@ void exchange_close(FrameLoop *loop);
 // Returns whether the current render should end. It is the renderers' `stop`, whose context is the loop.
 bool render_stops(void *context);
 
-// Called by the thread that watches the scene's files.
+// Records that a file of the scene changed. The thread that watches the files calls it with the loop.
 void files_changed(void *context);
 
 // Waits for the next work and returns its state. LOOP_BEGIN has then read the request.

@@ -3,6 +3,6 @@
 
 #include "host/view/caption.h"
 
-// Draws it in the lower right corner, with the image's largest error, unless the window is less than twice
-// as large.
+// Draws the scale and the image's largest error in the lower right corner, unless that would take more than
+// half of the window's width or height.
 void legend_draw(Caption *caption, SDL_Renderer *target, double largest_error);

@@ -1,5 +1,5 @@
-// Watches folders, not files, because a file that is replaced by renaming is another one, and its watch
-// would stay with the old one.
+// Watches folders, not files, because the watch of a file would stay with it when another file is renamed to
+// its name.
 #include "host/view/watch.h"
 
 #include "host/base/array.h"

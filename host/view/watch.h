@@ -8,7 +8,7 @@ typedef struct Watch Watch;
 // Calls `changed` on a separate thread. Returns NULL and prints a warning if the system cannot watch files.
 Watch *watch_open(void (*changed)(void *context), void *context);
 void watch_close(Watch *watch); // accepts NULL
-// watch_only watches this file alone, watch_add in addition to others. It need not exist. Both accept NULL,
-// and print a warning if the system cannot watch it.
+// watch_only watches this file alone, watch_add in addition to others. The file need not exist. Both accept
+// NULL, and print a warning if the system cannot watch it.
 void watch_only(Watch *watch, const char *path);
 void watch_add(Watch *watch, const char *path);
