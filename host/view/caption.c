@@ -36,7 +36,7 @@ static char *font_path(void)
     return path;
 }
 
-static void size_set(Caption *caption, int size)
+static void font_size_set(Caption *caption, int size)
 {
     if (size != caption->size) TTF_SetFontSize(caption->font, size);
     caption->size = size;
@@ -100,17 +100,17 @@ static SDL_Point character_size(const Caption *caption)
 SDL_Point caption_character(Caption *caption)
 {
     if (!caption) return (SDL_Point){0, 0};
-    size_set(caption, (int)(FONT_SIZE * caption->scale));
+    font_size_set(caption, (int)(FONT_SIZE * caption->scale));
     return character_size(caption);
 }
 
 // Sets the largest font in which the extent fits. Returns the text's width, at most `room.x`.
-static int size_fit(Caption *caption, SDL_Point extent, SDL_Point room)
+static int font_size_fit(Caption *caption, SDL_Point extent, SDL_Point room)
 {
     int size = (int)(FONT_SIZE * caption->scale);
     const int least = (int)(FONT_SIZE_MIN * caption->scale);
     for (;; size--) {
-        size_set(caption, size);
+        font_size_set(caption, size);
         const SDL_Point character = character_size(caption);
         const int width = extent.x * character.x;
         if (size <= least || (width <= room.x && extent.y * character.y <= room.y))
@@ -142,7 +142,7 @@ void caption_draw(Caption *caption, CaptionPlace place, const char *text)
     SDL_Point room = caption_room(caption);
     room = (SDL_Point){room.x - 2 * PADDING, room.y - 2 * PADDING};
     if (room.x <= 0) return;
-    const int width = size_fit(caption, extent_of(text), room);
+    const int width = font_size_fit(caption, extent_of(text), room);
     SDL_Surface *surface = TTF_RenderUTF8_Blended_Wrapped(caption->font, text, white, (Uint32)room.x);
     if (!surface) return;
     SDL_Rect ground = {0, 0, width + 2 * PADDING, surface->h + 2 * PADDING};
@@ -155,7 +155,7 @@ void caption_draw(Caption *caption, CaptionPlace place, const char *text)
 void caption_draw_line(Caption *caption, int x, int y, const char *text)
 {
     if (!caption) return;
-    size_set(caption, (int)(FONT_SIZE * caption->scale));
+    font_size_set(caption, (int)(FONT_SIZE * caption->scale));
     SDL_Surface *surface = TTF_RenderUTF8_Blended(caption->font, text, white);
     if (!surface) return;
     surface_draw(caption, surface, x, y, surface->w);

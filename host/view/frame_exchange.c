@@ -1,9 +1,9 @@
 // Passes data between the window's thread and the loop's thread. These invariants hold:
 //
-//  1. `shared` is accessed only in this file and only with the mutex. No thread reads or writes files,
-//  renders
-//     or notifies the other while it holds the mutex, so the window never waits for the renderer.
-//  2. The loop's thread alone accesses the members of FrameLoop that it owns, and `options` never change.
+//  1. `shared` is accessed only in this file and only with the mutex. While a thread holds the mutex, it does
+//     not read or write files, render, or call `notify`. So the window waits for the renderer only in
+//     frame_loop_close.
+//  2. The loop's thread alone accesses the members of FrameLoop that it owns. `options` are constant.
 //  3. Everything allocated has one owner. Publishing moves a text to `shared`, and acquiring moves it out. A
 //     frame is exchanged for another: of the three, the loop fills one, `shared` has the newest complete one,
 //     and the window shows the third.
@@ -120,7 +120,7 @@ LoopState work_wait(FrameLoop *loop)
     return work;
 }
 
-bool news_are_absent(FrameLoop *loop, long nanoseconds)
+bool news_await(FrameLoop *loop, long nanoseconds)
 {
     struct timespec until;
     clock_gettime(CLOCK_MONOTONIC, &until);
@@ -131,7 +131,7 @@ bool news_are_absent(FrameLoop *loop, long nanoseconds)
     while (!render_stops(loop) && pthread_cond_timedwait(&loop->changed, &loop->mutex, &until) == 0)
         continue;
     shared_unlock(loop);
-    return !render_stops(loop);
+    return render_stops(loop);
 }
 
 bool probe_acquire(FrameLoop *loop, uint32_t pixel[2])

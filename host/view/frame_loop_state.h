@@ -7,17 +7,17 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-// The states of the loop's thread. Each does its work and names the next one, as loop_run has it:
+// The states of the loop's thread. state_run does the work of each and returns the next one:
 //
 //     WAIT ──files changed──▶ RELOAD ──image due──▶ BEGIN
-//       ├────request────────▶ BEGIN ──moving──▶ PREVIEW ──▶ REST ──▶ PASSES
-//       │                       └─────at rest───────────────────────▶ PASSES ──error view──▶ ERRORS
+//       ├────request────────▶ BEGIN ──coarse frame first──▶ PREVIEW ──▶ REST ──▶ PASSES
+//       │                       └─────full size at once───────────────────────▶ PASSES ──error view──▶ ERRORS
 //       ├────question───────▶ PROBE
 //       ├────complete image─▶ SAVE
 //       └────closed─────────▶ END
 //
-// Every state but END returns to WAIT when its work is done, when the device failed, and, from BEGIN to
-// ERRORS, when there is other work: a request, a changed file or the end.
+// A state returns to WAIT when its work is done and no arrow continues, when the device failed and, from
+// PREVIEW to ERRORS, when a request, a changed file or the end of the loop ended the render.
 typedef enum {
     LOOP_WAIT,    // reports a failure of the device, and waits for work
     LOOP_RELOAD,  // re-reads the scene, because one of its files changed
@@ -97,8 +97,8 @@ void files_changed(void *context);
 
 // Waits for the next work and returns its state. LOOP_BEGIN has then read the request.
 LoopState work_wait(FrameLoop *loop);
-// Waits for news for that long. Returns false if there are some.
-bool news_are_absent(FrameLoop *loop, long nanoseconds);
+// Waits for that long unless the current render should end. Returns whether it should.
+bool news_await(FrameLoop *loop, long nanoseconds);
 // Returns the path to which the image is to be saved. The caller frees it.
 char *save_path_acquire(FrameLoop *loop);
 // Sets the pixel of a question that has no answer yet. Returns false if there is none.

@@ -125,8 +125,7 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
 
 bool camera_rests(FrameLoop *loop)
 {
-    if (loop->expected_move > PREVIEW_SECONDS) return news_are_absent(loop, REST_NANOSECONDS);
-    return !render_stops(loop);
+    return !news_await(loop, loop->expected_move > PREVIEW_SECONDS ? REST_NANOSECONDS : 0);
 }
 
 bool request_begin(FrameLoop *loop)

@@ -134,7 +134,7 @@ static void message_acquire(Window *window)
 }
 
 // Returns the window's size in points, at most what fits the display.
-static ImageSize size_fit(ImageSize size)
+static ImageSize window_size_fit(ImageSize size)
 {
     SDL_Rect room;
     if (SDL_GetDisplayUsableBounds(0, &room) != 0 || room.w < 1 || room.h < 1) return size;
@@ -148,7 +148,7 @@ static void scene_receive(Window *window)
     ImageSize size;
     window->scene_state = frame_loop_scene(window->frames, &size);
     if (window->scene_state != SCENE_LOADED || window->options->size.width > 0) return;
-    size = size_fit(size);
+    size = window_size_fit(size);
     SDL_SetWindowSize(window->screen.window, (int)size.width, (int)size.height);
     size_read(window);
 }
@@ -258,7 +258,7 @@ static bool window_open(Window *window)
 {
     const WindowOptions *options = window->options;
     const ImageSize usual = {1280, 720};
-    ImageSize size = size_fit(options->size.width > 0 ? options->size : usual);
+    ImageSize size = window_size_fit(options->size.width > 0 ? options->size : usual);
     SDL_SetHint(SDL_HINT_RENDER_SCALE_QUALITY, "linear");
     // where SDL draws in software, OpenGL is software too, and slower; SDL would open the window a second
     // time for it

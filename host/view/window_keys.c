@@ -66,10 +66,14 @@ void key_record(Window *window)
     camera_write(window, &window->scene_frame);
 }
 
-// Saves as SCENE-1.png, or with the first number that is free. An animation pauses, since only a complete
-// image is saved.
-static void image_save(Window *window, const char *ending)
+// Asks for the image to be saved as SCENE-1.png, or with the first number that is free. An animation pauses,
+// since only a complete image is saved.
+static void save_ask(Window *window, const char *ending)
 {
+    if (window->view != VIEW_COLOR) {
+        message_show(window, memory_copy_text("only the color view is saved: V changes the view"));
+        return;
+    }
     const char *name = scene_name(window), *dot = strrchr(name, '.');
     Text path = {0};
     int number = 0;
@@ -95,6 +99,13 @@ static void facts_toggle(Window *window)
     window->redraws = true;
 }
 
+// Shows the view that follows by `step`.
+static void view_show(Window *window, unsigned step)
+{
+    window->view = (View)((window->view + step) % VIEW_COUNT);
+    window->image_changed = true;
+}
+
 static void full_screen_toggle(const Window *window)
 {
     bool is_full = SDL_GetWindowFlags(window->screen.window) & SDL_WINDOW_FULLSCREEN_DESKTOP;
@@ -103,7 +114,8 @@ static void full_screen_toggle(const Window *window)
 
 void key_press(Window *window, const SDL_KeyboardEvent *event)
 {
-    if (window->mouse.drag == DRAG_LOOK && event->keysym.sym != SDLK_ESCAPE) return; // they fly
+    if (window->mouse.drag == DRAG_LOOK && event->keysym.sym != SDLK_ESCAPE) return; // keys fly the camera
+    const bool has_shift = event->keysym.mod & KMOD_SHIFT;
     message_show(window, NULL);
     switch (event->keysym.sym) {
     case SDLK_LEFT:
@@ -137,20 +149,14 @@ void key_press(Window *window, const SDL_KeyboardEvent *event)
         key_ask(window);
         break;
     case SDLK_s:
-        if (window->view == VIEW_COLOR)
-            image_save(window, event->keysym.mod & KMOD_SHIFT ? "exr" : "png");
-        else
-            message_show(window, memory_copy_text("only the color view is saved: V changes the view"));
+        save_ask(window, has_shift ? "exr" : "png");
         break;
     case SDLK_f:
         full_screen_toggle(window);
         break;
-    case SDLK_v: {
-        unsigned step = event->keysym.mod & KMOD_SHIFT ? VIEW_COUNT - 1 : 1;
-        window->view = (View)((window->view + step) % VIEW_COUNT);
-        window->image_changed = true;
+    case SDLK_v:
+        view_show(window, has_shift ? VIEW_COUNT - 1 : 1);
         break;
-    }
     case SDLK_1:
     case SDLK_2:
     case SDLK_3:
