@@ -45,8 +45,9 @@ TEST(grabbed_point_stays_under_the_cursor)
     static const double from[2] = {100, 50}, to[2] = {420, 333};
     for (int i = 0; i < 5; i++) {
         Camera start = camera_make((FieldAxis)(i % 2));
-        start.orthographic = i == 2 || i == 3;
-        start.equirectangular = i == 4;
+        start.projection = i == 4   ? PROJECTION_EQUIRECTANGULAR
+                           : i >= 2 ? PROJECTION_ORTHOGRAPHIC
+                                    : PROJECTION_PERSPECTIVE;
         start.shift[0] = -0.2;
         start.shift[1] = 0.4;
         Camera camera = start;
@@ -54,13 +55,13 @@ TEST(grabbed_point_stays_under_the_cursor)
 
         camera_orbit(&camera, point, 0.7, -0.3);
         check_pixel(&camera, point, from);
-        if (!start.orthographic) assert_number(distance_to(&camera, point), 4);
+        if (start.projection != PROJECTION_ORTHOGRAPHIC) assert_number(distance_to(&camera, point), 4);
         assert_true(distance_to(&camera, start.position) > 0.2);
 
         camera = start;
         camera_dolly(&camera, point, 0.25);
         check_pixel(&camera, point, from);
-        if (start.orthographic)
+        if (start.projection == PROJECTION_ORTHOGRAPHIC)
             assert_number(camera.half_tangent, start.half_tangent / 4);
         else
             assert_number(distance_to(&camera, point), 1);
@@ -128,13 +129,12 @@ static void check_yaml(const Camera *camera)
     assert_int_equal(read->field_axis, camera->field_axis);
     if (read->half_tangent != camera->half_tangent)
         fail_msg("%.17g read as %.17g from %s", camera->half_tangent, read->half_tangent, text_c(&text));
-    assert_int_equal(read->orthographic, camera->orthographic);
-    assert_int_equal(read->equirectangular, camera->equirectangular);
+    assert_int_equal(read->projection, camera->projection);
     assert_memory_equal(read->shift, camera->shift, sizeof camera->shift);
-    assert_true(read->lens_radius == camera->lens_radius);
-    assert_true(read->focal_distance == camera->focal_distance);
-    assert_int_equal(read->has_focus, camera->has_focus);
-    assert_memory_equal(&read->focus, &camera->focus, sizeof(Vector3));
+    assert_true(read->lens.radius == camera->lens.radius);
+    assert_true(read->lens.distance == camera->lens.distance);
+    assert_int_equal(read->lens.focus, camera->lens.focus);
+    assert_memory_equal(&read->lens.point, &camera->lens.point, sizeof(Vector3));
     scene_free(&scene);
     text_free(&text);
 }
@@ -150,20 +150,22 @@ TEST(yaml_gives_the_same_camera)
         camera.position = vector_scale(camera.position, 1.0 + 1.0 / i);
         check_yaml(&camera);
     }
-    Camera lens = camera;
-    lens.lens_radius = 0.1;
-    lens.focal_distance = 1.0 / 3;
-    check_yaml(&lens);
-    lens.orthographic = true;
-    lens.shift[1] = 0.1;
-    check_yaml(&lens);
-    lens.focal_distance = 0;
-    check_yaml(&lens);
-    lens.has_focus = true;
-    lens.focus = lens.look_at;
-    check_yaml(&lens);
+    Camera focused = camera;
+    focused.lens.radius = 0.1;
+    focused.lens.focus = FOCUS_DISTANCE;
+    focused.lens.distance = 1.0 / 3;
+    check_yaml(&focused);
+    focused.projection = PROJECTION_ORTHOGRAPHIC;
+    focused.shift[1] = 0.1;
+    check_yaml(&focused);
+    focused.lens.focus = FOCUS_LOOK_AT;
+    focused.lens.distance = 0;
+    check_yaml(&focused);
+    focused.lens.focus = FOCUS_POINT;
+    focused.lens.point = focused.look_at;
+    check_yaml(&focused);
     Camera panorama = camera_make(FIELD_HORIZONTAL);
-    panorama.equirectangular = true;
+    panorama.projection = PROJECTION_EQUIRECTANGULAR;
     panorama.half_tangent = M_PI;
     check_yaml(&panorama);
     camera.half_tangent = portable_tangent(50 * (M_PI / 360));

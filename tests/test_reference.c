@@ -329,7 +329,7 @@ TEST(aims_panoramas)
                            .up = {0, 1, 0},
                            .field_axis = FIELD_HORIZONTAL,
                            .half_tangent = M_PI,
-                           .equirectangular = true};
+                           .projection = PROJECTION_EQUIRECTANGULAR};
     static const struct {
         unsigned column, row; // of 8 by 3
         double x, y, z;       // longitudes from 7/8 of a half-turn to the left on, latitudes of 60, 0 and -60

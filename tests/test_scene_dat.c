@@ -262,7 +262,7 @@ TEST(test_frustum)
 TEST(test_orthographic)
 {
     Scene scene = scene_of_text("s.dat", BEGIN CAMERA_OF("projection orthographic", "") SPHERE);
-    assert_true(scene.camera.orthographic);
+    assert_true(scene.camera.projection == PROJECTION_ORTHOGRAPHIC);
     assert_number(scene.camera.half_tangent, 0.5);
     scene_free(&scene);
 }

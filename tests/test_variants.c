@@ -312,7 +312,7 @@ TEST(shifted_frames_are_cuts_of_a_larger_one)
     scene.camera = (Camera){.position = {0.5, 3, -10}, .look_at = {0.5, 3, 1}, .up = {0, 1, 0}};
     RenderSettings settings = film_settings(2 * SIDE, 2 * SIDE, probe_same_bits_from());
     for (int i = 0; i < 2; i++) {
-        scene.camera.orthographic = i == 1;
+        scene.camera.projection = i == 1 ? PROJECTION_ORTHOGRAPHIC : PROJECTION_PERSPECTIVE;
         scene.camera.half_tangent = i == 1 ? 4 : 0.5;
         settings.width = settings.height = settings.region_width = settings.region_height = 2 * SIDE;
         Film whole = render(&scene, &settings), expected = film_cut(&whole, SIDE, 0, SIDE, SIDE);
@@ -363,7 +363,7 @@ TEST(points_of_areas_agree)
 {
     check_sampled(&sampled);
     Scene parallel = sampled;
-    parallel.camera.orthographic = true;
+    parallel.camera.projection = PROJECTION_ORTHOGRAPHIC;
     parallel.camera.half_tangent = 3;
     check_sampled(&parallel);
 }
@@ -372,7 +372,7 @@ TEST(points_of_areas_agree)
 TEST(panoramas_agree)
 {
     Scene panorama = every_shape;
-    panorama.camera.equirectangular = true;
+    panorama.camera.projection = PROJECTION_EQUIRECTANGULAR;
     panorama.camera.field_axis = FIELD_HORIZONTAL;
     panorama.camera.half_tangent = M_PI;
     panorama.camera.position = (Vector3){0.3, 1.7, 0.4};
@@ -396,7 +396,8 @@ TEST(mirror_gives_the_mirrored_image)
     scene_mirror(&mirrored);
     for (Precision precision = probe_same_bits_from(); precision <= PRECISION_STRICT; precision++) {
         for (uint32_t width = WIDTH; width <= WIDTH + 1; width++) {
-            seen.camera.equirectangular = mirrored.camera.equirectangular = width > WIDTH;
+            seen.camera.projection = mirrored.camera.projection =
+                width > WIDTH ? PROJECTION_EQUIRECTANGULAR : PROJECTION_PERSPECTIVE;
             RenderSettings settings = film_settings(width, HEIGHT, precision);
             Film film = render(&seen, &settings), flipped = film_flipped(&film);
             Film mirror = render(&mirrored, &settings);

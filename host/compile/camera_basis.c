@@ -10,14 +10,14 @@ CameraBasis camera_basis(const Camera *camera, uint32_t width, uint32_t height)
     Vector3 up = vector_cross(right, forward);
     double span = camera->field_axis == FIELD_VERTICAL ? height : width;
     double half_pixel = camera->half_tangent / span;
-    double half_pixel_up = camera->equirectangular ? M_PI / 2 / height : half_pixel;
+    double half_pixel_up = camera->projection == PROJECTION_EQUIRECTANGULAR ? M_PI / 2 / height : half_pixel;
     CameraBasis basis = {
         forward, vector_scale(right, half_pixel), vector_scale(up, half_pixel_up), forward, {0}};
     if (camera->shift[0] != 0 || camera->shift[1] != 0) { // adding 0 could change the sign of a zero
         const double frame = 2 * camera->half_tangent;
         basis.shift = vector_add(vector_scale(right, camera->shift[0] * frame),
                                  vector_scale(up, camera->shift[1] * frame));
-        if (!camera->orthographic) basis.middle = vector_add(forward, basis.shift);
+        if (camera->projection != PROJECTION_ORTHOGRAPHIC) basis.middle = vector_add(forward, basis.shift);
     }
     return basis;
 }

@@ -79,11 +79,11 @@ FeatureSet features_of(const Scene *scene)
         if (light->area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
         if (light->area == AREA_SKY) set |= FEATURE_SKY_LIGHT;
     }
-    if (scene->camera.lens_radius > 0) set |= FEATURE_LENS;
+    if (scene->camera.lens.radius > 0) set |= FEATURE_LENS;
     if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;
     if (scene->sky.texture > 0) set |= FEATURE_IMAGES;
-    if (scene->camera.orthographic) set |= FEATURE_ORTHOGRAPHIC;
-    if (scene->camera.equirectangular) set |= FEATURE_EQUIRECTANGULAR;
+    if (scene->camera.projection == PROJECTION_ORTHOGRAPHIC) set |= FEATURE_ORTHOGRAPHIC;
+    if (scene->camera.projection == PROJECTION_EQUIRECTANGULAR) set |= FEATURE_EQUIRECTANGULAR;
     return set;
 }
 

@@ -29,8 +29,9 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
 {
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
     const double focal_distance = camera_focal_distance(&scene->camera),
-                 lens_radius = focal_distance > 0 ? scene->camera.lens_radius : 0;
-    const bool is_equirectangular = scene->camera.equirectangular;
+                 lens_radius = focal_distance > 0 ? scene->camera.lens.radius : 0;
+    const bool is_equirectangular = scene->camera.projection == PROJECTION_EQUIRECTANGULAR,
+               is_orthographic = scene->camera.projection == PROJECTION_ORTHOGRAPHIC;
     const Vector3 right = is_equirectangular ? vector_normalize(basis.right) : basis.right,
                   up = is_equirectangular ? vector_normalize(basis.up) : basis.up;
     double half_pixel_squared = vector_dot(basis.right, basis.right);
@@ -41,7 +42,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
                 below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
     const Vector3 forward = vector_normalize(scene->sky.forward);
     const Vector3 eye =
-        scene->camera.orthographic ? vector_add(compiled->eye_offset, basis.shift) : compiled->eye_offset;
+        is_orthographic ? vector_add(compiled->eye_offset, basis.shift) : compiled->eye_offset;
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
         .ambient = scalar4_of(scene->ambient, 0),
@@ -58,16 +59,16 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .lens_right = scalar4_of(vector_scale(vector_normalize(basis.right), lens_radius),
                                  focal_distance > 0 ? 1 / focal_distance : 0),
         .lens_up = scalar4_of(vector_scale(vector_normalize(basis.up), lens_radius),
-                              is_equirectangular           ? CAMERA_EQUIRECTANGULAR
-                              : scene->camera.orthographic ? CAMERA_ORTHOGRAPHIC
-                                                           : 0),
+                              is_equirectangular ? CAMERA_EQUIRECTANGULAR
+                              : is_orthographic  ? CAMERA_ORTHOGRAPHIC
+                                                 : 0),
         .bounds = center_and_half_extent(&compiled->bvh_bounds),
         .bounds_low = scalar4_of(compiled->bvh_bounds.min, instance_slack(compiled, settings)),
         .bounds_high = scalar4_of(compiled->bvh_bounds.max, 0),
         .contact_low = scalar4_within_floats(compiled->contact.min),
         .contact_high = scalar4_within_floats(compiled->contact.max),
-        .sample = {sample_width, first_rival(compiled, settings),
-                   scene->camera.orthographic ? sample_width : 0, settings->min_contribution},
+        .sample = {sample_width, first_rival(compiled, settings), is_orthographic ? sample_width : 0,
+                   settings->min_contribution},
         .image = {settings->width, settings->height, settings->sample_count, (uint32_t)scene->lights.count},
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,

@@ -12,7 +12,7 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     change(&scene->camera.position, factor);
     change(&scene->camera.look_at, factor);
     change(&scene->camera.up, factor);
-    change(&scene->camera.focus, factor);
+    change(&scene->camera.lens.point, factor);
     change(&scene->sky.up, factor);
     change(&scene->sky.forward, factor);
     for (size_t i = 0; i < scene->lights.count; i++) {
@@ -38,9 +38,9 @@ static void vector_grow(Vector3 *vector, double factor)
 void scene_scale(Scene *scene, double factor)
 {
     scene_for_each_vector(scene, vector_grow, factor);
-    scene->camera.lens_radius *= factor;
-    scene->camera.focal_distance *= factor;
-    if (scene->camera.orthographic) scene->camera.half_tangent *= factor;
+    scene->camera.lens.radius *= factor;
+    scene->camera.lens.distance *= factor;
+    if (scene->camera.projection == PROJECTION_ORTHOGRAPHIC) scene->camera.half_tangent *= factor;
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
         for (const size_t *offset = shape_ops[object->type]->lengths; *offset > 0; offset++)

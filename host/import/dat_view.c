@@ -22,7 +22,7 @@ static bool projection_read(DatReader *reader)
     if (!dat_skip(reader, "projection")) return true;
     const Word name = dat_word(reader);
     if (word_is_in_any_case(name, "orthographic")) {
-        reader->scene->camera.orthographic = true;
+        reader->scene->camera.projection = PROJECTION_ORTHOGRAPHIC;
     } else if (word_is_in_any_case(name, "perspective_dof")) {
         report_warning(&reader->report, name.offset, "depth of field is not shown: all is in focus");
         return dat_number(reader, "focallength", &unused) && dat_number(reader, "aperture", &unused);

@@ -105,11 +105,11 @@ void scene_add_object(Scene *scene, Object object, const Material *material)
 
 double camera_focal_distance(const Camera *camera)
 {
-    if (camera->lens_radius == 0) return 0;
-    if (camera->focal_distance > 0) return camera->focal_distance;
+    if (camera->lens.radius == 0) return 0;
+    if (camera->lens.focus == FOCUS_DISTANCE) return camera->lens.distance;
     const Vector3 view = vector_subtract(camera->look_at, camera->position);
-    const Vector3 to_focus = camera->has_focus ? vector_subtract(camera->focus, camera->position) : view;
-    return fmax(vector_dot(to_focus, vector_normalize(view)), 0);
+    const Vector3 in_focus = camera->lens.focus == FOCUS_POINT ? camera->lens.point : camera->look_at;
+    return fmax(vector_dot(vector_subtract(in_focus, camera->position), vector_normalize(view)), 0);
 }
 
 Color material_passing(const Material *material)

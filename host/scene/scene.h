@@ -17,6 +17,17 @@ typedef Vector3 Color; // linear RGB in x, y, z; 1 = full
 // The side of the image that the field of view spans; pixels are square.
 typedef enum { FIELD_VERTICAL, FIELD_HORIZONTAL } FieldAxis;
 
+typedef enum {
+    PROJECTION_PERSPECTIVE,
+    PROJECTION_ORTHOGRAPHIC, // rays are parallel to the view
+    // The image shows all directions, by longitude from left to right and latitude from bottom to top.
+    // half_tangent is then pi along the width, and there is neither a shift nor a lens.
+    PROJECTION_EQUIRECTANGULAR
+} Projection;
+
+// The place of the plane in focus: through the camera's look_at, at a distance, or through a point.
+typedef enum { FOCUS_LOOK_AT, FOCUS_DISTANCE, FOCUS_POINT } LensFocus;
+
 typedef struct {
     Vector3 position, look_at, up; // look_at differs from position; up may be zero or parallel to the view
     FieldAxis field_axis;
@@ -25,16 +36,14 @@ typedef struct {
     double half_tangent;
     double frame_aspect; // width over height of the frame, or 0 where the file gives none
     double shift[2];     // of the frame in its plane, to the right and up, in frames along field_axis
-    bool orthographic;   // rays are parallel to the view
-    // The image shows all directions, by longitude from left to right and latitude from bottom to top;
-    // half_tangent is then pi along the width, and there is neither a shift nor a lens.
-    bool equirectangular;
-    // With a lens the plane across the view at focal_distance is in focus or, if that is 0, the one through
-    // `focus`, or through look_at.
-    double lens_radius; // 0: no lens
-    double focal_distance;
-    bool has_focus;
-    Vector3 focus;
+    Projection projection;
+    // The plane across the view that `focus` chooses is in focus.
+    struct {
+        double radius; // 0: no lens
+        LensFocus focus;
+        double distance; // > 0 with FOCUS_DISTANCE
+        Vector3 point;   // with FOCUS_POINT
+    } lens;
 } Camera;
 
 typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightType;

@@ -14,7 +14,7 @@ ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned
 {
     const CameraBasis basis = camera_basis(camera, width, height);
     const Quad x = (Quad)2 * column + 1 - width, y = height - 1 - (Quad)2 * row;
-    if (camera->equirectangular) {
+    if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
         const Quad half_turn = QUAD_CALL(acos)(-1), longitude = half_turn * x / width,
                    latitude = half_turn / 2 * y / height;
         const Quad3 right = quad3(vector_normalize(basis.right)), up = quad3(vector_normalize(basis.up));

@@ -236,7 +236,7 @@ static bool gets_key(const YamlReader *reader, const char *key, const YamlNode *
 static bool values_replace(Copy *copy, CameraFile *file, const Camera *camera, const uint32_t *frame)
 {
     YamlReader *reader = &file->reader;
-    if (camera->lens_radius > 0 && camera_focal_distance(camera) == 0)
+    if (camera->lens.radius > 0 && camera_focal_distance(camera) == 0)
         return report_error(&reader->report, file->camera->offset,
                             "the camera cannot be written: 'focus' lies behind it");
     const Camera *old = &file->scene.camera;

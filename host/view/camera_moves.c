@@ -10,9 +10,9 @@ bool cameras_equal(const Camera *a, const Camera *b)
     return vectors_equal(a->position, b->position) && vectors_equal(a->look_at, b->look_at) &&
            vectors_equal(a->up, b->up) && a->field_axis == b->field_axis &&
            a->half_tangent == b->half_tangent && a->shift[0] == b->shift[0] && a->shift[1] == b->shift[1] &&
-           a->orthographic == b->orthographic && a->equirectangular == b->equirectangular &&
-           a->lens_radius == b->lens_radius && a->focal_distance == b->focal_distance &&
-           a->has_focus == b->has_focus && vectors_equal(a->focus, b->focus);
+           a->projection == b->projection && a->lens.radius == b->lens.radius &&
+           a->lens.distance == b->lens.distance && a->lens.focus == b->lens.focus &&
+           vectors_equal(a->lens.point, b->lens.point);
 }
 
 static void camera_move(Camera *camera, Vector3 by)
@@ -26,7 +26,7 @@ CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y)
     CameraBasis basis = camera_basis(camera, size.width, size.height);
     Vector3 right = vector_scale(basis.right, 2 * x + 1 - size.width);
     Vector3 up = vector_scale(basis.up, size.height - 1 - 2 * y);
-    if (camera->equirectangular) {
+    if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
         const double longitude = M_PI * ((2 * x + 1) / size.width - 1),
                      latitude = M_PI / 2 * (1 - (2 * y + 1) / size.height);
         const Vector3 level = vector_add(vector_scale(basis.forward, cos(longitude)),
@@ -36,7 +36,8 @@ CameraRay camera_ray(const Camera *camera, ImageSize size, double x, double y)
                                       vector_scale(vector_normalize(basis.up), sin(latitude)))};
     }
     Vector3 across = vector_add(vector_add(right, up), basis.shift);
-    if (camera->orthographic) return (CameraRay){vector_add(camera->position, across), basis.forward};
+    if (camera->projection == PROJECTION_ORTHOGRAPHIC)
+        return (CameraRay){vector_add(camera->position, across), basis.forward};
     return (CameraRay){camera->position, vector_normalize(vector_add(basis.forward, across))};
 }
 
@@ -71,12 +72,13 @@ void camera_pan(Camera *camera, ImageSize size, double distance, const double fr
 {
     CameraBasis basis = camera_basis(camera, size.width, size.height);
     Vector3 ray = camera_ray(camera, size, from[0], from[1]).direction;
-    if (camera->equirectangular) {
+    if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
         Vector3 other = camera_ray(camera, size, to[0], to[1]).direction;
         camera_move(camera, vector_scale(vector_subtract(ray, other), distance));
         return;
     }
-    double depth = camera->orthographic ? 1 : distance * vector_dot(basis.forward, ray);
+    double depth =
+        camera->projection == PROJECTION_ORTHOGRAPHIC ? 1 : distance * vector_dot(basis.forward, ray);
     Vector3 right = vector_scale(basis.right, 2 * depth * (from[0] - to[0]));
     Vector3 up = vector_scale(basis.up, 2 * depth * (to[1] - from[1]));
     camera_move(camera, vector_add(right, up));
@@ -84,7 +86,7 @@ void camera_pan(Camera *camera, ImageSize size, double distance, const double fr
 
 void camera_dolly(Camera *camera, Vector3 pivot, double factor)
 {
-    if (camera->orthographic) {
+    if (camera->projection == PROJECTION_ORTHOGRAPHIC) {
         Vector3 forward = vector_normalize(vector_subtract(camera->look_at, camera->position));
         Vector3 to_pivot = vector_subtract(pivot, camera->position);
         Vector3 across = vector_subtract(to_pivot, vector_scale(forward, vector_dot(to_pivot, forward)));

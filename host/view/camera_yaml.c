@@ -78,15 +78,15 @@ void camera_write_yaml(Text *text, const Camera *camera, double aspect)
         list_write(text, camera->shift, 2);
         text_appendf(text, ", ");
     }
-    if (camera->lens_radius > 0) {
-        number_write(text, "aperture", 2 * camera->lens_radius);
-        if (camera->has_focus) vector_write(text, "focus", camera->focus);
-        if (camera->focal_distance > 0) number_write(text, "focus", camera->focal_distance);
+    if (camera->lens.radius > 0) {
+        number_write(text, "aperture", 2 * camera->lens.radius);
+        if (camera->lens.focus == FOCUS_POINT) vector_write(text, "focus", camera->lens.point);
+        if (camera->lens.focus == FOCUS_DISTANCE) number_write(text, "focus", camera->lens.distance);
     }
-    if (camera->orthographic) {
+    if (camera->projection == PROJECTION_ORTHOGRAPHIC) {
         text_appendf(text, "height: ");
         number_write_yaml(text, 2 * camera->half_tangent);
-    } else if (camera->equirectangular) {
+    } else if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
         text_appendf(text, "projection: equirectangular");
     } else if (camera->field_axis == FIELD_VERTICAL) {
         text_appendf(text, "fov: ");

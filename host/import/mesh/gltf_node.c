@@ -200,7 +200,7 @@ static void camera_add(Gltf *gltf, const GltfItem *camera, const Affine *affine)
                                 .half_tangent = tan(angle / 2),
                                 .frame_aspect = fmax(aspect, 0)};
         if (flat.json) {
-            view->camera.orthographic = true;
+            view->camera.projection = PROJECTION_ORTHOGRAPHIC;
             view->camera.half_tangent = half_height;
             view->camera.frame_aspect = fmax(half_width / half_height, 0);
         }

@@ -130,8 +130,8 @@ static bool camera_is_sound(const Camera *camera)
 {
     return vector_is_within(camera->position, NUMBER_MAX) && vector_is_within(camera->look_at, NUMBER_MAX) &&
            vector_is_within(camera->up, NUMBER_MAX) && !vectors_equal(camera->position, camera->look_at) &&
-           camera->field_axis <= FIELD_HORIZONTAL && camera->half_tangent > 0 &&
-           camera->half_tangent <= NUMBER_MAX && camera->frame_aspect >= 0 &&
+           camera->field_axis <= FIELD_HORIZONTAL && camera->projection <= PROJECTION_EQUIRECTANGULAR &&
+           camera->half_tangent > 0 && camera->half_tangent <= NUMBER_MAX && camera->frame_aspect >= 0 &&
            camera->frame_aspect <= NUMBER_MAX;
 }
 

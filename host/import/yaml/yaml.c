@@ -18,7 +18,7 @@ typedef struct {
 
 static bool read_projection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
-    *(bool *)target = true;
+    *(Projection *)target = PROJECTION_EQUIRECTANGULAR;
     return yaml_is(&reader->tree, node, "equirectangular") ||
            expected_report(reader, field->name, "equirectangular", node);
 }
@@ -27,11 +27,11 @@ static bool read_projection(YamlReader *reader, const Field *field, const YamlNo
 static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     CameraFields *read = target;
-    read->camera.has_focus = node->type != YAML_SCALAR;
-    if (read->camera.has_focus) return read_vector(reader, field, node, &read->camera.focus);
+    read->camera.lens.focus = node->type == YAML_SCALAR ? FOCUS_DISTANCE : FOCUS_POINT;
+    if (node->type != YAML_SCALAR) return read_vector(reader, field, node, &read->camera.lens.point);
     Field distance = *field;
     distance.range = &range_positive;
-    return read_number(reader, &distance, node, &read->camera.focal_distance);
+    return read_number(reader, &distance, node, &read->camera.lens.distance);
 }
 
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
@@ -47,8 +47,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         {"frame", read_items, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive,
          &two_numbers},
         {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
-        {"projection", read_projection, offsetof(CameraFields, camera.equirectangular), FORM_FOURTH,
-         REQUIRED},
+        {"projection", read_projection, offsetof(CameraFields, camera.projection), FORM_FOURTH, REQUIRED},
         {"shift", read_items, offsetof(CameraFields, camera.shift), FORM_FLAT, OPTIONAL, NULL, &two_numbers},
         {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL},
         {"aperture", read_number, offsetof(CameraFields, aperture), FORM_FLAT, OPTIONAL, &range_not_negative},
@@ -69,14 +68,14 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         camera->position =
             vector_add(camera->look_at, vector_turned(from, vector_normalize(camera->up), read.turn));
     }
-    camera->lens_radius = read.aperture / 2;
+    camera->lens.radius = read.aperture / 2;
     const YamlNode *focus = field_node(reader, node, "focus");
-    if (camera->lens_radius == 0 && focus != node)
+    if (camera->lens.radius == 0 && focus != node)
         report_warning(&reader->report, focus->offset, "'focus' has no effect without an 'aperture'");
-    else if (camera->lens_radius > 0 && camera_focal_distance(camera) == 0)
+    else if (camera->lens.radius > 0 && camera_focal_distance(camera) == 0)
         report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
     if (form == FORM_THIRD) {
-        camera->orthographic = true;
+        camera->projection = PROJECTION_ORTHOGRAPHIC;
         camera->half_tangent = read.height / 2;
     } else if (form == FORM_FOURTH) {
         camera->field_axis = FIELD_HORIZONTAL;
