@@ -95,8 +95,8 @@ Scene random_scene(uint64_t seed, size_t object_count)
         Light light = {.type = types[i], .color = random_color(&random)};
         light.position = vector_subtract(random_point(&random, 5, 15), vector_scale(up, 8));
         light.direction = vector_subtract(random_point(&random, 0, 3), light.position);
-        light.half_angle = random_between(&random, 15, 40);
-        light.penumbra = random_between(&random, 0, 10);
+        light.spot.half_angle = random_between(&random, 15, 40);
+        light.spot.penumbra = random_between(&random, 0, 10);
         if (light.type == LIGHT_POINT) {
             light.color = vector_scale(light.color, 100);
             light.fading[0] = random_between(&random, 0, 1);

@@ -250,8 +250,8 @@ static void spot_light_attack(Light *spot)
                   to_seen = vector_normalize(vector_subtract(seen, light));
     spot->type = LIGHT_SPOT;
     spot->direction = axis;
-    spot->half_angle = nudge(acos(vector_dot(axis, to_seen)) * 180 / 3.14159265358979323846);
-    spot->penumbra = 0;
+    spot->spot.half_angle = nudge(acos(vector_dot(axis, to_seen)) * 180 / 3.14159265358979323846);
+    spot->spot.penumbra = 0;
 }
 
 static Scene scene_attacking(Family family, unsigned seed)

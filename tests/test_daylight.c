@@ -171,7 +171,7 @@ TEST(test_scene)
     const double across = sqrt(3) / 2;
     assert_vector(scene.lights.items[0].direction, -across, -0.5, 0); // it is in the east
     assert_vector(scene.sky.forward, 1, 0, 0);
-    assert_int_equal(scene.lights.items[0].area, AREA_NONE);
+    assert_int_equal(scene.lights.items[0].area.type, AREA_NONE);
     Image image = daylight_image(30, 5, vector_all(0.2));
     assert_memory_equal(scene.textures.items[scene.sky.texture - 1].image.values, image.values,
                         3 * sizeof(float) * image.width * image.height);
@@ -181,7 +181,7 @@ TEST(test_scene)
 
     scene = scene_of_background("{sun: {elevation: 30, azimuth: 90, angle: 0.53}, turn: 90, up: [0, 0, 2]}");
     assert_vector(scene.lights.items[0].direction, across, 0, -0.5); // north is -x, turned to -y
-    assert_int_equal(scene.lights.items[0].area, AREA_ELLIPSE);
+    assert_int_equal(scene.lights.items[0].area.type, AREA_ELLIPSE);
     scene_free(&scene);
 
     scene = scene_of_background("{sun: {elevation: 30, azimuth: 90, light: false}}\nambient: 0.25");

@@ -177,7 +177,7 @@ static void spot_cone(Precision precision)
     const double outer = 5 * tan(M_PI / 6), inner = 5 * tan(M_PI / 9);
     const double versine_outer = 1 - cos(M_PI / 6), versine_inner = 1 - cos(M_PI / 9);
     Film soft = render(&scene, 160, 160, precision, AOV_POSITION);
-    scene.lights.items[0].penumbra = 0;
+    scene.lights.items[0].spot.penumbra = 0;
     Film hard = render(&scene, 160, 160, precision, AOV_POSITION);
     size_t between = 0;
     for (size_t i = 0; i < (size_t)160 * 160; i++) {

@@ -257,8 +257,8 @@ TEST(shades_as_phong)
     light = (Light){.type = LIGHT_SPOT,
                     .color = {2, 2, 2},
                     .position = {0, 4, 0},
-                    .half_angle = 60,
-                    .penumbra = 40,
+                    .spot.half_angle = 60,
+                    .spot.penumbra = 40,
                     .direction = {sin(halfway), -cos(halfway), 0}};
     assert_near(red(&scene, (Vector3){0, 2, 0}, (Vector3){0, -1, 0}), 0.2 + (0.4 + 0.25), 1e-15);
     light.direction = (Vector3){1, -0.5, 0};

@@ -62,8 +62,8 @@ TEST(test_lights)
     assert_vector(lights[2].direction, 1, -2, -3);
     assert_int_equal(lights[3].type, LIGHT_SPOT);
     assert_vector(lights[3].direction, 0, -1, -0.5);
-    assert_number(lights[3].half_angle, 45);
-    assert_number(lights[3].penumbra, 25);
+    assert_number(lights[3].spot.half_angle, 45);
+    assert_number(lights[3].spot.penumbra, 25);
     assert_vector(lights[4].color, 0.25, 0, 0);
 }
 

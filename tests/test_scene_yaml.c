@@ -48,11 +48,11 @@ TEST(test_lights)
     assert_int_equal(spot->type, LIGHT_SPOT);
     assert_vector(spot->position, 0, 5, 0);
     assert_vector(spot->direction, 0, -4, 0);
-    assert_number(spot->half_angle, 30);
-    assert_number(spot->penumbra, 5);
+    assert_number(spot->spot.half_angle, 30);
+    assert_number(spot->spot.penumbra, 5);
     assert_vector(other->direction, 0, -2, 0);
     assert_vector(other->color, 2, 2, 2);
-    assert_number(other->penumbra, 0);
+    assert_number(other->spot.penumbra, 0);
 }
 
 TEST(test_materials)

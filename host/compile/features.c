@@ -76,8 +76,8 @@ FeatureSet features_of(const Scene *scene)
         const Light *light = &scene->lights.items[i];
         set |= light_features[light->type];
         if (light_fades(light)) set |= FEATURE_FADING_LIGHTS;
-        if (light->area != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
-        if (light->area == AREA_SKY) set |= FEATURE_SKY_LIGHT;
+        if (light->area.type != AREA_NONE) set |= FEATURE_AREA_LIGHTS;
+        if (light->area.type == AREA_SKY) set |= FEATURE_SKY_LIGHT;
     }
     if (scene->camera.lens.radius > 0) set |= FEATURE_LENS;
     if (!vector_is_zero(scene->sky.up)) set |= FEATURE_SKY;

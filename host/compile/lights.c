@@ -26,12 +26,12 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
         lights[i] = (FlatLight){.color = scalar4_of(light->color, vector_largest(light->color)),
-                                .type = {.x = (uint32_t)light->type, .y = (uint32_t)light->area}};
-        if (light->area != AREA_NONE) {
-            const double factor = light->area == AREA_SKY ? scene->sky.cell_factor : light->radius;
+                                .type = {.x = (uint32_t)light->type, .y = (uint32_t)light->area.type}};
+        if (light->area.type != AREA_NONE) {
+            const double factor = light->area.type == AREA_SKY ? scene->sky.cell_factor : light->area.radius;
             const double unit = light->type == LIGHT_DIRECTIONAL ? 1 / vector_length(light->direction) : 1;
-            lights[i].across_u = scalar4_of(vector_scale(light->across[0], unit), factor);
-            lights[i].across_v = scalar4_of(vector_scale(light->across[1], unit), 0);
+            lights[i].across_u = scalar4_of(vector_scale(light->area.across[0], unit), factor);
+            lights[i].across_v = scalar4_of(vector_scale(light->area.across[1], unit), 0);
         }
         lights[i].fading =
             (scalar4){light_fades(light) ? light->fading[0] : 1, light->fading[1], light->fading[2], 0};
@@ -40,7 +40,8 @@ void lights_flatten(CompiledScene *compiled, const Scene *scene, const Rounding 
         if (light->type != LIGHT_POINT)
             lights[i].direction = scalar4_of(vector_normalize(light->direction), 0);
         if (light->type == LIGHT_SPOT) {
-            double outer = versine(light->half_angle), inner = versine(light->half_angle - light->penumbra);
+            double outer = versine(light->spot.half_angle),
+                   inner = versine(light->spot.half_angle - light->spot.penumbra);
             lights[i].cone = (scalar4){outer, inner, outer > inner ? 1 / (outer - inner) : 0, 0};
         }
     }

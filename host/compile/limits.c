@@ -151,8 +151,8 @@ bool lights_fit(const CompiledScene *compiled, const Scene *scene, const Compile
     if (settings->precision == PRECISION_DOUBLE) return true;
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
-        const double distance = vector_largest(vector_subtract(light->position, eye)) + light->radius +
-                                vector_largest(light->across[0]) + vector_largest(light->across[1]);
+        const double distance = vector_largest(vector_subtract(light->position, eye)) + light->area.radius +
+                                vector_largest(light->area.across[0]) + vector_largest(light->area.across[1]);
         if (light->type == LIGHT_DIRECTIONAL || distance <= farthest) continue;
         return message_error(
             messages,

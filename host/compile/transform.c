@@ -18,8 +18,8 @@ static void scene_for_each_vector(Scene *scene, void (*change)(Vector3 *vector, 
     for (size_t i = 0; i < scene->lights.count; i++) {
         change(&scene->lights.items[i].position, factor);
         change(&scene->lights.items[i].direction, factor);
-        change(&scene->lights.items[i].across[0], factor);
-        change(&scene->lights.items[i].across[1], factor);
+        change(&scene->lights.items[i].area.across[0], factor);
+        change(&scene->lights.items[i].area.across[1], factor);
     }
     for (size_t i = 0; i < scene->objects.count; i++) {
         Object *object = &scene->objects.items[i];
@@ -49,7 +49,7 @@ void scene_scale(Scene *scene, double factor)
             object->as.mesh.transform.rows[row][3] *= factor;
     }
     for (size_t i = 0; i < scene->lights.count; i++) {
-        scene->lights.items[i].radius *= factor;
+        scene->lights.items[i].area.radius *= factor;
         scene->lights.items[i].fading[1] /= factor;
         scene->lights.items[i].fading[2] /= factor * factor;
     }

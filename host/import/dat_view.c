@@ -146,8 +146,8 @@ bool dat_spotlight(DatReader *reader)
     double start;
     if (!light_place_read(reader, &light) || !dat_vector(reader, "direction", &light.direction) ||
         !dat_number(reader, "falloff_start", &start) || !dat_expect(reader, "falloff_end") ||
-        !dat_value_in_range(reader, "falloff_end", &range_falloff, &light.half_angle))
+        !dat_value_in_range(reader, "falloff_end", &range_falloff, &light.spot.half_angle))
         return false;
-    light.penumbra = light.half_angle - fmin(fmax(start, 0), light.half_angle);
+    light.spot.penumbra = light.spot.half_angle - fmin(fmax(start, 0), light.spot.half_angle);
     return fading_read(reader, &light) && light_end(reader, light);
 }

@@ -121,23 +121,23 @@ Color material_passing(const Material *material)
 
 static void lamp_add(Scene *scene, const Light *light, uint32_t material)
 {
-    const Vector3 u = light->across[0], v = light->across[1], center = light->position;
+    const Vector3 u = light->area.across[0], v = light->area.across[1], center = light->position;
     Object lamp = {.type = SHAPE_SPHERE, .material = material};
-    if (light->area == AREA_SPHERE) {
+    if (light->area.type == AREA_SPHERE) {
         lamp.as.sphere.center = center;
-        lamp.as.sphere.radius = light->radius;
+        lamp.as.sphere.radius = light->area.radius;
         array_push(scene->objects, lamp);
         return;
     }
-    if (light->area == AREA_ELLIPSE) {
+    if (light->area.type == AREA_ELLIPSE) {
         lamp.type = SHAPE_DISC;
         lamp.as.disc.center = center;
         lamp.as.disc.normal = vector_cross(vector_normalize(u), vector_normalize(v));
-        lamp.as.disc.radius = light->radius;
+        lamp.as.disc.radius = light->area.radius;
         array_push(scene->objects, lamp);
         return;
     }
-    if (light->area == AREA_TRIANGLE) {
+    if (light->area.type == AREA_TRIANGLE) {
         const Vector3 vertex = vector_subtract(center, vector_scale(vector_add(u, v), 0.25));
         lamp.type = SHAPE_TRIANGLE;
         lamp.as.triangle.vertices[0] = vertex;
@@ -161,7 +161,7 @@ void scene_add_lamps(Scene *scene)
 {
     for (size_t i = 0; i < scene->lights.count; i++) {
         const Light *light = &scene->lights.items[i];
-        if (!light->is_visible || light->area == AREA_NONE) continue;
+        if (!light->area.is_visible || light->area.type == AREA_NONE) continue;
         Material material = material_default();
         material.color = vector_all(0);
         material.emission = light->color;

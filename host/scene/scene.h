@@ -50,22 +50,26 @@ typedef enum { LIGHT_POINT, LIGHT_DIRECTIONAL, LIGHT_SPOT } LightType;
 
 // The area that a light shines from: its position, a rectangle or an ellipse around it, a sphere, a
 // triangle, or the directions of sky.cells.
-typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE, AREA_SKY } LightArea;
+typedef enum { AREA_NONE, AREA_RECTANGLE, AREA_ELLIPSE, AREA_SPHERE, AREA_TRIANGLE, AREA_SKY } LightAreaType;
 
 typedef struct {
     LightType type;
     Color color;       // times intensity
     Vector3 position;  // point, spot
     Vector3 direction; // directional: where the light travels; spot: look_at - position; not unit
-    // spot, degrees from its axis: no light beyond half_angle, full light within half_angle - penumbra
-    double half_angle, penumbra;
-    LightArea area;
-    // The vectors from the center of a rectangle or an ellipse to the middles of two sides. For a
-    // directional light they are across `direction`, and relative to its length. For a triangle they are two
-    // sides from one vertex, which is at position - (across[0] + across[1]) / 4.
-    Vector3 across[2];
-    double radius;   // of a sphere or a disc
-    bool is_visible; // the area is an object that shows `color` and casts no shadow
+    // degrees from the axis of a spot: no light beyond half_angle, full light within half_angle - penumbra
+    struct {
+        double half_angle, penumbra;
+    } spot;
+    struct {
+        LightAreaType type;
+        bool is_visible; // it is an object that shows `color` and casts no shadow
+        double radius;   // of a sphere or a disc
+        // The vectors from the center of a rectangle or an ellipse to the middles of two sides. For a
+        // directional light they are across `direction`, and relative to its length. For a triangle they are
+        // two sides from one vertex, which is at position - (across[0] + across[1]) / 4.
+        Vector3 across[2];
+    } area;
     // point, spot: unless the latter two are 0, the strength is divided by fading[0] + fading[1] d +
     // fading[2] d^2 at the distance d
     double fading[3];

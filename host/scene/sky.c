@@ -192,7 +192,7 @@ void scene_add_sky_light(Scene *scene)
     if (most * intensity < faint_light) return;
     // scaled so that a white surface that sees all of a uniform sky has the sky's color
     const Light sky_light = {.type = LIGHT_DIRECTIONAL,
-                             .area = AREA_SKY,
+                             .area.type = AREA_SKY,
                              .color = vector_all(most * cell_count * intensity / M_PI),
                              .direction = vector_scale(scene->sky.up, -1)};
     scene->sky.cell_factor = 2 * M_PI / most;

@@ -81,8 +81,8 @@ static Quad spot_factor(const Light *light, Quad3 from_light)
     const Quad degree = QUAD_CALL(acos)(-1) / 180;
     Quad along = quad3_dot(quad3_unit(quad3(light->direction)), quad3_unit(from_light));
     Quad versine = 1 - along;
-    Quad outer = 1 - QUAD_CALL(cos)(light->half_angle * degree);
-    Quad inner = 1 - QUAD_CALL(cos)((light->half_angle - light->penumbra) * degree);
+    Quad outer = 1 - QUAD_CALL(cos)(light->spot.half_angle * degree);
+    Quad inner = 1 - QUAD_CALL(cos)((light->spot.half_angle - light->spot.penumbra) * degree);
     if (versine <= inner) return 1;
     if (versine >= outer) return 0;
     Quad x = (outer - versine) / (outer - inner);

@@ -335,8 +335,8 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
             .color = {light->mColorDiffuse.r, light->mColorDiffuse.g, light->mColorDiffuse.b},
             .position = affine_point(affine, vector_of(&light->mPosition)),
             .direction = vector_normalize(affine_direction(affine, vector_of(&light->mDirection))),
-            .half_angle = outer,
-            .penumbra = outer - inner,
+            .spot.half_angle = outer,
+            .spot.penumbra = outer - inner,
             .fading = {light->mAttenuationConstant, light->mAttenuationLinear, light->mAttenuationQuadratic}};
         array_push(view->lights, added);
     }

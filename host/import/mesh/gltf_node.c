@@ -233,8 +233,8 @@ static void light_add(Gltf *gltf, const GltfItem *light, const Affine *affine)
             .color = {fmax(color[0], 0) * part, fmax(color[1], 0) * part, fmax(color[2], 0) * part},
             .position = affine_point(affine, (Vector3){0, 0, 0}),
             .direction = vector_normalize(affine_direction(affine, (Vector3){0, 0, -1})),
-            .half_angle = outer * (180 / M_PI),
-            .penumbra = (outer - inner) * (180 / M_PI),
+            .spot.half_angle = outer * (180 / M_PI),
+            .spot.penumbra = (outer - inner) * (180 / M_PI),
             .fading = {0, 0, 1}};
         array_push(gltf->draft->import->view->lights, added);
     }

@@ -71,8 +71,8 @@ static void lights_around(Scene *scene)
 
 static bool light_is_sound(const Light *light)
 {
-    const bool has_cone = light->half_angle > 0 && light->half_angle < 180 && light->penumbra >= 0 &&
-                          light->penumbra <= light->half_angle;
+    const bool has_cone = light->spot.half_angle > 0 && light->spot.half_angle < 180 &&
+                          light->spot.penumbra >= 0 && light->spot.penumbra <= light->spot.half_angle;
     return light->type <= LIGHT_SPOT && vector_is_within(light->position, NUMBER_MAX) &&
            vector_is_within(light->direction, NUMBER_MAX) && vector_is_within(light->color, NUMBER_MAX) &&
            vector_is_zero(vector_min(light->color, vector_all(0))) &&

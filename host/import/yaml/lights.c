@@ -62,21 +62,24 @@ static const Field spot_fields[] = {
     {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
     {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED},
     {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED},
-    {"angle", read_number, offsetof(LightFields, light.half_angle), FORM_ANY, REQUIRED, &range_half_turn},
-    {"penumbra", read_number, offsetof(LightFields, light.penumbra), FORM_ANY, OPTIONAL, &range_not_negative},
-    {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, OPTIONAL, &range_not_negative},
+    {"angle", read_number, offsetof(LightFields, light.spot.half_angle), FORM_ANY, REQUIRED,
+     &range_half_turn},
+    {"penumbra", read_number, offsetof(LightFields, light.spot.penumbra), FORM_ANY, OPTIONAL,
+     &range_not_negative},
+    {"radius", read_number, offsetof(LightFields, light.area.radius), FORM_ANY, OPTIONAL,
+     &range_not_negative},
     FALLOFF,
     COLOR,
 };
 
 #define VISIBLE                                                                                              \
     {                                                                                                        \
-        "visible", read_boolean, offsetof(LightFields, light.is_visible), FORM_ANY, OPTIONAL                 \
+        "visible", read_boolean, offsetof(LightFields, light.area.is_visible), FORM_ANY, OPTIONAL            \
     }
 
 static const Field sphere_fields[] = {
     {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
-    {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
+    {"radius", read_number, offsetof(LightFields, light.area.radius), FORM_ANY, REQUIRED, &range_positive},
     VISIBLE,
     FALLOFF,
     COLOR,
@@ -95,7 +98,7 @@ static const Field rectangle_fields[] = {
 static const Field disc_fields[] = {
     {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
     {"normal", read_direction, offsetof(LightFields, normal), FORM_ANY, REQUIRED},
-    {"radius", read_number, offsetof(LightFields, light.radius), FORM_ANY, REQUIRED, &range_positive},
+    {"radius", read_number, offsetof(LightFields, light.area.radius), FORM_ANY, REQUIRED, &range_positive},
     VISIBLE,
     FALLOFF,
     COLOR,
@@ -114,7 +117,7 @@ static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
     if (vector_is_zero(light->direction))
         return report_error(&reader->report, field_node(reader, mapping, "look_at")->offset,
                             "'look_at' must differ from 'position'");
-    if (light->penumbra > light->half_angle)
+    if (light->spot.penumbra > light->spot.half_angle)
         return report_error(&reader->report, field_node(reader, mapping, "penumbra")->offset,
                             "'penumbra' must not exceed 'angle'");
     return true;
@@ -133,8 +136,8 @@ void light_set_angle(Light *light, double degrees)
 {
     if (degrees == 0) return;
     const double length = vector_length(light->direction);
-    across_set(light->across, light->direction, length * portable_tangent(degrees * (M_PI / 360)));
-    light->area = AREA_ELLIPSE;
+    across_set(light->area.across, light->direction, length * portable_tangent(degrees * (M_PI / 360)));
+    light->area.type = AREA_ELLIPSE;
 }
 
 // Sets the light's area.
@@ -143,19 +146,19 @@ static void area_set(LightFields *read)
     Light *light = &read->light;
     if (light->type == LIGHT_DIRECTIONAL) {
         light_set_angle(light, read->angle);
-    } else if (light->area == AREA_ELLIPSE) {
-        across_set(light->across, read->normal, light->radius);
-    } else if (light->area == AREA_RECTANGLE) {
-        light->across[0] = vector_scale(read->edges[0], 0.5);
-        light->across[1] = vector_scale(read->edges[1], 0.5);
-    } else if (light->area == AREA_TRIANGLE) {
+    } else if (light->area.type == AREA_ELLIPSE) {
+        across_set(light->area.across, read->normal, light->area.radius);
+    } else if (light->area.type == AREA_RECTANGLE) {
+        light->area.across[0] = vector_scale(read->edges[0], 0.5);
+        light->area.across[1] = vector_scale(read->edges[1], 0.5);
+    } else if (light->area.type == AREA_TRIANGLE) {
         const Vector3 *vertices = read->vertices;
         for (int i = 0; i < 2; i++)
-            light->across[i] = vector_subtract(vertices[i + 1], vertices[0]);
-        const Vector3 diagonal = vector_add(light->across[0], light->across[1]);
+            light->area.across[i] = vector_subtract(vertices[i + 1], vertices[0]);
+        const Vector3 diagonal = vector_add(light->area.across[0], light->area.across[1]);
         light->position = vector_add(vertices[0], vector_scale(diagonal, 0.25));
-    } else if (light->radius > 0) {
-        light->area = AREA_SPHERE;
+    } else if (light->area.radius > 0) {
+        light->area.type = AREA_SPHERE;
     }
 }
 
@@ -163,7 +166,7 @@ static void area_set(LightFields *read)
 static const struct {
     const char *name;
     LightType type;
-    LightArea area;
+    LightAreaType area;
     const Field *fields;
     size_t field_count;
 } light_types[] = {
@@ -191,7 +194,7 @@ static void light_read(YamlReader *reader, const YamlNode *item)
         return;
     }
     LightFields fields = {
-        .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area = light_types[row].area},
+        .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area.type = light_types[row].area},
         .intensity = 1,
     };
     const Form form = fields_read(reader, mapping, names[row], light_types[row].fields,
@@ -199,13 +202,14 @@ static void light_read(YamlReader *reader, const YamlNode *item)
     if (!form) return;
     if (fields.light.type == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
     const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1]));
-    if (fields.light.area == AREA_RECTANGLE && vector_length(across) < 1e-9) {
+    if (fields.light.area.type == AREA_RECTANGLE && vector_length(across) < 1e-9) {
         report_error(&reader->report, field_node(reader, mapping, "edges")->offset,
                      "'edges' must not be parallel");
         return;
     }
     const Vector3 *vertices = fields.vertices;
-    if (fields.light.area == AREA_TRIANGLE && !triangle_has_area(vertices[0], vertices[1], vertices[2])) {
+    if (fields.light.area.type == AREA_TRIANGLE &&
+        !triangle_has_area(vertices[0], vertices[1], vertices[2])) {
         report_error(&reader->report, field_node(reader, mapping, "vertices")->offset,
                      "'vertices' must not be on one line");
         return;
