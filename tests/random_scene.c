@@ -33,10 +33,10 @@ static Material random_material(Random *random, size_t index)
     if (index == 2) material.transmission_tint = color_tint(material.color);
     if (index == 0) material.emission = (Color){material.diffuse.y, 0, 1.5 * material.diffuse.x};
     if (index == 3) {
-        material.checker = true;
-        material.checker_size = random_between(random, 0.3, 1);
-        material.checker_colors[0] = random_color(random);
-        material.checker_colors[1] = random_color(random);
+        material.checker.is_on = true;
+        material.checker.size = random_between(random, 0.3, 1);
+        material.checker.colors[0] = random_color(random);
+        material.checker.colors[1] = random_color(random);
     }
     return material;
 }

@@ -52,9 +52,9 @@ TEST(checkers_far_out_are_decided)
             Scene scene = scene_seen_from(from, 3 * size);
             scene.camera.look_at.z = from.z - 1;
             Material *material = &scene.materials.items[0];
-            material->checker = true;
-            material->checker_size = size;
-            material->checker_colors[0] = (Color){1, 1, 1};
+            material->checker.is_on = true;
+            material->checker.size = size;
+            material->checker.colors[0] = (Color){1, 1, 1};
             scene.ambient = (Color){1, 1, 1};
             material->ambient = 1;
             const Vector3 point = {from.x, from.y, from.z - 1};
@@ -221,9 +221,9 @@ TEST(slim_triangles_are_seldom_rerendered)
         Material *sheet = &scene.materials.items[0], *wall = &scene.materials.items[1];
         *(is_mirror ? &sheet->reflection : &sheet->transmission) = 0.8;
         sheet->ior = 1.5;
-        wall->checker = true;
-        wall->checker_size = 0.05;
-        wall->checker_colors[0] = (Color){1, 1, 1};
+        wall->checker.is_on = true;
+        wall->checker.size = 0.05;
+        wall->checker.colors[0] = (Color){1, 1, 1};
         wall->ambient = 1;
         array_push(scene.meshes, ribbons_in_view());
         array_push(scene.objects, ((Object){.type = SHAPE_MESH}));

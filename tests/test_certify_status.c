@@ -49,7 +49,7 @@ Renderer *__wrap_renderer_open(Compute *compute, const Scene *scene, const Rende
     changed.materials.items = memory_allocate(count, sizeof *changed.materials.items);
     memcpy(changed.materials.items, scene->materials.items, count * sizeof *changed.materials.items);
     for (size_t i = 0; i < count && wrong.change == THE_CHECKER; i++)
-        changed.materials.items[i].checker_size *= 1.5;
+        changed.materials.items[i].checker.size *= 1.5;
     changed.objects.count -= wrong.change == A_SHADOW; // the last is the disc
     RenderSettings shared = *settings;
     shared.extra_features = CERTIFIED_FEATURES; // of other tests' programs

@@ -64,8 +64,8 @@ static Scene optical_scene(uint64_t seed)
     Scene scene = random_scene(seed, OBJECTS);
     Material *glass = &scene.materials.items[2];
     glass->fresnel = true;
-    scene.materials.items[1].conductor_n = (Color){0.2, 1, 1.5};
-    scene.materials.items[1].conductor_k = (Color){3.5, 2.5, 0};
+    scene.materials.items[1].conductor.n = (Color){0.2, 1, 1.5};
+    scene.materials.items[1].conductor.k = (Color){3.5, 2.5, 0};
     glass->absorption = vector_scale(glass->color, 0.25);
     return scene;
 }
@@ -142,7 +142,7 @@ static Scene unchecked_scene(uint64_t seed)
 {
     Scene scene = optical_scene(seed);
     for (size_t i = 0; i < scene.materials.count; i++)
-        scene.materials.items[i].checker = false;
+        scene.materials.items[i].checker.is_on = false;
     return scene;
 }
 

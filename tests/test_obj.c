@@ -289,8 +289,8 @@ TEST(images_of_materials_are_used)
     const Material *red = triangle_material(&scene, 0), *same = triangle_material(&scene, 1);
     assert_int_equal(scene.textures.count, 1);
     assert_string_equal(scene.textures.items[0].path, "./a.ppm");
-    assert_int_equal(red->texture, 1);
-    assert_int_equal(same->texture, 1);
+    assert_int_equal(red->image.texture, 1);
+    assert_int_equal(same->image.texture, 1);
     assert_vector(red->diffuse, 0.75, 0.5, 0.25);
     assert_number(red->ambient, 0.5);
     assert_vector(same->diffuse, 1, 1, 1);
@@ -299,7 +299,7 @@ TEST(images_of_materials_are_used)
     scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" FACE,
                          "scene.yaml:4:18: warning: a.obj: no texture coordinates for the image './a.ppm' of "
                          "material 'red'\n");
-    assert_int_equal(triangle_material(&scene, 0)->texture, 0);
+    assert_int_equal(triangle_material(&scene, 0)->image.texture, 0);
     assert_vector(triangle_material(&scene, 0)->color, 0.75, 0.5, 0.25);
     scene_free(&scene);
     scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "f 1/1 2/2 3/3\n",
@@ -307,7 +307,7 @@ TEST(images_of_materials_are_used)
                          "material 'red'\n"
                          "a.obj:6:13: warning: a face names texture coordinate 3 (from 1); there are 0: not "
                          "used\n");
-    assert_int_equal(triangle_material(&scene, 0)->texture, 0);
+    assert_int_equal(triangle_material(&scene, 0)->image.texture, 0);
     scene_free(&scene);
 
     static const struct {
@@ -361,8 +361,8 @@ TEST(bumps_are_normals)
                                             "replaces the first\n"
                                           : "");
         const Material *red = triangle_material(&scene, 0);
-        assert_int_equal(red->normal_texture, 1);
-        assert_number(red->normal_strength, -2.5);
+        assert_int_equal(red->normal_map.texture, 1);
+        assert_number(red->normal_map.strength, -2.5);
         assert_int_equal(scene.textures.items[0].content, i % 2 ? TEXTURE_NORMALS : TEXTURE_BUMPS);
         const float *values = scene.textures.items[0].image.values;
         const double slope = 0.2 * 5 / 50, length = sqrt(1 + slope * slope);

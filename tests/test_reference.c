@@ -287,8 +287,10 @@ TEST(casts_shadows)
 TEST(lays_checkers)
 {
     Object floor = {.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
-    Material material = {
-        .ambient = 1, .checker = true, .checker_size = 2, .checker_colors = {{1, 1, 1}, {0.5, 0.5, 0.5}}};
+    Material material = {.ambient = 1,
+                         .checker.is_on = true,
+                         .checker.size = 2,
+                         .checker.colors = {{1, 1, 1}, {0.5, 0.5, 0.5}}};
     Scene scene = one_object(&floor, &material, NULL, 0);
     const Vector3 down = {0, -1, 0};
     // The floor's own axes are x and -z.

@@ -71,11 +71,11 @@ TEST(test_materials)
     assert_number(red->reflection, 0.25);
     assert_number(red->transmission, 0.5);
     assert_number(red->ior, 1.33);
-    assert_false(red->checker);
-    assert_true(tiles->checker);
-    assert_vector(tiles->checker_colors[0], 1, 1, 1);
-    assert_vector(tiles->checker_colors[1], 0, 0.5, 0);
-    assert_number(tiles->checker_size, 2);
+    assert_false(red->checker.is_on);
+    assert_true(tiles->checker.is_on);
+    assert_vector(tiles->checker.colors[0], 1, 1, 1);
+    assert_vector(tiles->checker.colors[1], 0, 0.5, 0);
+    assert_number(tiles->checker.size, 2);
     assert_vector(tiles->diffuse, 0.9, 0.8, 0.7);
     assert_vector(blue->color, 0, 0, 1);
     Material defaults = material_default();
@@ -87,7 +87,7 @@ TEST(test_materials)
     assert_number(plain->reflection, 0);
     assert_number(plain->transmission, 0);
     assert_number(plain->ior, 1.5);
-    assert_number(defaults.checker_size, 1);
+    assert_number(defaults.checker.size, 1);
 }
 
 TEST(test_tints)
@@ -122,14 +122,14 @@ TEST(test_tints)
     assert_vector(gray[3].transmission_tint, 0.2, 0.5, 1);
     assert_vector(material_passing(&gray[3]), 0.2, 0.5, 1);
     assert_vector(material_passing(&gray[2]), 0, 0, 0);
-    assert_vector(gray->conductor_n, 0, 0, 0);
-    assert_vector(gray[4].conductor_n, 0.15557, 0.42415, 1.3831);
-    assert_vector(gray[4].conductor_k, 3.6024, 2.4721, 1.9155);
+    assert_vector(gray->conductor.n, 0, 0, 0);
+    assert_vector(gray[4].conductor.n, 0.15557, 0.42415, 1.3831);
+    assert_vector(gray[4].conductor.k, 3.6024, 2.4721, 1.9155);
     assert_number(gray[4].reflection, 1);
     assert_number(gray[4].ambient, 0);
     assert_vector(gray[4].diffuse, 0, 0, 0);
-    assert_vector(gray[5].conductor_n, 2, 2, 2);
-    assert_vector(gray[5].conductor_k, 1, 3, 4);
+    assert_vector(gray[5].conductor.n, 2, 2, 2);
+    assert_vector(gray[5].conductor.k, 1, 3, 4);
     assert_number(gray[5].reflection, 0.5);
     assert_number(gray[5].ambient, 2);
     scene_free(&scene);
@@ -311,8 +311,8 @@ TEST(test_colors)
     assert_vector(materials[0].diffuse, 0, 0, half);
     assert_vector(materials[1].color, 1, 1, 1);
     assert_vector(materials[1].diffuse, 2, 1, 0);
-    assert_vector(materials[2].checker_colors[0], 0, 1, 0);
-    assert_vector(materials[2].checker_colors[1], 0.25, 0.25, 0.25);
+    assert_vector(materials[2].checker.colors[0], 0, 1, 0);
+    assert_vector(materials[2].checker.colors[1], 0.25, 0.25, 0.25);
     assert_vector(materials[3].color, 1.5, 0, 0);
     scene_free(&scene);
 }
@@ -450,7 +450,7 @@ TEST(test_layers_of_images)
         assert_number((double)scene.textures.items[i].image.values[0], i == 0 ? 2 : 1);
     static const uint32_t textures[] = {1, 2, 2, 1};
     for (size_t i = 0; i < 4; i++)
-        assert_int_equal(scene.materials.items[i].texture, textures[i]);
+        assert_int_equal(scene.materials.items[i].image.texture, textures[i]);
     scene_free(&scene);
 }
 

@@ -84,10 +84,10 @@ static Scene soak_scene(Random *random)
     scene.lights.count = random_index(random, (uint32_t)scene.lights.count + 1);
     const uint32_t plain_count = (uint32_t)scene.materials.count;
     Material textured = scene.materials.items[random_index(random, plain_count)];
-    textured.checker = false;
-    textured.texture = scene_add_texture(&scene, image_path, NULL, false, 0);
+    textured.checker.is_on = false;
+    textured.image.texture = scene_add_texture(&scene, image_path, NULL, false, 0);
     MessageList messages = {0};
-    assert_true(image_read(&scene.textures.items[textured.texture - 1].image, image_path, &messages));
+    assert_true(image_read(&scene.textures.items[textured.image.texture - 1].image, image_path, &messages));
     textured.texture_size = random_between(random, 0.5, 4);
     array_push(scene.materials, textured);
     for (uint32_t i = 0; i < kept; i++)

@@ -202,7 +202,7 @@ static void check_places(const char *camera, const char *object, TextureMap map,
     TestTexture texture = texture_make(4, 2);
     texture_write(&texture);
     Scene scene = scene_make(camera, object);
-    memcpy(scene.materials.items[0].texture_wrap, wraps, sizeof scene.materials.items[0].texture_wrap);
+    memcpy(scene.materials.items[0].image.wraps, wraps, sizeof scene.materials.items[0].image.wraps);
     for (Precision precision = PRECISION_SINGLE; precision <= PRECISION_DOUBLE; precision++) {
         if (!probe_has(precision)) continue;
         RenderSettings settings = film_settings(WIDTH, HEIGHT, precision);
@@ -605,7 +605,7 @@ TEST(textures_are_shared)
     assert_int_equal(scene.textures.count, 3);
     assert_string_equal(scene.textures.items[0].path, "scenes/images/globe.png");
     assert_string_equal(scene.textures.items[2].path, texture_path);
-    assert_int_equal(scene.materials.items[2].texture, 1);
+    assert_int_equal(scene.materials.items[2].image.texture, 1);
     text_free(&text);
     scene_free(&scene);
 }

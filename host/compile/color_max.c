@@ -19,8 +19,9 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
                                 Color light_sum)
 {
     Color color = material->color;
-    if (material->checker) color = vector_max(material->checker_colors[0], material->checker_colors[1]);
-    if (material->texture > 0) color = vector_all(compiled->textures[material->texture - 1].largest_texel);
+    if (material->checker.is_on) color = vector_max(material->checker.colors[0], material->checker.colors[1]);
+    if (material->image.texture > 0)
+        color = vector_all(compiled->textures[material->image.texture - 1].largest_texel);
     const Color ambient = vector_scale(vector_multiply(scene->ambient, color), material->ambient);
     const Color factor =
         vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular));

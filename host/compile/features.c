@@ -22,10 +22,10 @@ static const FeatureSet light_features[] = {
 static FeatureSet material_features(const Material *material)
 {
     FeatureSet set = 0;
-    if (material->checker) set |= FEATURE_CHECKERS;
+    if (material->checker.is_on) set |= FEATURE_CHECKERS;
     if (material_any_texture(material)) set |= FEATURE_IMAGES;
-    if (material->cutout > 0) set |= FEATURE_CUTOUTS;
-    if (material->normal_texture > 0) set |= FEATURE_NORMAL_MAPS;
+    if (material->cutout.threshold > 0) set |= FEATURE_CUTOUTS;
+    if (material->normal_map.texture > 0) set |= FEATURE_NORMAL_MAPS;
     if (material->reflection > 0) set |= FEATURE_REFLECTION;
     // includes reflected rays, for total internal reflection
     if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
@@ -38,7 +38,7 @@ static FeatureSet material_features(const Material *material)
     if (!vector_is_zero(material->reflection_tint) || !vector_is_zero(material->specular_tint))
         set |= FEATURE_TINTS;
     if (!vector_is_zero(material->emission)) set |= FEATURE_EMISSION;
-    if (material->conductor_n.x > 0 && set & FEATURE_REFLECTION) set |= FEATURE_CONDUCTORS | FEATURE_TINTS;
+    if (material->conductor.n.x > 0 && set & FEATURE_REFLECTION) set |= FEATURE_CONDUCTORS | FEATURE_TINTS;
     // needs the index of refraction and the side of the surface
     if (material->fresnel && set & (FEATURE_REFLECTION | FEATURE_TRANSMISSION))
         set |= FEATURE_FRESNEL | FEATURE_TRANSMISSION;

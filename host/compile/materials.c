@@ -31,22 +31,22 @@ static double density_of(double absorption, bool is_double)
 
 static scalar4 conductor_real(const Material *material)
 {
-    const Color n = material->conductor_n, k = material->conductor_k;
+    const Color n = material->conductor.n, k = material->conductor.k;
     return scalar4_of(vector_subtract(vector_multiply(n, n), vector_multiply(k, k)), n.x > 0);
 }
 
 static scalar4 conductor_imaginary_squared(const Material *material)
 {
-    const Color root = vector_scale(vector_multiply(material->conductor_n, material->conductor_k), 2);
+    const Color root = vector_scale(vector_multiply(material->conductor.n, material->conductor.k), 2);
     return scalar4_of(vector_multiply(root, root), 0);
 }
 
 static uint4 cutout_of(const CompiledScene *compiled, const Material *material)
 {
-    if (material->cutout == 0 || material->cutout_texture == 0) return (uint4){0, 0, 0, 0};
-    const CompiledTexture *texture = &compiled->textures[material->cutout_texture - 1];
-    const float least = (float)material->cutout;
-    uint4 cutout = {1 + texture->first_level, 0, material->texture_wrap[0], material->texture_wrap[1]};
+    if (material->cutout.threshold == 0 || material->cutout.texture == 0) return (uint4){0, 0, 0, 0};
+    const CompiledTexture *texture = &compiled->textures[material->cutout.texture - 1];
+    const float least = (float)material->cutout.threshold;
+    uint4 cutout = {1 + texture->first_level, 0, material->image.wraps[0], material->image.wraps[1]};
     memcpy(&cutout.y, &least, sizeof least);
     return cutout;
 }
@@ -61,14 +61,14 @@ static uint4 texture_of(const CompiledScene *compiled, uint32_t number, const Te
 static void normal_map_set(FlatMaterial *flat, const CompiledScene *compiled, const Material *material,
                            const CompiledTexture *any)
 {
-    const CompiledTexture *map = &compiled->textures[material->normal_texture - 1];
-    const double(*rows)[3] = material->normal_rows;
+    const CompiledTexture *map = &compiled->textures[material->normal_map.texture - 1];
+    const double(*rows)[3] = material->normal_map.rows;
     const double area = fabs(rows[0][0] * rows[1][1] - rows[0][1] * rows[1][0]),
                  texels = (double)map->width * map->height / ((double)any->width * any->height);
-    flat->normal_map = texture_of(compiled, material->normal_texture, material->normal_wrap);
+    flat->normal_map = texture_of(compiled, material->normal_map.texture, material->normal_map.wraps);
     // larger ones would overflow when squared; with this one, the normal already lies in the surface
     const double strength_max = 1e8,
-                 strength = fmax(fmin(material->normal_strength, strength_max), -strength_max);
+                 strength = fmax(fmin(material->normal_map.strength, strength_max), -strength_max);
     flat->normal_u = (scalar4){rows[0][0], rows[0][1], rows[0][2], strength};
     flat->normal_v = (scalar4){rows[1][0], rows[1][1], rows[1][2], sqrt(area * texels)};
 }
@@ -79,14 +79,14 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
     FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *material = &scene->materials.items[i];
-        double size = material->checker_size;
+        double size = material->checker.size;
         Vector3 eye = rounding->eye;
         const Color passed = material_passing(material);
         materials[i] = (FlatMaterial){
-            .color = scalar4_of(material->checker ? material->checker_colors[0] : material->color,
+            .color = scalar4_of(material->checker.is_on ? material->checker.colors[0] : material->color,
                                 material->ambient),
             .diffuse = scalar4_of(material->diffuse, material->specular),
-            .other_color = scalar4_of(material->checker_colors[1], material->shininess),
+            .other_color = scalar4_of(material->checker.colors[1], material->shininess),
             .reflection_transmission_ior = {part_of_light(material->reflection),
                                             part_of_light(material->transmission), material->ior, 0},
             .reflection_tint = scalar4_of(tint_factors(material->reflection_tint), material->fresnel),
@@ -102,15 +102,15 @@ void materials_flatten(CompiledScene *compiled, const Scene *scene, const Roundi
             .optical_depth_green = optical_depth_of(passed.y),
             .optical_depth_blue = optical_depth_of(passed.z),
         };
-        if (material->checker) // the remainders are exact, quotients far from the origin are not
+        if (material->checker.is_on) // the remainders are exact, quotients far from the origin are not
             materials[i].grid = (scalar4){fmod(eye.x, 2 * size) / size, fmod(eye.y, 2 * size) / size,
                                           fmod(eye.z, 2 * size) / size, 1 / size};
         materials[i].cutout = cutout_of(compiled, material);
         if (material_any_texture(material) == 0) continue;
         const CompiledTexture *any = &compiled->textures[material_any_texture(material) - 1];
         materials[i].reflection_transmission_ior.w = any->width / material->texture_size;
-        if (material->texture > 0)
-            materials[i].texture = texture_of(compiled, material->texture, material->texture_wrap);
-        if (material->normal_texture > 0) normal_map_set(&materials[i], compiled, material, any);
+        if (material->image.texture > 0)
+            materials[i].texture = texture_of(compiled, material->image.texture, material->image.wraps);
+        if (material->normal_map.texture > 0) normal_map_set(&materials[i], compiled, material, any);
     }
 }

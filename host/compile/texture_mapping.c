@@ -35,7 +35,7 @@ void surface_grid(const Flattening *flattening, uint32_t material, Vector3 norma
 {
     const Material *look = &flattening->scene->materials.items[material];
     const uint32_t any = material_any_texture(look);
-    if (any == 0 && !look->checker) return;
+    if (any == 0 && !look->checker.is_on) return;
     const Quad3 unit = quad3_unit(quad3(axis_scaled(normal)));
     if (any > 0) {
         const CompiledTexture *texture = &flattening->compiled->textures[any - 1];
@@ -45,8 +45,8 @@ void surface_grid(const Flattening *flattening, uint32_t material, Vector3 norma
         *v = grid_axis(flattening, up, width * texture->height / texture->width, 1);
     } else {
         Quad3 across = axis_across(vector_least_aligned_axis(vector_normalize(normal)), unit);
-        *u = grid_axis(flattening, across, look->checker_size, 2);
-        *v = grid_axis(flattening, quad3_cross(unit, across), look->checker_size, 2);
+        *u = grid_axis(flattening, across, look->checker.size, 2);
+        *v = grid_axis(flattening, quad3_cross(unit, across), look->checker.size, 2);
     }
 }
 

@@ -61,7 +61,7 @@ void scene_scale(Scene *scene, double factor)
         vector_grow(&mesh->bounds.max, factor);
     }
     for (size_t i = 0; i < scene->materials.count; i++) {
-        scene->materials.items[i].checker_size *= factor;
+        scene->materials.items[i].checker.size *= factor;
         scene->materials.items[i].texture_size *= factor;
         scene->materials.items[i].absorption = vector_scale(scene->materials.items[i].absorption, 1 / factor);
     }
@@ -111,7 +111,7 @@ void scene_mirror(Scene *scene)
 {
     scene_for_each_vector(scene, vector_mirror, -1);
     for (size_t i = 0; i < scene->materials.count; i++) {
-        Color *colors = scene->materials.items[i].checker_colors, first = colors[0];
+        Color *colors = scene->materials.items[i].checker.colors, first = colors[0];
         colors[0] = colors[1];
         colors[1] = first;
     }

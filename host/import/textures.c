@@ -132,11 +132,12 @@ static AlphaUse *alpha_uses(const Scene *scene)
     uses[scene->sky.texture].loses = true; // uses[0] stands for materials without an image
     for (size_t i = 0; i < scene->materials.count; i++) {
         const Material *material = &scene->materials.items[i];
-        const uint32_t cutout = material->cutout > 0 ? material->cutout_texture : 0;
+        const uint32_t cutout = material->cutout.threshold > 0 ? material->cutout.texture : 0;
         uses[cutout].cuts = true;
-        uses[cutout].blends |= material->cutout_blends;
-        uses[cutout].asks |= !material->ignores_alpha;
-        if (material->texture != cutout) uses[material->texture].loses |= !material->ignores_alpha;
+        uses[cutout].blends |= material->cutout.blends;
+        uses[cutout].asks |= !material->image.ignores_alpha;
+        if (material->image.texture != cutout)
+            uses[material->image.texture].loses |= !material->image.ignores_alpha;
     }
     return uses;
 }
@@ -164,9 +165,9 @@ static void cutouts_prune(Scene *scene)
 {
     for (size_t i = 0; i < scene->materials.count; i++) {
         Material *material = &scene->materials.items[i];
-        if (material->cutout == 0 || material->cutout_texture == 0) continue;
-        if (!scene->textures.items[material->cutout_texture - 1].image.alpha)
-            material->cutout = material->cutout_texture = 0;
+        if (material->cutout.threshold == 0 || material->cutout.texture == 0) continue;
+        if (!scene->textures.items[material->cutout.texture - 1].image.alpha)
+            material->cutout.threshold = material->cutout.texture = 0;
     }
 }
 

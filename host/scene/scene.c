@@ -21,10 +21,10 @@ Material material_default(void)
                       .diffuse = {1, 1, 1},
                       .shininess = 32,
                       .ior = 1.5,
-                      .checker_size = 1,
+                      .checker.size = 1,
                       .texture_size = 1,
-                      .normal_rows = {{1, 0, 0}, {0, 1, 0}},
-                      .normal_strength = 1};
+                      .normal_map.rows = {{1, 0, 0}, {0, 1, 0}},
+                      .normal_map.strength = 1};
 }
 
 void light_fold_fading(Light *light)

@@ -89,6 +89,11 @@ typedef enum { TEXTURE_REPEATED, TEXTURE_CLAMPED, TEXTURE_MIRRORED } TextureWrap
 // The part of a shadow ray that a surface blocks: what it does not transmit, all, or nothing.
 typedef enum { SHADOW_OF_TRANSMISSION, SHADOW_FULL, SHADOW_NONE } ShadowType;
 
+// The complex index of refraction n + i k of a metal.
+typedef struct {
+    Color n, k;
+} Conductor;
+
 typedef struct {
     Color color;
     double ambient;                  // ka
@@ -98,34 +103,42 @@ typedef struct {
     double reflection, transmission; // weights of the reflected and the refracted ray, the largest channel's
     // the channels over the largest, or 0 where they are equal
     Color reflection_tint, transmission_tint, specular_tint;
-    Color emission; // added to what the surface shows; lights nothing else
-    bool fresnel;   // the surface reflects a part of `transmission`, or of `reflection` without it
-    Color conductor_n, conductor_k; // reflects by the complex index n + i k; n is 0 if it does not
+    Color emission;      // added to what the surface shows; lights nothing else
+    bool fresnel;        // the surface reflects a part of `transmission`, or of `reflection` without it
+    Conductor conductor; // reflects by this index; n is 0 if it does not
     double ior;
     ShadowType shadow;
     Color absorption; // exp(-absorption d) of what is transmitted is left after a length d within
-    bool checker;
-    Color checker_colors[2];     // in place of color
-    double checker_size;         // side of a square, > 0, in scene units
-    uint32_t texture;            // in place of color: 1 + index into the scene's textures; 0: none
-    double texture_size;         // width of a texture on a plane or disc, > 0, in scene units
-    TextureWrap texture_wrap[2]; // along u and v, on a mesh
-    // A normal map, the affine map from the other textures' coordinates to its own (one row each for u and
-    // v), and the factor of its tangential components.
-    uint32_t normal_texture;
-    double normal_rows[2][3], normal_strength;
-    TextureWrap normal_wrap[2];
-    uint32_t cutout_texture; // the surface is absent where the alpha of this texture is below `cutout`
-    double cutout;           // 0: it is everywhere
-    bool cutout_blends;      // its format blends by this alpha
-    bool ignores_alpha;      // its format defines the use of the alpha of `texture`
+    struct {
+        bool is_on;
+        Color colors[2]; // in place of color
+        double size;     // side of a square, > 0, in scene units
+    } checker;
+    double texture_size; // width of the textures below on a plane or disc, > 0, in scene units
+    struct {
+        uint32_t texture;     // in place of color: 1 + index into the scene's textures; 0: none
+        TextureWrap wraps[2]; // along u and v, on a mesh; also those of the cutout
+        bool ignores_alpha;   // its format defines the use of the alpha
+    } image;
+    struct {
+        uint32_t texture;
+        TextureWrap wraps[2];
+        double rows[2][3]; // the affine map from the other textures' coordinates to u and v of this one
+        double strength;   // the factor of the tangential components
+    } normal_map;
+    // The surface is absent where the alpha of the texture is below the threshold.
+    struct {
+        uint32_t texture;
+        double threshold; // 0: it is everywhere
+        bool blends;      // its format blends by this alpha
+    } cutout;
 } Material;
 
 // Returns the texture whose place on a surface is that of all textures of its material, or 0.
 static inline uint32_t material_any_texture(const Material *material)
 {
-    if (material->texture > 0) return material->texture;
-    return material->cutout_texture > 0 ? material->cutout_texture : material->normal_texture;
+    if (material->image.texture > 0) return material->image.texture;
+    return material->cutout.texture > 0 ? material->cutout.texture : material->normal_map.texture;
 }
 
 // The cutout for images by whose alpha other programs blend.
@@ -282,7 +295,7 @@ typedef struct {
     struct {
         Vector3 up;
         Color zenith, nadir;
-        // An image of all directions replaces these colors; the number is that of a Material's texture. Its
+        // An image of all directions replaces these colors; the number is that of a Material's image. Its
         // colors are multiplied by `intensity`, and its center lies along `forward`, across `up`.
         uint32_t texture;
         Vector3 forward;
@@ -333,8 +346,8 @@ uint32_t scene_add_material(Scene *scene, const Material *material, const char *
 // Bounds the cost of a hostile file.
 enum { SCENE_TEXTURES_MAX = 1000 };
 
-// Returns the value of a material's `texture` for the image, which materials with the same image share, or 0
-// if the scene has too many. `layer` may be NULL, as in SceneTexture.
+// Returns the value of a material's `image.texture` for the image, which materials with the same image share,
+// or 0 if the scene has too many. `layer` may be NULL, as in SceneTexture.
 uint32_t scene_add_texture(Scene *scene, const char *path, const char *layer, TextureContent content,
                            size_t offset);
 

@@ -170,7 +170,7 @@ static Scene unchecked_scene(void)
 {
     Scene scene = every_shape_scene();
     for (size_t i = 0; i < scene.materials.count; i++)
-        scene.materials.items[i].checker = false;
+        scene.materials.items[i].checker.is_on = false;
     return scene;
 }
 

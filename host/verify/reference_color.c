@@ -58,7 +58,7 @@ static Color checker_color(const Object *object, const Material *material, const
                            Quad3 point, Quad *margin)
 {
     bool flat = object->type == SHAPE_PLANE || object->type == SHAPE_DISC;
-    double size = material->checker_size;
+    double size = material->checker.size;
     Quad squares;
     if (flat) {
         Vector3 given = object->type == SHAPE_PLANE ? object->as.plane.normal : object->as.disc.normal;
@@ -71,7 +71,7 @@ static Color checker_color(const Object *object, const Material *material, const
         squares = square_of(point.x, size, margin) + square_of(point.y, size, margin) +
                   square_of(point.z, size, margin);
     }
-    return material->checker_colors[QUAD_CALL(fmod)(squares, 2) != 0];
+    return material->checker.colors[QUAD_CALL(fmod)(squares, 2) != 0];
 }
 
 // Returns 1 within half_angle - penumbra, 0 beyond half_angle, and the smooth step 3 x^2 - 2 x^3 of 1 - cos
@@ -219,7 +219,8 @@ static ShadedPoint surface_at(const ReferenceScene *world, const ReferenceRay *r
         surface.start += blur * size;
     }
     surface_lift(&surface);
-    if (material->checker) surface.base = checker_color(object, material, hit, surface.point, &hit->margin);
+    if (material->checker.is_on)
+        surface.base = checker_color(object, material, hit, surface.point, &hit->margin);
     return surface;
 }
 
@@ -426,7 +427,7 @@ static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Col
     tree->shadows = NULL;
     tree->sum = vector_add(tree->sum, vector_multiply(own.color, weight));
     tree->margin = fmin(tree->margin, own.margin);
-    tree->has_texture = tree->has_texture || material->texture > 0;
+    tree->has_texture = tree->has_texture || material->image.texture > 0;
     if (bounces_left == 0) {
         signature_add(tree, hit.object, 0);
         return;
@@ -459,8 +460,8 @@ static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Col
             reflected_weight = vector_scale(reflected_weight, part);
         }
     }
-    if (material->conductor_n.x > 0) {
-        const Color n = material->conductor_n, k = material->conductor_k;
+    if (material->conductor.n.x > 0) {
+        const Color n = material->conductor.n, k = material->conductor.k;
         const Quad cosine = -quad3_dot(direction, surface.normal);
         const Color part = {conductor_reflectance(cosine, n.x, k.x), conductor_reflectance(cosine, n.y, k.y),
                             conductor_reflectance(cosine, n.z, k.z)};

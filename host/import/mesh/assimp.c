@@ -204,8 +204,8 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
     to->scene_index[0] = to->scene_index[1] = scene_add_material(scene, &material, name.data);
     if (to->texture == 0) return;
     const Color color = material.color;
-    material.texture = to->texture;
-    memcpy(material.texture_wrap, wraps, sizeof wraps);
+    material.image.texture = to->texture;
+    memcpy(material.image.wraps, wraps, sizeof wraps);
     material.diffuse = vector_multiply(material.diffuse, color);
     material.ambient *= importer->draft->import->view ? 0 : (color.x + color.y + color.z) / 3;
     to->scene_index[1] = scene_add_material(scene, &material, name.data);

@@ -120,8 +120,8 @@ static void materials_write(FILE *reply, const Scene *scene)
                                   .shininess = from->shininess,
                                   .transmission = from->transmission,
                                   .ior = from->ior,
-                                  .texture = from->texture,
-                                  .wraps = {from->texture_wrap[0], from->texture_wrap[1]}};
+                                  .texture = from->image.texture,
+                                  .wraps = {from->image.wraps[0], from->image.wraps[1]}};
         snprintf(material.name, sizeof material.name, "%s", scene->material_names.items[i]);
         fwrite(&material, sizeof material, 1, reply);
     }
@@ -257,9 +257,9 @@ static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count, const 
         material.diffuse = from.diffuse;
         material.emission = from.emission;
         material.ambient = from.ambient;
-        material.texture = from.texture > 0 ? textures[from.texture - 1] : 0;
+        material.image.texture = from.texture > 0 ? textures[from.texture - 1] : 0;
         for (int axis = 0; axis < 2; axis++)
-            material.texture_wrap[axis] = (TextureWrap)from.wraps[axis];
+            material.image.wraps[axis] = (TextureWrap)from.wraps[axis];
         material.specular = from.specular;
         material.shininess = from.shininess;
         material.transmission = from.transmission;

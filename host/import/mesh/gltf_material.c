@@ -259,9 +259,9 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
         gltf_warn(gltf, &mode, "must be OPAQUE, MASK or BLEND: OPAQUE is used");
     const double opacity = is_mask ? alpha >= surface->cutoff : is_blend ? alpha : 1;
     if (surface->base_texture.json && opacity > 0) {
-        if (is_mask && surface->cutoff > 0) look->cutout = surface->cutoff / alpha;
-        if (is_blend) look->cutout = CUTOUT_OF_BLENDED;
-        look->cutout_blends = is_blend;
+        if (is_mask && surface->cutoff > 0) look->cutout.threshold = surface->cutoff / alpha;
+        if (is_blend) look->cutout.threshold = CUTOUT_OF_BLENDED;
+        look->cutout.blends = is_blend;
     }
     if (opacity < 1) {
         material_set_opacity(look, opacity);
@@ -320,8 +320,8 @@ static void normals_set(Gltf *gltf, const GltfItem *item, GltfMaterial *material
     double rows[2][3], from_upward[2][3];
     rows_multiply(back, upward, from_upward);
     rows_multiply(normals->uv_rows, from_upward, rows);
-    rows_multiply(upward, rows, look->normal_rows);
-    gltf_numbers(gltf, &info, "scale", 1, &look->normal_strength);
+    rows_multiply(upward, rows, look->normal_map.rows);
+    gltf_numbers(gltf, &info, "scale", 1, &look->normal_map.strength);
 }
 
 static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *material)
@@ -335,7 +335,7 @@ static void material_read(Gltf *gltf, const GltfItem *item, GltfMaterial *materi
                                .normals = {.uv_rows = {{1, 0, 0}, {0, 1, 0}}},
                                .scene_index = {DRAFT_NONE, DRAFT_NONE}};
     Material *look = &material->look;
-    look->ignores_alpha = true; // alphaMode decides
+    look->image.ignores_alpha = true; // alphaMode decides
     for (int i = 0; i < 4; i++)
         surface.base[i] = fmax(surface.base[i], 0);
     texture_read(gltf, &surface.base_texture, TEXTURE_COLORS, &material->texture);
@@ -367,16 +367,16 @@ uint32_t gltf_material_index(Gltf *gltf, GltfMaterial *material, bool is_texture
     if (*index != DRAFT_NONE) return *index;
     Material look = material->look;
     const bool is_colored = is_textured && material->texture.number > 0;
-    if (!is_colored) look.cutout = 0;
+    if (!is_colored) look.cutout.threshold = 0;
     if (is_textured && material->normals.number > 0) {
-        look.normal_texture = material->normals.number;
-        memcpy(look.normal_wrap, material->normals.wraps, sizeof look.normal_wrap);
+        look.normal_map.texture = material->normals.number;
+        memcpy(look.normal_map.wraps, material->normals.wraps, sizeof look.normal_map.wraps);
     }
     if (is_colored) {
-        look.texture = look.cutout_texture = material->texture.number;
+        look.image.texture = look.cutout.texture = material->texture.number;
         look.ambient = material->textured_ambient;
         if (material->texture_emits) look.emission = vector_all(0);
-        memcpy(look.texture_wrap, material->texture.wraps, sizeof look.texture_wrap);
+        memcpy(look.image.wraps, material->texture.wraps, sizeof look.image.wraps);
         look.diffuse = vector_multiply(look.diffuse, look.color);
     }
     const GltfItem item = gltf_entry(gltf, "materials", (size_t)(material - gltf->materials));

@@ -409,17 +409,17 @@ static void textures_use(MeshDraft *draft, MtlMaterial *material)
     const MtlImage *opacity = &material->opacity_image;
     if (color->path && opacity->path && strcmp(color->path, opacity->path) == 0)
         color->content = TEXTURE_OPACITY;
-    look->texture = image_add(draft, material, color);
-    if (look->texture > 0) {
+    look->image.texture = image_add(draft, material, color);
+    if (look->image.texture > 0) {
         look->diffuse = vector_multiply(look->diffuse, look->color);
         look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
     }
-    look->normal_texture = image_add(draft, material, &material->normal_image);
-    if (look->normal_texture > 0) look->normal_strength = material->normal_image.strength;
-    look->cutout_texture = image_add(draft, material, opacity);
-    if (look->cutout_texture == 0) return;
-    look->cutout = CUTOUT_OF_BLENDED;
-    look->cutout_blends = true;
+    look->normal_map.texture = image_add(draft, material, &material->normal_image);
+    if (look->normal_map.texture > 0) look->normal_map.strength = material->normal_image.strength;
+    look->cutout.texture = image_add(draft, material, opacity);
+    if (look->cutout.texture == 0) return;
+    look->cutout.threshold = CUTOUT_OF_BLENDED;
+    look->cutout.blends = true;
 }
 
 static uint32_t material_use(MeshDraft *draft, MtlMaterial *material)

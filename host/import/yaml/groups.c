@@ -29,7 +29,7 @@ static bool pattern_ignores_transform(const Scene *scene, const Object *object, 
 {
     const Material *material = &scene->materials.items[object->material];
     const double(*m)[4] = affine->rows;
-    if (material->checker) return true;
+    if (material->checker.is_on) return true;
     if (material_any_texture(material) == 0 || object->type == SHAPE_MESH) return false;
     const bool turns = m[0][1] != 0 || m[0][2] != 0 || m[1][0] != 0 || m[1][2] != 0 || m[2][0] != 0 ||
                        m[2][1] != 0 || m[0][0] < 0 || m[1][1] < 0 || m[2][2] < 0;

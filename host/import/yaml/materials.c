@@ -7,25 +7,16 @@
 // Bounds the cost of wrong names in a hostile file.
 enum { NAMES_COMPARED = 1000 };
 
-typedef struct {
-    Color colors[2];
-    double size;
-} Checker;
-
 static bool read_checker(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Items two_colors = {2, "two colors", read_color, sizeof(Color)};
     static const Field fields[] = {
-        {"colors", read_items, offsetof(Checker, colors), FORM_ANY, REQUIRED, NULL, &two_colors},
-        {"size", read_number, offsetof(Checker, size), FORM_ANY, OPTIONAL, &range_positive},
+        {"colors", read_items, offsetof(Material, checker.colors), FORM_ANY, REQUIRED, NULL, &two_colors},
+        {"size", read_number, offsetof(Material, checker.size), FORM_ANY, OPTIONAL, &range_positive},
     };
-    Checker checker = {.size = 1};
-    if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &checker)) return false;
     Material *material = target;
-    material->checker = true;
-    memcpy(material->checker_colors, checker.colors, sizeof checker.colors);
-    material->checker_size = checker.size;
-    return true;
+    material->checker.is_on = true;
+    return fields_read(reader, node, field->name, fields, COUNT_OF(fields), material);
 }
 
 typedef struct {
@@ -53,10 +44,6 @@ static bool read_absorption(YamlReader *reader, const Field *field, const YamlNo
     *(Color *)target = color_absorption(absorption.color, absorption.distance);
     return true;
 }
-
-typedef struct {
-    Color n, k;
-} Conductor;
 
 // Reads three numbers, or one for all channels.
 static bool read_channels(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -89,26 +76,19 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
         {"n", read_channels, offsetof(Conductor, n), FORM_ANY, REQUIRED, &range_positive},
         {"k", read_channels, offsetof(Conductor, k), FORM_ANY, REQUIRED, &range_not_negative},
     };
-    Material *material = target;
-    Conductor index = {0};
-    if (node->type == YAML_SCALAR) {
-        const char *names[COUNT_OF(conductors)];
-        for (size_t i = 0; i < COUNT_OF(conductors); i++) {
-            names[i] = conductors[i].name;
-            if (yaml_is(&reader->tree, node, names[i])) index = conductors[i].index;
-        }
-        if (index.n.x == 0) {
-            unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
-            return false;
-        }
-    } else if (node->type == YAML_SEQUENCE) {
+    if (node->type == YAML_SEQUENCE)
         return expected_report(reader, field->name, "the name of a metal or a mapping of n and k", node);
-    } else if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &index)) {
-        return false;
+    if (node->type == YAML_MAPPING)
+        return fields_read(reader, node, field->name, fields, COUNT_OF(fields), target);
+    const char *names[COUNT_OF(conductors)];
+    for (size_t i = 0; i < COUNT_OF(conductors); i++) {
+        names[i] = conductors[i].name;
+        if (!yaml_is(&reader->tree, node, names[i])) continue;
+        *(Conductor *)target = conductors[i].index;
+        return true;
     }
-    material->conductor_n = index.n;
-    material->conductor_k = index.k;
-    return true;
+    unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
+    return false;
 }
 
 // Returns the path of the node's file, which is the scene's for a value of --set.
@@ -236,9 +216,9 @@ static void textures_check(YamlReader *reader, const Material *material, const Y
 {
     const YamlNode *size = field_node(reader, node, "size"),
                    *strength = field_node(reader, node, "normal_strength");
-    if (size != node && material->texture == 0 && material->normal_texture == 0)
+    if (size != node && material->image.texture == 0 && material->normal_map.texture == 0)
         report_error(&reader->report, size->offset, "'size' needs an 'image' or a 'normal_map'");
-    if (strength != node && material->normal_texture == 0)
+    if (strength != node && material->normal_map.texture == 0)
         report_error(&reader->report, strength->offset, "'normal_strength' is that of a 'normal_map'");
 }
 
@@ -247,13 +227,13 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     static const Field fields[] = {
         {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL},
         {"checker", read_checker, 0, FORM_SECOND, OPTIONAL},
-        {"image", read_texture, offsetof(Material, texture), FORM_THIRD, REQUIRED},
+        {"image", read_texture, offsetof(Material, image.texture), FORM_THIRD, REQUIRED},
         {"size", read_number, offsetof(Material, texture_size), FORM_FIRST | FORM_THIRD, OPTIONAL,
          &range_positive},
-        {"cutout", read_number, offsetof(Material, cutout), FORM_THIRD, OPTIONAL, &range_unit},
-        {"normal_map", read_normal_map, offsetof(Material, normal_texture), FORM_FIRST | FORM_THIRD,
+        {"cutout", read_number, offsetof(Material, cutout.threshold), FORM_THIRD, OPTIONAL, &range_unit},
+        {"normal_map", read_normal_map, offsetof(Material, normal_map.texture), FORM_FIRST | FORM_THIRD,
          OPTIONAL},
-        {"normal_strength", read_number, offsetof(Material, normal_strength), FORM_FIRST | FORM_THIRD,
+        {"normal_strength", read_number, offsetof(Material, normal_map.strength), FORM_FIRST | FORM_THIRD,
          OPTIONAL, &range_not_negative},
         {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
         {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL},
@@ -264,7 +244,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
         {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
         {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL},
         {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL},
-        {"conductor", read_conductor, 0, FORM_ANY, OPTIONAL},
+        {"conductor", read_conductor, offsetof(Material, conductor), FORM_ANY, OPTIONAL},
         {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL},
         {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL},
     };
@@ -277,7 +257,7 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     }
     const bool is_read = node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material);
     if (is_read) textures_check(reader, &material, node);
-    if (material.cutout > 0) material.cutout_texture = material.texture;
+    if (material.cutout.threshold > 0) material.cutout.texture = material.image.texture;
     if (conductor != node && (material.fresnel || material.transmission > 0))
         report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
                      material.fresnel ? "fresnel" : "transmission");
