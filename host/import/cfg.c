@@ -19,24 +19,17 @@ typedef struct {
     double radius, angle, specular;
 } BlockValues;
 
-typedef struct {
-    const char *name;
-    size_t offset; // in BlockValues
-    bool is_vector;
-    const Range *range;
-} BlockKey;
-
-static const BlockKey keys[] = {
-    {"position", offsetof(BlockValues, position), true, NULL},
-    {"look_at", offsetof(BlockValues, look_at), true, NULL},
-    {"center", offsetof(BlockValues, center), true, NULL},
-    {"normal", offsetof(BlockValues, normal), true, NULL},
-    {"radius", offsetof(BlockValues, radius), false, &range_positive},
-    {"angle", offsetof(BlockValues, angle), false, &range_radians},
-    {"intensity", offsetof(BlockValues, intensity), true, &range_not_negative},
-    {"color", offsetof(BlockValues, color), true, &range_color},
-    {"diffuse", offsetof(BlockValues, diffuse), true, &range_not_negative},
-    {"specular", offsetof(BlockValues, specular), false, &range_not_negative},
+static const LineField keys[] = {
+    {"position", line_blank_vector, offsetof(BlockValues, position), NULL},
+    {"look_at", line_blank_vector, offsetof(BlockValues, look_at), NULL},
+    {"center", line_blank_vector, offsetof(BlockValues, center), NULL},
+    {"normal", line_blank_vector, offsetof(BlockValues, normal), NULL},
+    {"radius", line_number, offsetof(BlockValues, radius), &range_positive},
+    {"angle", line_number, offsetof(BlockValues, angle), &range_radians},
+    {"intensity", line_blank_vector, offsetof(BlockValues, intensity), &range_not_negative},
+    {"color", line_blank_vector, offsetof(BlockValues, color), &range_color},
+    {"diffuse", line_blank_vector, offsetof(BlockValues, diffuse), &range_not_negative},
+    {"specular", line_number, offsetof(BlockValues, specular), &range_not_negative},
 };
 
 enum { KEY_COUNT = COUNT_OF(keys), BLOCK_KEYS_MAX = 8 };
@@ -124,7 +117,7 @@ static const Block blocks[] = {
     {"cone", BLOCK_OBJECT, {"angle", "center", "normal", OBJECT_KEYS}, cone_finish},
 };
 
-static const BlockKey *key_find(const Block *block, Word word)
+static const LineField *key_find(const Block *block, Word word)
 {
     bool belongs = false;
     for (size_t i = 0; i < BLOCK_KEYS_MAX && block->keys[i]; i++)
@@ -143,16 +136,14 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
         report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
         return true;
     }
-    const BlockKey *key = key_find(block, word);
+    const LineField *key = key_find(block, word);
     if (!key)
         return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
                             WORD_TEXT(word));
     if (seen[key - keys]) return report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
     seen[key - keys] = true;
     size_t offset = line_peek(line).offset;
-    void *target = (char *)values + key->offset;
-    bool read = key->is_vector ? line_blank_vector(line, key->name, key->range, target)
-                               : line_number(line, key->name, key->range, target);
+    const bool read = line_field(line, key, values);
     if (read && !strcmp(key->name, "normal") && vector_is_zero(values->normal))
         return report_error(&reader->report, offset, "'normal' must not be zero");
     if (read && !strcmp(key->name, "color") && vector_largest(values->color) > COLOR_MAX) {

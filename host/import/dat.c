@@ -8,22 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-Word dat_peek(DatReader *reader)
-{
-    line_reach_word(&reader->line);
-    return line_peek(&reader->line);
-}
-
-Word dat_word(DatReader *reader)
-{
-    line_reach_word(&reader->line);
-    return line_word(&reader->line);
-}
-
 bool dat_skip(DatReader *reader, const char *keyword)
 {
-    const bool is_next = word_is_in_any_case(dat_peek(reader), keyword);
-    if (is_next) dat_word(reader);
+    const bool is_next = word_is_in_any_case(free_peek(&reader->line), keyword);
+    if (is_next) free_word(&reader->line);
     return is_next;
 }
 
@@ -37,50 +25,21 @@ void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 
 bool dat_expect(DatReader *reader, const char *keyword)
 {
-    const Word word = dat_peek(reader);
+    const Word word = free_peek(&reader->line);
     if (dat_skip(reader, keyword)) return true;
     if (!word.length) return report_error(&reader->report, word.offset, "'%s' is missing", keyword);
     return report_error(&reader->report, word.offset, "'%s' is missing before '%.*s'", keyword,
                         WORD_TEXT(word));
 }
 
-bool dat_value_in_range(DatReader *reader, const char *name, const Range *range, double *value)
-{
-    line_reach_word(&reader->line);
-    const size_t start = reader->line.at;
-    const bool read = line_number(&reader->line, name, range, value);
-    if (!read) reader->line.at = start;
-    return read;
-}
-
-bool dat_value(DatReader *reader, const char *name, double *value)
-{
-    return dat_value_in_range(reader, name, NULL, value);
-}
-
-bool dat_whole_number(DatReader *reader, const char *name, const Range *range, unsigned *value)
-{
-    line_reach_word(&reader->line);
-    const size_t start = reader->line.at;
-    const bool read = line_whole_number(&reader->line, name, range, value);
-    if (!read) reader->line.at = start;
-    return read;
-}
-
 bool dat_number(DatReader *reader, const char *keyword, double *value)
 {
-    return dat_expect(reader, keyword) && dat_value(reader, keyword, value);
-}
-
-bool dat_components(DatReader *reader, const char *name, Vector3 *vector)
-{
-    return dat_value(reader, name, &vector->x) && dat_value(reader, name, &vector->y) &&
-           dat_value(reader, name, &vector->z);
+    return dat_expect(reader, keyword) && free_number(&reader->line, keyword, NULL, value);
 }
 
 bool dat_coordinates(DatReader *reader, const char *name, Vector3 *vector)
 {
-    if (!dat_components(reader, name, vector)) return false;
+    if (!free_vector(&reader->line, name, NULL, vector)) return false;
     vector->z = -vector->z;
     return true;
 }
@@ -94,22 +53,23 @@ static bool occlusion_read(DatReader *reader)
 {
     Vector3 unused;
     double number;
-    dat_warn(reader, dat_peek(reader).offset, "ambient occlusion is not shown");
-    return dat_expect(reader, "ambient_color") && dat_components(reader, "ambient_color", &unused) &&
+    dat_warn(reader, free_peek(&reader->line).offset, "ambient occlusion is not shown");
+    return dat_expect(reader, "ambient_color") &&
+           free_vector(&reader->line, "ambient_color", NULL, &unused) &&
            dat_number(reader, "rescale_direct", &number) && dat_number(reader, "samples", &number);
 }
 
 static bool shader_mode_read(DatReader *reader)
 {
     double unused;
-    const Word quality = dat_word(reader);
+    const Word quality = free_word(&reader->line);
     if (!word_is_in_any_case(quality, "full"))
         dat_warn(reader, quality.offset,
                  "shader mode '%.*s' leaves something out, such as shadows: shown in full",
                  WORD_TEXT(quality));
     while (!dat_skip(reader, "end_shader_mode")) {
         const Line before = reader->line;
-        const Word word = dat_word(reader);
+        const Word word = free_word(&reader->line);
         bool read = true;
         if (word_is_in_any_case(word, "trans_vmd"))
             reader->dims_clear = true;
@@ -122,7 +82,7 @@ static bool shader_mode_read(DatReader *reader)
             dat_warn(reader, word.offset,
                      "'shadow_filter_off' is not used: transparent objects cast shadows");
         else if (word_is_in_any_case(word, "trans_max_surfaces"))
-            read = dat_value(reader, "trans_max_surfaces", &unused);
+            read = free_number(&reader->line, "trans_max_surfaces", NULL, &unused);
         else if (word_is_in_any_case(word, "ambient_occlusion"))
             read = occlusion_read(reader);
         else if (!word_is_in_any_case(word, "fog_vmd") && !word_is_in_any_case(word, "shadow_filter_on")) {
@@ -201,15 +161,15 @@ static size_t statement_find(Word word)
 // Skips the rest of a statement, up to the next one.
 static void statement_skip(DatReader *reader)
 {
-    for (Word word = dat_peek(reader); word.length; word = dat_peek(reader)) {
+    for (Word word = free_peek(&reader->line); word.length; word = free_peek(&reader->line)) {
         if (statement_find(word) < STATEMENT_COUNT) return;
-        dat_word(reader);
+        free_word(&reader->line);
     }
 }
 
 static void statement_read(DatReader *reader)
 {
-    const Word word = dat_word(reader);
+    const Word word = free_word(&reader->line);
     const size_t index = statement_find(word);
     if (index == STATEMENT_COUNT) {
         report_error(&reader->report, word.offset, "unknown statement '%.*s'", WORD_TEXT(word));
@@ -218,7 +178,7 @@ static void statement_read(DatReader *reader)
     } else {
         dat_warn(reader, word.offset, "'%s' is not shown", statements[index].keyword);
         for (int i = 0; i < statements[index].hidden_words; i++)
-            dat_word(reader);
+            free_word(&reader->line);
     }
     statement_skip(reader);
 }
@@ -229,10 +189,10 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report, '#')) {
         Places places = places_open(source, NULL);
-        if (!word_is_in_any_case(dat_peek(&reader), "begin_scene"))
-            report_error(&reader.report, dat_peek(&reader).offset, "a scene starts with 'begin_scene'");
-        while (!report_is_full(&reader.report) && !reader.is_at_end && dat_peek(&reader).length) {
-            const size_t offset = dat_peek(&reader).offset;
+        if (!word_is_in_any_case(free_peek(&reader.line), "begin_scene"))
+            report_error(&reader.report, free_peek(&reader.line).offset, "a scene starts with 'begin_scene'");
+        while (!report_is_full(&reader.report) && !reader.is_at_end && free_peek(&reader.line).length) {
+            const size_t offset = free_peek(&reader.line).offset;
             statement_read(&reader);
             places_record(&places, scene, offset);
         }

@@ -22,10 +22,6 @@ typedef struct {
     size_t slot_count;
 } DatReader;
 
-// Return the next word, on this or a later line. dat_peek leaves it unread and dat_word moves past it. The
-// word is empty at the end of the source.
-Word dat_peek(DatReader *reader);
-Word dat_word(DatReader *reader);
 // Skips the next word if it is the keyword, and returns whether it is.
 bool dat_skip(DatReader *reader, const char *keyword);
 // Adds a warning once, however often the source repeats its cause.
@@ -38,15 +34,8 @@ bool dat_expect(DatReader *reader, const char *keyword);
 bool dat_number(DatReader *reader, const char *keyword, double *value);
 // Reads a vector. Tachyon's coordinates are left-handed: z is negated.
 bool dat_vector(DatReader *reader, const char *keyword, Vector3 *vector);
-// Each of these reads a value without a keyword; `name` is for errors. A word that is not a number stays
-// unread, since it may start the next statement.
-bool dat_value(DatReader *reader, const char *name, double *value);
-bool dat_value_in_range(DatReader *reader, const char *name, const Range *range, double *value);
-bool dat_whole_number(DatReader *reader, const char *name, const Range *range, unsigned *value);
-// dat_coordinates reads a vector and negates its z. dat_components reads three numbers of a vector or a
-// color unchanged.
+// Reads a vector without a keyword; `name` is for errors.
 bool dat_coordinates(DatReader *reader, const char *name, Vector3 *vector);
-bool dat_components(DatReader *reader, const char *name, Vector3 *vector);
 
 // dat_texture.c
 

@@ -64,6 +64,18 @@ Word line_peek(const Line *line)
     return line_word(&copy);
 }
 
+Word free_peek(Line *line)
+{
+    line_reach_word(line);
+    return line_peek(line);
+}
+
+Word free_word(Line *line)
+{
+    line_reach_word(line);
+    return line_word(line);
+}
+
 bool words_equal(Word a, Word b)
 {
     return a.length == b.length && memcmp(a.text, b.text, a.length) == 0;
@@ -86,27 +98,33 @@ bool word_is_number(Word word)
 }
 
 // Returns the next word, or reports an error if there is none.
-static bool line_field(Line *line, const char *name, Word *word)
+static bool line_value(Line *line, const char *name, Word *word)
 {
     *word = line_word(line);
     if (!word->length) report_error(line->report, word->offset, "'%s' is missing", name);
     return word->length > 0;
 }
 
-bool line_number(Line *line, const char *name, const Range *range, double *value)
+bool line_field(Line *line, const LineField *field, void *values)
 {
-    Word word;
-    return line_field(line, name, &word) && number_read_field(line->report, word, name, range, value);
+    return field->read(line, field->name, field->range, (char *)values + field->offset);
 }
 
-bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value)
+bool line_number(Line *line, const char *name, const Range *range, void *value)
+{
+    Word word;
+    return line_value(line, name, &word) && number_read_field(line->report, word, name, range, value);
+}
+
+bool line_whole_number(Line *line, const char *name, const Range *range, void *value)
 {
     double number;
     size_t offset = line_peek(line).offset;
     if (!line_number(line, name, range, &number)) return false;
-    *value = (unsigned)number;
-    if (*value != number) report_error(line->report, offset, "'%s' must be a whole number", name);
-    return *value == number;
+    if (number != floor(number))
+        return report_error(line->report, offset, "'%s' must be a whole number", name);
+    *(unsigned *)value = (unsigned)number;
+    return true;
 }
 
 static size_t comma_count(Word word)
@@ -141,10 +159,10 @@ Word line_peek_vector(const Line *line)
     return word;
 }
 
-bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value)
+bool line_comma_vector(Line *line, const char *name, const Range *range, void *value)
 {
     Word word;
-    if (!line_field(line, name, &word)) return false;
+    if (!line_value(line, name, &word)) return false;
     const bool has_blanks = word_continues(line, word);
     word_extend(line, &word);
     if (has_blanks && !line->joins_blanks && comma_count(word) == 2)
@@ -167,11 +185,11 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3
             part.length--;
         if (!number_read_field(line->report, part, name, range, &values[i])) return false;
     }
-    *value = (Vector3){values[0], values[1], values[2]};
+    *(Vector3 *)value = (Vector3){values[0], values[1], values[2]};
     return true;
 }
 
-bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value)
+bool line_blank_vector(Line *line, const char *name, const Range *range, void *value)
 {
     double values[3];
     for (size_t i = 0; i < 3; i++) {
@@ -179,8 +197,34 @@ bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3
             return report_error(line->report, line->at, "'%s' must be three numbers, not %zu", name, i);
         if (!line_number(line, name, range, &values[i])) return false;
     }
-    *value = (Vector3){values[0], values[1], values[2]};
+    *(Vector3 *)value = (Vector3){values[0], values[1], values[2]};
     return true;
+}
+
+static bool free_read(Line *line, LineReader *read, const char *name, const Range *range, void *value)
+{
+    line_reach_word(line);
+    const size_t start = line->at;
+    const bool is_read = read(line, name, range, value);
+    if (!is_read) line->at = start;
+    return is_read;
+}
+
+bool free_number(Line *line, const char *name, const Range *range, void *value)
+{
+    return free_read(line, line_number, name, range, value);
+}
+
+bool free_whole_number(Line *line, const char *name, const Range *range, void *value)
+{
+    return free_read(line, line_whole_number, name, range, value);
+}
+
+bool free_vector(Line *line, const char *name, const Range *range, void *value)
+{
+    Vector3 *vector = value;
+    return free_number(line, name, range, &vector->x) && free_number(line, name, range, &vector->y) &&
+           free_number(line, name, range, &vector->z);
 }
 
 bool line_end(Line *line)

@@ -26,20 +26,36 @@ bool line_reach_word(Line *line);
 // returns.
 Word line_peek(const Line *line);
 Word line_peek_vector(const Line *line); // as line_comma_vector reads it
+// Return the next word of this or a later line, empty at the end of the source. free_peek leaves it unread.
+Word free_peek(Line *line);
+Word free_word(Line *line);
 Word line_word(Line *line);
 bool word_is(Word word, const char *text);
 bool word_is_in_any_case(Word word, const char *text);
 bool words_equal(Word a, Word b);
 bool word_is_number(Word word); // accepts numbers that are out of range
 
-// Reads the next word as a number. Reports an error and returns false if it is missing or invalid.
-bool line_number(Line *line, const char *name, const Range *range, double *value);
-// Reads the next word as an integer, whose range lies within that of unsigned. Reports an error and returns
-// false if it is missing or invalid.
-bool line_whole_number(Line *line, const char *name, const Range *range, unsigned *value);
-// Reads three numbers from one word with commas or from three words.
-bool line_comma_vector(Line *line, const char *name, const Range *range, Vector3 *value);
-bool line_blank_vector(Line *line, const char *name, const Range *range, Vector3 *value);
+// Reads a value that messages call `name`, whose numbers lie in the range; NULL allows any. Reports an error
+// and returns false if it is missing or invalid.
+typedef bool LineReader(Line *line, const char *name, const Range *range, void *value);
+
+// A value and the member of a struct that holds it.
+typedef struct {
+    const char *name;
+    LineReader *read;
+    size_t offset; // of the member
+    const Range *range;
+} LineField;
+
+// Reads the field's value into its member of `values`. Reports an error and returns false if it is invalid.
+bool line_field(Line *line, const LineField *field, void *values);
+
+// Read a double from a word, an unsigned from a word, whose range lies within that of unsigned, and a Vector3
+// from one word with commas or from three words.
+LineReader line_number, line_whole_number, line_comma_vector, line_blank_vector;
+// Read a double, an unsigned and a Vector3 from the next words of this line or later ones. A word that is
+// invalid stays unread.
+LineReader free_number, free_whole_number, free_vector;
 // Reports an error and returns false if anything is left on the line.
 bool line_end(Line *line);
 // Sets *has_one, which tells whether the source had a `what`. Reports an error at the line and returns false

@@ -22,88 +22,75 @@ typedef struct {
 
 static const Range range_corner_count = {3, 16384, false, "from 3 to 16384"};
 
-static bool read_number(NffReader *reader, const char *name, const Range *range, double *value)
-{
-    line_reach_word(&reader->line);
-    return line_number(&reader->line, name, range, value);
-}
-
-static bool read_vector(NffReader *reader, const char *name, const Range *range, Vector3 *value)
-{
-    return read_number(reader, name, range, &value->x) && read_number(reader, name, range, &value->y) &&
-           read_number(reader, name, range, &value->z);
-}
-
 static bool read_color(NffReader *reader, Color *color)
 {
-    return read_vector(reader, "color", &range_not_negative, color);
+    return free_vector(&reader->line, "color", &range_not_negative, color);
 }
 
-static bool read_whole_number(NffReader *reader, const char *name, const Range *range, unsigned *value)
+static bool read_size(Line *line, const char *name, const Range *range, void *value)
 {
-    line_reach_word(&reader->line);
-    return line_whole_number(&reader->line, name, range, value);
+    unsigned *size = value;
+    (void)name;
+    return free_whole_number(line, "width", range, &size[0]) &&
+           free_whole_number(line, "height", range, &size[1]);
 }
 
-// The keys of a view, of which those before VIEW_REQUIRED are required.
-enum { VIEW_FROM, VIEW_AT, VIEW_UP, VIEW_ANGLE, VIEW_HITHER, VIEW_RESOLUTION, VIEW_KEYS };
-enum { VIEW_REQUIRED = VIEW_HITHER };
-static const char *const view_keys[VIEW_KEYS] = {"from", "at", "up", "angle", "hither", "resolution"};
+typedef struct {
+    Vector3 from, at, up;
+    double angle, hither; // glint has no near clipping plane
+    unsigned size[2];
+} View;
 
-// Reads the value of a key. Skips `hither`, because glint has no near clipping plane.
-static bool read_view_key(NffReader *reader, size_t key)
-{
-    Camera *camera = &reader->scene->camera;
-    Vector3 *const vectors[] = {&camera->position, &camera->look_at, &camera->up};
-    double number;
-    if (key < COUNT_OF(vectors)) return read_vector(reader, view_keys[key], NULL, vectors[key]);
-    if (key == VIEW_RESOLUTION)
-        return read_whole_number(reader, "width", &range_pixels, &reader->scene->width) &&
-               read_whole_number(reader, "height", &range_pixels, &reader->scene->height);
-    if (key == VIEW_HITHER) return read_number(reader, view_keys[key], NULL, &number);
-    if (!read_number(reader, view_keys[key], &range_field_of_view, &number)) return false;
-    camera->half_tangent = portable_tangent(number * (M_PI / 360));
-    return true;
-}
+// The first four are required.
+static const LineField view_keys[] = {
+    {"from", free_vector, offsetof(View, from), NULL},
+    {"at", free_vector, offsetof(View, at), NULL},
+    {"up", free_vector, offsetof(View, up), NULL},
+    {"angle", free_number, offsetof(View, angle), &range_field_of_view},
+    {"hither", free_number, offsetof(View, hither), NULL},
+    {"resolution", read_size, offsetof(View, size), &range_pixels},
+};
+enum { VIEW_REQUIRED = 4, VIEW_KEYS = COUNT_OF(view_keys) };
 
 static size_t view_key_index(Word word)
 {
     size_t index = 0;
-    while (index < VIEW_KEYS && !word_is(word, view_keys[index]))
+    while (index < VIEW_KEYS && !word_is(word, view_keys[index].name))
         index++;
     return index;
 }
 
-static bool view_is_complete(NffReader *reader, size_t offset, const bool *seen)
-{
-    for (size_t i = 0; i < VIEW_REQUIRED; i++) {
-        if (seen[i]) continue;
-        return report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i]);
-    }
-    const Camera *camera = &reader->scene->camera;
-    bool looks = !vector_is_zero(vector_subtract(camera->look_at, camera->position));
-    if (!looks) report_error(&reader->report, offset, "'from' and 'at' must differ");
-    return looks;
-}
-
 static bool read_view(NffReader *reader)
 {
-    size_t offset = reader->line.start;
+    const size_t offset = reader->line.start;
     if (!line_is_first(&reader->line, &reader->has_view, "view")) return false;
     if (reader->scene->objects.count)
         return report_error(&reader->report, offset, "the view must stand before the objects");
-    reader->scene->camera.field_axis = FIELD_VERTICAL;
+    View view = {0};
     bool seen[VIEW_KEYS] = {false};
     while (line_reach_word(&reader->line)) {
-        Word word = line_peek(&reader->line);
-        size_t index = view_key_index(word);
+        const Word word = line_peek(&reader->line);
+        const size_t index = view_key_index(word);
         if (index == VIEW_KEYS) break;
-        if (seen[index]) return report_error(&reader->report, word.offset, "a second '%s'", view_keys[index]);
+        const LineField *key = &view_keys[index];
+        if (seen[index]) return report_error(&reader->report, word.offset, "a second '%s'", key->name);
         seen[index] = true;
         line_word(&reader->line);
-        if (!read_view_key(reader, index) || !line_end(&reader->line)) return false;
+        if (!line_field(&reader->line, key, &view) || !line_end(&reader->line)) return false;
     }
-    return view_is_complete(reader, offset, seen);
+    for (size_t i = 0; i < VIEW_REQUIRED; i++)
+        if (!seen[i]) return report_error(&reader->report, offset, "the view lacks '%s'", view_keys[i].name);
+    if (vectors_equal(view.from, view.at))
+        return report_error(&reader->report, offset, "'from' and 'at' must differ");
+    Scene *scene = reader->scene;
+    scene->camera = (Camera){.position = view.from,
+                             .look_at = view.at,
+                             .up = view.up,
+                             .field_axis = FIELD_VERTICAL,
+                             .half_tangent = portable_tangent(view.angle * (M_PI / 360))};
+    scene->width = view.size[0];
+    scene->height = view.size[1];
+    return true;
 }
 
 static bool read_background(NffReader *reader)
@@ -115,7 +102,7 @@ static bool read_background(NffReader *reader)
 static bool read_light(NffReader *reader)
 {
     Light light = {.type = LIGHT_POINT};
-    if (!read_vector(reader, "position", NULL, &light.position)) return false;
+    if (!free_vector(&reader->line, "position", NULL, &light.position)) return false;
     if (!line_peek(&reader->line).length)
         array_push(reader->white_lights, reader->scene->lights.count);
     else if (!read_color(reader, &light.color))
@@ -127,19 +114,19 @@ static bool read_light(NffReader *reader)
 static bool read_material(NffReader *reader)
 {
     Material material = material_default();
-    double diffuse;
+    Line *line = &reader->line;
+    double ior;
     reader->has_material = true;
-    if (!read_color(reader, &material.color) || !read_number(reader, "Kd", &range_not_negative, &diffuse) ||
-        !read_number(reader, "Ks", &range_unit, &material.specular) ||
-        !read_number(reader, "Shine", &range_not_negative, &material.shininess) ||
-        !read_number(reader, "T", &range_unit, &material.transmission))
+    if (!read_color(reader, &material.color) ||
+        !free_number(line, "Kd", &range_not_negative, &material.ambient) ||
+        !free_number(line, "Ks", &range_unit, &material.specular) ||
+        !free_number(line, "Shine", &range_not_negative, &material.shininess) ||
+        !free_number(line, "T", &range_unit, &material.transmission))
         return false;
     const Range *range = material.transmission > 0 ? &range_positive : &range_not_negative;
-    double ior;
-    if (!read_number(reader, "index of refraction", range, &ior) || !line_end(&reader->line)) return false;
+    if (!free_number(line, "index of refraction", range, &ior) || !line_end(line)) return false;
     if (ior > 0) material.ior = ior;
-    material.ambient = diffuse;
-    material.diffuse = (Color){diffuse, diffuse, diffuse};
+    material.diffuse = vector_all(material.ambient);
     material.reflection = material.specular;
     material.shadow = SHADOW_FULL;
     reader->material = scene_add_material(reader->scene, &material, "");
@@ -162,10 +149,9 @@ static bool read_sphere(NffReader *reader)
 {
     Object object = {.type = SHAPE_SPHERE};
     double radius;
-    if (!read_vector(reader, "center", NULL, &object.as.sphere.center)) return false;
-    line_reach_word(&reader->line);
-    size_t offset = line_peek(&reader->line).offset;
-    if (!read_number(reader, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
+    if (!free_vector(&reader->line, "center", NULL, &object.as.sphere.center)) return false;
+    const size_t offset = free_peek(&reader->line).offset;
+    if (!free_number(&reader->line, "radius", NULL, &radius) || !line_end(&reader->line)) return false;
     if (radius == 0) return report_error(&reader->report, offset, "'radius' must not be 0");
     object.as.sphere.radius = fabs(radius);
     object.as.sphere.only_inside = radius < 0;
@@ -179,9 +165,10 @@ static bool read_cone(NffReader *reader)
     Vector3 base, apex;
     double base_radius, apex_radius;
     size_t offset = reader->line.start;
-    if (!read_vector(reader, "base", NULL, &base) || !read_number(reader, "radius", NULL, &base_radius) ||
-        !read_vector(reader, "apex", NULL, &apex) || !read_number(reader, "radius", NULL, &apex_radius) ||
-        !line_end(&reader->line))
+    if (!free_vector(&reader->line, "base", NULL, &base) ||
+        !free_number(&reader->line, "radius", NULL, &base_radius) ||
+        !free_vector(&reader->line, "apex", NULL, &apex) ||
+        !free_number(&reader->line, "radius", NULL, &apex_radius) || !line_end(&reader->line))
         return false;
     Vector3 axis = vector_subtract(apex, base);
     const char *fault = NULL;
@@ -213,15 +200,14 @@ static bool read_cone(NffReader *reader)
 static bool read_corners(NffReader *reader, bool smooth)
 {
     unsigned count;
-    if (!read_whole_number(reader, "vertex count", &range_corner_count, &count)) return false;
+    if (!free_whole_number(&reader->line, "vertex count", &range_corner_count, &count)) return false;
     reader->corners.count = reader->normals.count = 0;
     for (unsigned i = 0; i < count; i++) {
         Vector3 corner, normal = {0, 0, 0};
-        if (!read_vector(reader, "vertex", NULL, &corner)) return false;
+        if (!free_vector(&reader->line, "vertex", NULL, &corner)) return false;
         if (smooth) {
-            line_reach_word(&reader->line);
-            size_t offset = line_peek(&reader->line).offset;
-            if (!read_vector(reader, "normal", NULL, &normal)) return false;
+            const size_t offset = free_peek(&reader->line).offset;
+            if (!free_vector(&reader->line, "normal", NULL, &normal)) return false;
             if (vector_is_zero(normal))
                 return report_error(&reader->report, offset, "'normal' must not be zero");
         }
