@@ -48,12 +48,14 @@ bool numbers_fit(const CompiledScene *compiled, const Scene *scene, const Compil
 // adds one empty node.
 void bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
 
-// Builds the BVH of a shared mesh alone, whatever the settings choose. bvh_shift adds to the indices of its
-// nodes and of its leaves, which are those of blocks, or of triangles if it has no blocks.
+// Builds the BVH of a shared mesh alone, whatever the settings choose.
 void mesh_bvh_flatten(CompiledScene *compiled, const CompileSettings *settings);
+
+// bvh_nodes.c: Adds to the indices of the nodes and of the leaves, which are those of blocks, or of triangles
+// if there are no blocks.
 void bvh_shift(CompiledScene *compiled, uint32_t node_base, uint32_t leaf_base);
 
-// Fits the boxes of the same tree to the primitives as they are now.
+// bvh_nodes.c: Fits the boxes of the same tree to the primitives as they are now.
 void bvh_refit(CompiledScene *compiled);
 
 // culling.c: Fills FLAT_CULL_SPHERES for the BVH and each primitive outside it, or for none if there would
