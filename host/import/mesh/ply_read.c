@@ -156,7 +156,7 @@ static bool real_read(const char **text, const char *end, double *value)
     return false;
 }
 
-// Reads the line's next word as a number of the type; Sets *is_there to whether the line has one.
+// Reads the line's next word as a number of the type. Sets *is_there to whether the line has one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
     ply_blanks_skip(&reader->line);
@@ -195,17 +195,22 @@ static double binary_number(const PlyReader *reader, const PlyType *type)
     return type->size == sizeof single ? single : number;
 }
 
+// Reads the next number of the line or the file. Sets *is_there to whether it has one.
+static bool value_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
+{
+    if (!is_binary(reader)) return word_read(reader, type, value, is_there);
+    *is_there = bytes_left(reader) >= type->size;
+    if (!*is_there) return true;
+    *value = binary_number(reader, type);
+    reader->reading.left.at += type->size;
+    return true;
+}
+
 // Reads the row's next number, which must exist.
 static bool number_next(PlyReader *reader, const PlyProperty *property, const PlyType *type, double *value)
 {
-    if (is_binary(reader)) {
-        if (bytes_left(reader) < type->size) return value_missing(reader, property);
-        *value = binary_number(reader, type);
-        reader->reading.left.at += type->size;
-        return true;
-    }
     bool is_there;
-    return word_read(reader, type, value, &is_there) && (is_there || value_missing(reader, property));
+    return value_read(reader, type, value, &is_there) && (is_there || value_missing(reader, property));
 }
 
 static bool list_fails(PlyReader *reader, const PlyProperty *property, size_t offset, double promised,
@@ -232,19 +237,13 @@ static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *n
     if (is_binary(reader)) {
         const size_t most = bytes_left(reader) / property->type->size;
         if (!is_count(count) || count > (double)most) return list_fails(reader, property, start, count, most);
-        if (!numbers) {
-            reader->reading.left.at += (size_t)count * property->type->size;
-            return true;
-        }
     } else if (!is_count(count)) {
         return draft_fails(reader->reading.draft, start, "%.15g is not the length of a list", count);
     }
     for (size_t i = 0; (double)i < count; i++) {
         double value;
-        bool is_there = true;
-        if (is_binary(reader) ? !number_next(reader, property, property->type, &value)
-                              : !word_read(reader, property->type, &value, &is_there))
-            return false;
+        bool is_there;
+        if (!value_read(reader, property->type, &value, &is_there)) return false;
         if (!is_there) return list_fails(reader, property, start, count, i);
         if (numbers) array_push(*numbers, value);
     }

@@ -4,11 +4,10 @@
 
 bool scan_is_text(Scan *scan, Report *report)
 {
-    const size_t length = (size_t)(scan->end - scan->start);
-    const char *nul = length > 0 ? memchr(scan->start, '\0', length) : NULL;
-    if (nul) report_error(report, (size_t)(nul - scan->start), "not text: a NUL character");
-    if (length >= 3 && memcmp(scan->start, "\xEF\xBB\xBF", 3) == 0) scan->at += 3;
-    return !nul;
+    Line line;
+    const bool is_text = line_open(&line, report, '\0');
+    scan->at += line.next;
+    return is_text;
 }
 
 void unused_record(UnusedWords *unused, Report *report, Word word, const char *what)
