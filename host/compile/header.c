@@ -25,6 +25,24 @@ static double first_rival(const CompiledScene *compiled, const CompileSettings *
     return settings->certifies && !bounds_hold(compiled, settings) ? -largest : largest;
 }
 
+static void sky_set(SceneHeader *header, const CompiledScene *compiled, const Scene *scene)
+{
+    const bool has_sky = !vector_is_zero(scene->sky.up);
+    const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
+                below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
+    const Vector3 up = vector_normalize(scene->sky.up), forward = vector_normalize(scene->sky.forward);
+    header->sky_up =
+        scalar4_of(has_sky ? up : scene->sky.up, fmax(vector_largest(above), vector_largest(below)));
+    header->sky_above = scalar4_of(above, 0);
+    header->sky_below = scalar4_of(below, 0);
+    header->sky_forward = scalar4_of(forward, scene->sky.intensity);
+    header->sky_right = scalar4_of(vector_cross(forward, up), 0);
+    if (scene->sky.texture == 0) return;
+    const CompiledTexture *texture = &compiled->textures[scene->sky.texture - 1];
+    header->sky_texture =
+        (uint4){1 + texture->first_level, texture->level_count, WRAP_REPEATED, WRAP_CLAMPED};
+}
+
 void header_write(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const CameraBasis basis = camera_basis(&scene->camera, settings->width, settings->height);
@@ -37,21 +55,11 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
     double half_pixel_squared = vector_dot(basis.right, basis.right);
     if (is_equirectangular) half_pixel_squared = fmax(half_pixel_squared, vector_dot(basis.up, basis.up));
     const double sample_width = 2 * sqrt(half_pixel_squared / settings->sample_count);
-    const bool has_sky = !vector_is_zero(scene->sky.up);
-    const Color above = has_sky ? vector_subtract(scene->sky.zenith, scene->background) : vector_all(0),
-                below = has_sky ? vector_subtract(scene->sky.nadir, scene->background) : vector_all(0);
-    const Vector3 forward = vector_normalize(scene->sky.forward);
     const Vector3 eye =
         is_orthographic ? vector_add(compiled->eye_offset, basis.shift) : compiled->eye_offset;
     SceneHeader header = {
         .background = scalar4_of(scene->background, 0),
         .ambient = scalar4_of(scene->ambient, 0),
-        .sky_up = scalar4_of(has_sky ? vector_normalize(scene->sky.up) : scene->sky.up,
-                             fmax(vector_largest(above), vector_largest(below))),
-        .sky_above = scalar4_of(above, 0),
-        .sky_below = scalar4_of(below, 0),
-        .sky_forward = scalar4_of(forward, scene->sky.intensity),
-        .sky_right = scalar4_of(vector_cross(forward, vector_normalize(scene->sky.up)), 0),
         .eye = scalar4_of(eye, 0),
         .forward = scalar4_of(basis.middle, camera_direction_error(&basis)),
         .right = scalar4_of(right, is_equirectangular ? 0.5 / settings->width : 0),
@@ -73,11 +81,7 @@ void header_write(CompiledScene *compiled, const Scene *scene, const CompileSett
         .bounces.x = settings->bounce_count,
         .cull_spheres.x = compiled->cull_sphere_count,
     };
-    if (scene->sky.texture > 0) {
-        const CompiledTexture *texture = &compiled->textures[scene->sky.texture - 1];
-        header.sky_texture =
-            (uint4){1 + texture->first_level, texture->level_count, WRAP_REPEATED, WRAP_CLAMPED};
-    }
+    sky_set(&header, compiled, scene);
     uint32_t counts[TYPE_COUNT];
     for (size_t type = 0; type < TYPE_COUNT; type++)
         counts[type] = (uint32_t)compiled->arrays[FLAT_FIRST_SHAPE + type].count;

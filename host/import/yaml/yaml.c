@@ -34,20 +34,48 @@ static bool read_focus(YamlReader *reader, const Field *field, const YamlNode *n
     return read_number(reader, &distance, node, &read->camera.lens.distance);
 }
 
+// The forms of a camera, by the key that sets its frame.
+enum {
+    FORM_FOV = FORM_FIRST,
+    FORM_FOCAL_LENGTH = FORM_SECOND,
+    FORM_HEIGHT = FORM_THIRD,
+    FORM_PROJECTION = FORM_FOURTH
+};
+
+static void frame_set(CameraFields *read, Form form)
+{
+    Camera *camera = &read->camera;
+    if (form == FORM_HEIGHT) {
+        camera->projection = PROJECTION_ORTHOGRAPHIC;
+        camera->half_tangent = read->height / 2;
+    } else if (form == FORM_PROJECTION) {
+        camera->field_axis = FIELD_HORIZONTAL;
+        camera->half_tangent = M_PI;
+        camera->frame_aspect = 2;
+    } else if (form == FORM_FOV) {
+        camera->field_axis = FIELD_VERTICAL;
+        camera->half_tangent = portable_tangent(read->fov_degrees * (M_PI / 360));
+    } else {
+        camera->field_axis = FIELD_HORIZONTAL;
+        camera->half_tangent = read->frame[0] / 2 / read->focal_length;
+        camera->frame_aspect = read->frame[0] / read->frame[1];
+    }
+}
+
 void yaml_read_camera(YamlReader *reader, const YamlNode *node)
 {
-    enum { FORM_FLAT = FORM_FIRST | FORM_SECOND | FORM_THIRD }; // the image is part of a plane
+    enum { FORM_FLAT = FORM_FOV | FORM_FOCAL_LENGTH | FORM_HEIGHT }; // the image is part of a plane
     static const Field fields[] = {
         {"position", read_vector, offsetof(CameraFields, camera.position), FORM_ANY, REQUIRED},
         {"look_at", read_vector, offsetof(CameraFields, camera.look_at), FORM_ANY, REQUIRED},
         {"up", read_direction, offsetof(CameraFields, camera.up), FORM_ANY, OPTIONAL},
-        {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FIRST, OPTIONAL, &range_field_of_view},
-        {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_SECOND, REQUIRED,
+        {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FOV, OPTIONAL, &range_field_of_view},
+        {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_FOCAL_LENGTH, REQUIRED,
          &range_positive},
-        {"frame", read_items, offsetof(CameraFields, frame), FORM_SECOND, REQUIRED, &range_positive,
+        {"frame", read_items, offsetof(CameraFields, frame), FORM_FOCAL_LENGTH, REQUIRED, &range_positive,
          &two_numbers},
-        {"height", read_number, offsetof(CameraFields, height), FORM_THIRD, REQUIRED, &range_positive},
-        {"projection", read_projection, offsetof(CameraFields, camera.projection), FORM_FOURTH, REQUIRED},
+        {"height", read_number, offsetof(CameraFields, height), FORM_HEIGHT, REQUIRED, &range_positive},
+        {"projection", read_projection, offsetof(CameraFields, camera.projection), FORM_PROJECTION, REQUIRED},
         {"shift", read_items, offsetof(CameraFields, camera.shift), FORM_FLAT, OPTIONAL, NULL, &two_numbers},
         {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL},
         {"aperture", read_number, offsetof(CameraFields, aperture), FORM_FLAT, OPTIONAL, &range_not_negative},
@@ -56,6 +84,7 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
     CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
     const Form form = fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read);
     if (!form) return;
+    frame_set(&read, form);
     Camera *camera = &reader->scene->camera;
     *camera = read.camera;
     if (vector_is_zero(vector_subtract(camera->look_at, camera->position))) {
@@ -74,21 +103,6 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
         report_warning(&reader->report, focus->offset, "'focus' has no effect without an 'aperture'");
     else if (camera->lens.radius > 0 && camera_focal_distance(camera) == 0)
         report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
-    if (form == FORM_THIRD) {
-        camera->projection = PROJECTION_ORTHOGRAPHIC;
-        camera->half_tangent = read.height / 2;
-    } else if (form == FORM_FOURTH) {
-        camera->field_axis = FIELD_HORIZONTAL;
-        camera->half_tangent = M_PI;
-        camera->frame_aspect = 2;
-    } else if (form == FORM_FIRST) {
-        camera->field_axis = FIELD_VERTICAL;
-        camera->half_tangent = portable_tangent(read.fov_degrees * (M_PI / 360));
-    } else {
-        camera->field_axis = FIELD_HORIZONTAL;
-        camera->half_tangent = read.frame[0] / 2 / read.focal_length;
-        camera->frame_aspect = read.frame[0] / read.frame[1];
-    }
 }
 
 // Rejects an `include` that --set adds, because files are included before values are set.
