@@ -1,10 +1,12 @@
 #include "host/scene/oval.h"
 
 #include <math.h>
+#include <string.h>
 
-// Sets axes of the given lengths, the last along `along`.
-static void axes_set(Object *oval, Vector3 along, double across, double length)
+// Sets the center, and axes of the given lengths, the last along `along`.
+static void axes_set(Object *oval, Vector3 center, Vector3 along, double across, double length)
 {
+    oval->as.oval.center = center;
     const Vector3 w = vector_normalize(along);
     const Vector3 u = vector_normalize(vector_cross(w, vector_least_aligned_axis(w)));
     oval->as.oval.axes[0] = vector_scale(u, across);
@@ -16,20 +18,17 @@ static void axes_set(Object *oval, Vector3 along, double across, double length)
 static void ends_set(Object *oval, Vector3 from, Vector3 axis, double widest)
 {
     const Vector3 half = vector_scale(axis, 0.5);
-    oval->as.oval.center = vector_add(from, half);
     oval->as.oval.finite = true;
     oval->as.oval.half_height = 1;
-    axes_set(oval, axis, widest, vector_length(half));
+    axes_set(oval, vector_add(from, half), axis, widest, vector_length(half));
 }
 
 void oval_make(Object *object)
 {
     const Object from = *object;
     object->type = SHAPE_OVAL;
+    memset(&object->as, 0, sizeof object->as);
     object->as.oval.unit = from.type;
-    object->as.oval.finite = object->as.oval.caps = false;
-    object->as.oval.half_height = object->as.oval.rise = 0;
-    object->as.oval.radii[0] = object->as.oval.radii[1] = 0;
     switch (from.type) {
     case SHAPE_SPHERE:
         object->as.oval.center = from.as.sphere.center;
@@ -37,22 +36,20 @@ void oval_make(Object *object)
             object->as.oval.axes[i] = vector_scale((Vector3){i == 0, i == 1, i == 2}, from.as.sphere.radius);
         return;
     case SHAPE_DISC:
-        object->as.oval.center = from.as.disc.center;
-        axes_set(object, from.as.disc.normal, from.as.disc.radius, from.as.disc.radius);
+        axes_set(object, from.as.disc.center, from.as.disc.normal, from.as.disc.radius, from.as.disc.radius);
         return;
     case SHAPE_CYLINDER:
         object->as.oval.caps = from.as.cylinder.caps;
-        object->as.oval.center = from.as.cylinder.from;
-        axes_set(object, from.as.cylinder.axis, from.as.cylinder.radius, from.as.cylinder.radius);
+        axes_set(object, from.as.cylinder.from, from.as.cylinder.axis, from.as.cylinder.radius,
+                 from.as.cylinder.radius);
         if (from.as.cylinder.finite)
             ends_set(object, from.as.cylinder.from, from.as.cylinder.axis, from.as.cylinder.radius);
         return;
     case SHAPE_CONE: {
         const double *radii = from.as.cone.radius, widest = fmax(radii[0], radii[1]);
         object->as.oval.caps = from.as.cone.caps;
-        object->as.oval.center = from.as.cone.from;
         object->as.oval.rise = from.as.cone.slope;
-        axes_set(object, from.as.cone.axis, 1, 1);
+        axes_set(object, from.as.cone.from, from.as.cone.axis, 1, 1);
         if (!from.as.cone.finite) return;
         ends_set(object, from.as.cone.from, from.as.cone.axis, widest);
         object->as.oval.radii[0] = radii[0] / widest;
@@ -61,8 +58,7 @@ void oval_make(Object *object)
     }
     case SHAPE_TORUS: {
         const double size = from.as.torus.major + from.as.torus.minor;
-        object->as.oval.center = from.as.torus.center;
-        axes_set(object, from.as.torus.axis, size, size);
+        axes_set(object, from.as.torus.center, from.as.torus.axis, size, size);
         object->as.oval.radii[0] = from.as.torus.major / size;
         object->as.oval.radii[1] = from.as.torus.minor / size;
         return;
@@ -71,9 +67,8 @@ void oval_make(Object *object)
         const double focal_length = from.as.paraboloid.focal_length, height = from.as.paraboloid.height;
         const Vector3 axis = vector_normalize(from.as.paraboloid.axis);
         object->as.oval.caps = from.as.paraboloid.caps;
-        object->as.oval.center = from.as.paraboloid.apex;
         object->as.oval.rise = 1;
-        axes_set(object, axis, 4 * focal_length, 4 * focal_length);
+        axes_set(object, from.as.paraboloid.apex, axis, 4 * focal_length, 4 * focal_length);
         if (from.as.paraboloid.finite)
             ends_set(object, from.as.paraboloid.apex, vector_scale(axis, height),
                      2 * sqrt(focal_length * height));

@@ -119,42 +119,34 @@ Color material_passing(const Material *material)
     return vector_all(material->shadow == SHADOW_NONE ? 1 : 0);
 }
 
+static Object triangle_of(uint32_t material, Vector3 a, Vector3 b, Vector3 c)
+{
+    return (Object){.type = SHAPE_TRIANGLE, .material = material, .as.triangle.vertices = {a, b, c}};
+}
+
 static void lamp_add(Scene *scene, const Light *light, uint32_t material)
 {
-    const Vector3 u = light->area.across[0], v = light->area.across[1], center = light->position;
+    const Vector3 center = light->position, u = light->area.across[0], v = light->area.across[1],
+                  first = vector_subtract(center, vector_add(u, v)),
+                  last = vector_add(center, vector_add(u, v));
     Object lamp = {.type = SHAPE_SPHERE, .material = material};
     if (light->area.type == AREA_SPHERE) {
         lamp.as.sphere.center = center;
         lamp.as.sphere.radius = light->area.radius;
-        array_push(scene->objects, lamp);
-        return;
-    }
-    if (light->area.type == AREA_ELLIPSE) {
+    } else if (light->area.type == AREA_ELLIPSE) {
         lamp.type = SHAPE_DISC;
         lamp.as.disc.center = center;
         lamp.as.disc.normal = vector_cross(vector_normalize(u), vector_normalize(v));
         lamp.as.disc.radius = light->area.radius;
-        array_push(scene->objects, lamp);
-        return;
-    }
-    if (light->area.type == AREA_TRIANGLE) {
+    } else if (light->area.type == AREA_TRIANGLE) {
         const Vector3 vertex = vector_subtract(center, vector_scale(vector_add(u, v), 0.25));
-        lamp.type = SHAPE_TRIANGLE;
-        lamp.as.triangle.vertices[0] = vertex;
-        lamp.as.triangle.vertices[1] = vector_add(vertex, u);
-        lamp.as.triangle.vertices[2] = vector_add(vertex, v);
+        lamp = triangle_of(material, vertex, vector_add(vertex, u), vector_add(vertex, v));
+    } else {
+        lamp = triangle_of(material, first, vector_subtract(center, vector_subtract(u, v)), last);
         array_push(scene->objects, lamp);
-        return;
+        lamp = triangle_of(material, first, vector_add(center, vector_subtract(u, v)), last);
     }
-    const Vector3 first = vector_subtract(center, vector_add(u, v)),
-                  last = vector_add(center, vector_add(u, v));
-    for (int side = -1; side <= 1; side += 2) {
-        lamp.type = SHAPE_TRIANGLE;
-        lamp.as.triangle.vertices[0] = first;
-        lamp.as.triangle.vertices[1] = vector_add(center, vector_scale(vector_subtract(u, v), side));
-        lamp.as.triangle.vertices[2] = last;
-        array_push(scene->objects, lamp);
-    }
+    array_push(scene->objects, lamp);
 }
 
 void scene_add_lamps(Scene *scene)
