@@ -59,9 +59,7 @@ static bool settings_read(RenderSettings *settings, const GlintRenderSettings *g
     if ((width == 0) != (height == 0))
         return message_error(messages, "an image needs both width and height, or neither, not %u x %u", width,
                              height);
-    if (width == 0) {
-        scene_choose_image_size(scene, &width, &height);
-    }
+    scene_choose_image_size(scene, &width, &height);
     if (width > IMAGE_SIDE_MAX || height > IMAGE_SIDE_MAX)
         return message_error(messages, "an image may have at most %d pixels per side, not %u x %u",
                              IMAGE_SIDE_MAX, width, height);
