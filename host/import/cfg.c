@@ -3,7 +3,6 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
-#include "host/import/place.h"
 #include "host/scene/portable.h"
 
 #include <string.h>
@@ -239,26 +238,24 @@ static void block_open(CfgReader *reader)
     block->finish(reader, &values);
 }
 
-static void blocks_read(CfgReader *reader)
+static void block_read_or_skip(void *context)
 {
-    Places places = places_open(reader->report.source, NULL);
-    while (!report_is_full(&reader->report) && line_next_filled(&reader->line)) {
-        Word word = line_peek(&reader->line);
-        if (word_opens_block(word))
-            block_open(reader);
-        else
-            report_warning(&reader->report, word.offset, "skipped '%.*s'", WORD_TEXT(word));
-        places_record(&places, reader->scene, word.offset);
-    }
-    places_close(&places);
-    if (!reader->has_camera && !report_is_full(&reader->report))
-        report_error(&reader->report, reader->report.source->length, "no camera: a block =>camera");
+    CfgReader *reader = context;
+    const Word word = line_peek(&reader->line);
+    if (word_opens_block(word))
+        block_open(reader);
+    else
+        report_warning(&reader->report, word.offset, "skipped '%.*s'", WORD_TEXT(word));
 }
 
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {0.2, 0.2, 0.2}};
     CfgReader reader = {.report = report_open(source, messages), .scene = scene};
-    if (line_open(&reader.line, &reader.report, '\0')) blocks_read(&reader);
+    if (line_open(&reader.line, &reader.report, '\0')) {
+        line_elements(&reader.line, scene, line_next_filled, block_read_or_skip, &reader);
+        if (!reader.has_camera && !report_is_full(&reader.report))
+            report_error(&reader.report, source->length, "no camera: a block =>camera");
+    }
     return scene_finish(scene, &reader.report, NULL);
 }

@@ -3,7 +3,6 @@
 // what is read and how it maps to glint.
 #include "host/import/dat.h"
 #include "host/base/array.h"
-#include "host/import/place.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -94,9 +93,11 @@ static bool shader_mode_read(DatReader *reader)
     return true;
 }
 
+// Skips all that follows.
 static bool scene_end(DatReader *reader)
 {
-    reader->is_at_end = true;
+    reader->line.at = reader->line.end;
+    reader->line.next = reader->report.source->length;
     return true;
 }
 
@@ -167,8 +168,9 @@ static void statement_skip(DatReader *reader)
     }
 }
 
-static void statement_read(DatReader *reader)
+static void statement_read(void *context)
 {
+    DatReader *reader = context;
     const Word word = free_word(&reader->line);
     const size_t index = statement_find(word);
     if (index == STATEMENT_COUNT) {
@@ -188,15 +190,9 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {1, 1, 1}};
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report, '#')) {
-        Places places = places_open(source, NULL);
         if (!word_is_in_any_case(free_peek(&reader.line), "begin_scene"))
             report_error(&reader.report, free_peek(&reader.line).offset, "a scene starts with 'begin_scene'");
-        while (!report_is_full(&reader.report) && !reader.is_at_end && free_peek(&reader.line).length) {
-            const size_t offset = free_peek(&reader.line).offset;
-            statement_read(&reader);
-            places_record(&places, scene, offset);
-        }
-        places_close(&places);
+        line_elements(&reader.line, scene, line_reach_word, statement_read, &reader);
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block 'camera'");
     }

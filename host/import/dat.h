@@ -15,7 +15,7 @@ typedef struct {
     Report report;
     Line line;
     Scene *scene;
-    bool has_resolution, has_camera, is_at_end;
+    bool has_resolution, has_camera;
     bool dims_clear; // opacity dims what a transparent surface shows, as in VMD
     ARRAY_OF(DatTexture) textures;
     uint32_t *slots; // of a hash table: 1 + index of a texture; 0: free

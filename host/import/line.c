@@ -1,5 +1,6 @@
 #include "host/import/line.h"
 #include "host/base/text.h"
+#include "host/import/place.h"
 
 #include <string.h>
 #include <strings.h>
@@ -225,6 +226,21 @@ bool free_vector(Line *line, const char *name, const Range *range, void *value)
     Vector3 *vector = value;
     return free_number(line, name, range, &vector->x) && free_number(line, name, range, &vector->y) &&
            free_number(line, name, range, &vector->z);
+}
+
+bool line_elements(Line *line, Scene *scene, bool (*next)(Line *line), void (*read)(void *reader),
+                   void *reader)
+{
+    bool is_empty = true;
+    Places places = places_open(line->report->source, NULL);
+    while (!report_is_full(line->report) && next(line)) {
+        const size_t offset = line_peek(line).offset;
+        is_empty = false;
+        read(reader);
+        places_record(&places, scene, offset);
+    }
+    places_close(&places);
+    return !is_empty;
 }
 
 bool line_end(Line *line)

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "host/import/number.h"
-#include "host/scene/vector.h"
+#include "host/scene/scene.h"
 
 typedef struct {
     Report *report;
@@ -56,6 +56,10 @@ LineReader line_number, line_whole_number, line_comma_vector, line_blank_vector;
 // Read a double, an unsigned and a Vector3 from the next words of this line or later ones. A word that is
 // invalid stays unread.
 LineReader free_number, free_whole_number, free_vector;
+// Calls `read` at each word that `next` moves to, line_next_filled or line_reach_word, until the report is
+// full. Stores the lines of the objects that it adds. Returns false if there are no words.
+bool line_elements(Line *line, Scene *scene, bool (*next)(Line *line), void (*read)(void *reader),
+                   void *reader);
 // Reports an error and returns false if anything is left on the line.
 bool line_end(Line *line);
 // Sets *has_one, which tells whether the source had a `what`. Reports an error at the line and returns false

@@ -3,7 +3,6 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
-#include "host/import/place.h"
 #include "host/scene/polygon.h"
 #include "host/scene/portable.h"
 
@@ -264,8 +263,9 @@ static const struct {
 };
 
 // Reads an element. After an error, skips the rest of its line and the lines that may belong to it.
-static void element_read(NffReader *reader)
+static void element_read(void *context)
 {
+    NffReader *reader = context;
     Word name = line_word(&reader->line);
     for (size_t i = 0; i < COUNT_OF(elements); i++) {
         if (!word_is(name, elements[i].name)) continue;
@@ -303,16 +303,7 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     NffReader reader = {.report = report_open(source, messages), .scene = scene};
     if (line_open(&reader.line, &reader.report, '#')) {
-        bool is_empty = true;
-        Places places = places_open(source, NULL);
-        while (!report_is_full(&reader.report) && line_reach_word(&reader.line)) {
-            const size_t offset = line_peek(&reader.line).offset;
-            is_empty = false;
-            element_read(&reader);
-            places_record(&places, scene, offset);
-        }
-        places_close(&places);
-        if (is_empty)
+        if (!line_elements(&reader.line, scene, line_reach_word, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_view && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no view: an element v");

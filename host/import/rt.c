@@ -3,7 +3,6 @@
 #include "host/base/array.h"
 #include "host/import/line.h"
 #include "host/import/load.h"
-#include "host/import/place.h"
 #include "host/scene/portable.h"
 
 #include <string.h>
@@ -13,7 +12,7 @@ typedef struct {
     Line line;
     Scene *scene;
     bool lenient;
-    bool has_element, has_ambient, has_camera, has_size;
+    bool has_ambient, has_camera, has_size;
 } RtReader;
 
 static const Range range_axis = {-1, 1, false, "from -1 to 1"},
@@ -279,10 +278,10 @@ static const struct {
     {"cy", read_cylinder}, {"co", read_cone},       {"sq", read_square},    {"tr", read_triangle},
 };
 
-static void element_read(RtReader *reader)
+static void element_read(void *context)
 {
+    RtReader *reader = context;
     Word name = line_word(&reader->line);
-    reader->has_element = true;
     for (size_t i = 0; i < COUNT_OF(elements); i++) {
         if (word_is(name, elements[i].name)) {
             elements[i].read(reader);
@@ -301,18 +300,12 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
     RtReader reader = {
         .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
-    Places places = places_open(source, NULL);
     if (line_open(&reader.line, &reader.report, '#')) {
         reader.line.joins_blanks = reader.lenient;
-        while (!report_is_full(&reader.report) && line_next_filled(&reader.line)) {
-            element_read(&reader);
-            places_record(&places, scene, reader.line.start);
-        }
-        if (!reader.has_element)
+        if (!line_elements(&reader.line, scene, line_next_filled, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a line with C");
     }
-    places_close(&places);
     return scene_finish(scene, &reader.report, NULL);
 }
