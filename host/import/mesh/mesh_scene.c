@@ -69,12 +69,14 @@ static void lights_around(Scene *scene)
                ((Light){.type = LIGHT_DIRECTIONAL, .color = {0.25, 0.25, 0.25}, .direction = fill}));
 }
 
+// Returns whether a light is usable, even if a hostile file controls the process that it comes from.
 static bool light_is_sound(const Light *light)
 {
     const bool has_cone = light->spot.half_angle > 0 && light->spot.half_angle < 180 &&
                           light->spot.penumbra >= 0 && light->spot.penumbra <= light->spot.half_angle;
-    return light->type <= LIGHT_SPOT && vector_is_within(light->position, NUMBER_MAX) &&
-           vector_is_within(light->direction, NUMBER_MAX) && vector_is_within(light->color, NUMBER_MAX) &&
+    return light->type <= LIGHT_SPOT && light->area.type == AREA_NONE &&
+           vector_is_within(light->position, NUMBER_MAX) && vector_is_within(light->direction, NUMBER_MAX) &&
+           vector_is_within(light->color, NUMBER_MAX) &&
            vector_is_zero(vector_min(light->color, vector_all(0))) &&
            (light->type == LIGHT_POINT || !vector_is_zero(light->direction)) &&
            (light->type != LIGHT_SPOT || has_cone);
@@ -132,7 +134,7 @@ static bool camera_is_sound(const Camera *camera)
            vector_is_within(camera->up, NUMBER_MAX) && !vectors_equal(camera->position, camera->look_at) &&
            camera->field_axis <= FIELD_HORIZONTAL && camera->projection <= PROJECTION_EQUIRECTANGULAR &&
            camera->half_tangent > 0 && camera->half_tangent <= NUMBER_MAX && camera->frame_aspect >= 0 &&
-           camera->frame_aspect <= NUMBER_MAX;
+           camera->frame_aspect <= NUMBER_MAX && camera->lens.radius == 0;
 }
 
 static void scene_show(Scene *scene, const MeshView *view, const char *path, Report *report)
