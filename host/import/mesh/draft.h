@@ -83,6 +83,16 @@ void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
 // that has no remaining index.
 void draft_drop_missing(MeshDraft *draft);
 
+// Adds a vertex. `unread` is the offset of a coordinate that is not a number in range, or 0. Returns false
+// with an error if there are too many vertices.
+static inline bool draft_add_vertex(MeshDraft *draft, Vector3 position, size_t unread)
+{
+    if (draft->positions.count == DRAFT_NONE - 1) return draft_refuse(draft, "too many vertices");
+    if (unread > 0) array_push(draft->unread, ((DraftPlace){draft->positions.count, unread}));
+    array_push(draft->positions, unread > 0 ? vector_all(NAN) : position);
+    return true;
+}
+
 // Adds the index of the next corner, position first; `offset` is its place in the file. An index that the
 // file defines later is checked at the end.
 static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t index, size_t offset)

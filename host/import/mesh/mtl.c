@@ -191,16 +191,13 @@ static bool texture_option_read(Scan *scan, double *multiplier, bool *is_used)
 {
     Scan ahead = *scan;
     const Word word = scan_word(&ahead);
-    double number;
+    double unused[3];
     if (word.length < 2 || word.text[0] != '-') return false;
     *scan = ahead;
-    int count = 0;
     *is_used =
         multiplier && word_is(word, "-bm") && scan_more(scan) && scan_number(scan, multiplier) == NUMBER_READ;
     if (*is_used) return true;
-    while (count < 3 && scan_more(scan) && scan_number(scan, &number) == NUMBER_READ)
-        count++;
-    if (count == 0) scan_word(scan);
+    if (scan_numbers(scan, unused, 3) == 0) scan_word(scan);
     return true;
 }
 

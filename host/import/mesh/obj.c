@@ -21,43 +21,30 @@ static size_t offset_of(const ObjReader *reader)
     return scan_offset(&reader->scan);
 }
 
-// Reads numbers up to the first word that is not a number. Returns whether it reached the line's end.
-static bool numbers_read(ObjReader *reader, double *numbers, int most, int *count)
-{
-    for (*count = 0; scan_more(&reader->scan); ++*count)
-        if (*count == most || scan_number(&reader->scan, &numbers[*count]) != NUMBER_READ) return false;
-    return true;
-}
-
 // Reads a position. A fourth number is homogeneous, and further ones are a color.
 static bool position_read(ObjReader *reader)
 {
     MeshDraft *draft = reader->draft;
     double numbers[4] = {0};
-    int count;
-    const bool at_end = numbers_read(reader, numbers, 4, &count);
+    const int count = scan_numbers(&reader->scan, numbers, 4);
+    const bool at_end = !scan_more(&reader->scan);
     const size_t offset = offset_of(reader);
     Vector3 position = {numbers[0], numbers[1], numbers[2]};
-    if (count < 3) {
-        position = vector_all(NAN);
-        array_push(draft->unread, ((DraftPlace){draft->positions.count, offset}));
-    } else if (count == 4 && at_end) {
+    if (count == 4 && at_end) {
         if (numbers[3] == 0) return draft_fails(draft, offset, "the fourth number of a vertex is 0");
         position = (Vector3){position.x / numbers[3], position.y / numbers[3], position.z / numbers[3]};
     } else if (count == 4 && !reader->has_colors) {
         report_warning(&draft->report, offset, "colors of vertices are not used");
         reader->has_colors = true;
     }
-    if (draft->positions.count == DRAFT_NONE - 1) return draft_fails(draft, offset, "too many vertices");
-    array_push(draft->positions, position);
-    return true;
+    return draft_add_vertex(draft, position, count < 3 ? offset : 0);
 }
 
 static bool uv_read(ObjReader *reader)
 {
     double numbers[3] = {NAN, 0, 0};
-    int count;
-    if (!numbers_read(reader, numbers, 3, &count) && count < 2) numbers[count] = NAN;
+    const int count = scan_numbers(&reader->scan, numbers, 3);
+    if (count < 2 && scan_more(&reader->scan)) numbers[count] = NAN;
     draft_add_uv(reader->draft, numbers[0], numbers[1]);
     return true;
 }
@@ -65,8 +52,7 @@ static bool uv_read(ObjReader *reader)
 static bool normal_read(ObjReader *reader)
 {
     double numbers[3] = {0};
-    int count;
-    numbers_read(reader, numbers, 3, &count);
+    const int count = scan_numbers(&reader->scan, numbers, 3);
     const Vector3 normal = {numbers[0], numbers[1], numbers[2]};
     array_push(reader->draft->normals, count == 3 ? normal : vector_all(NAN));
     return true;

@@ -286,13 +286,11 @@ static bool vertex_add(PlyReader *reader)
 {
     MeshDraft *draft = reader->reading.draft;
     const double *numbers = reader->numbers;
-    if (reader->unread) array_push(draft->unread, ((DraftPlace){draft->positions.count, reader->unread}));
-    if (draft->positions.count == DRAFT_NONE - 1) return draft_refuse(draft, "too many vertices");
-    array_push(draft->positions, ((Vector3){numbers[ROLE_X], numbers[ROLE_Y], numbers[ROLE_Z]}));
     if (draft->is_shared[DRAFT_NORMAL])
         array_push(draft->normals, ((Vector3){numbers[ROLE_NX], numbers[ROLE_NY], numbers[ROLE_NZ]}));
     if (draft->is_shared[DRAFT_UV]) draft_add_uv(draft, numbers[ROLE_U], numbers[ROLE_V]);
-    return true;
+    return draft_add_vertex(draft, (Vector3){numbers[ROLE_X], numbers[ROLE_Y], numbers[ROLE_Z]},
+                            reader->unread);
 }
 
 static bool face_add(PlyReader *reader)

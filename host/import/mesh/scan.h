@@ -90,6 +90,15 @@ static inline NumberStatus scan_number(Scan *scan, double *value)
     return status;
 }
 
+// Reads up to `most` numbers, and returns how many come before another word or the end of the line.
+static inline int scan_numbers(Scan *scan, double *numbers, int most)
+{
+    int count = 0;
+    while (count < most && scan_more(scan) && scan_number(scan, &numbers[count]) == NUMBER_READ)
+        count++;
+    return count;
+}
+
 // Moves to the next line. Returns false at the end of the text.
 static inline bool scan_line(Scan *scan)
 {

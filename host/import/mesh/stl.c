@@ -18,19 +18,12 @@ typedef struct {
 static bool vertex_read(StlReader *reader)
 {
     MeshDraft *draft = reader->draft;
-    double numbers[3];
-    int count = 0;
-    while (count < 3 && scan_more(&reader->scan) &&
-           scan_number(&reader->scan, &numbers[count]) == NUMBER_READ)
-        count++;
-    const size_t offset = scan_offset(&reader->scan);
-    if (count < 3) array_push(draft->unread, ((DraftPlace){draft->positions.count, offset}));
-    if (draft->positions.count == DRAFT_NONE - 1) return draft_fails(draft, offset, "too many vertices");
+    double numbers[3] = {0};
+    const bool is_read = scan_numbers(&reader->scan, numbers, 3) == 3;
     array_push(draft->corners[DRAFT_POSITION], (uint32_t)draft->positions.count);
-    array_push(draft->positions,
-               count < 3 ? vector_all(NAN) : ((Vector3){numbers[0], numbers[1], numbers[2]}));
     reader->corner_count++;
-    return true;
+    return draft_add_vertex(draft, (Vector3){numbers[0], numbers[1], numbers[2]},
+                            is_read ? 0 : scan_offset(&reader->scan));
 }
 
 static bool facet_end(StlReader *reader, size_t offset)
