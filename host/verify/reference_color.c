@@ -1,7 +1,7 @@
 #include "host/verify/reference_color.h"
 
-#include "host/compile/camera_basis.h"
 #include "host/compile/random_shape.h"
+#include "host/verify/reference_optics.h"
 #include <float.h>
 #include <math.h>
 
@@ -9,34 +9,13 @@
 // It is far above the rounding of quadruple precision and far below that of double.
 #define START_PART ((Quad)0x1p-90L)
 
-ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
-                                  unsigned row)
-{
-    const CameraBasis basis = camera_basis(camera, width, height);
-    const Quad x = (Quad)2 * column + 1 - width, y = height - 1 - (Quad)2 * row;
-    if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
-        const Quad half_turn = QUAD_CALL(acos)(-1), longitude = half_turn * x / width,
-                   latitude = half_turn / 2 * y / height;
-        const Quad3 right = quad3(vector_normalize(basis.right)), up = quad3(vector_normalize(basis.up));
-        const Quad3 level = quad3_add(quad3_scale(quad3(basis.forward), QUAD_CALL(cos)(longitude)),
-                                      quad3_scale(right, QUAD_CALL(sin)(longitude)));
-        return (ReferenceRay){quad3(camera->position),
-                              quad3_add(quad3_scale(level, QUAD_CALL(cos)(latitude)),
-                                        quad3_scale(up, QUAD_CALL(sin)(latitude))),
-                              0, (Quad)FLT_MAX};
-    }
-    const Quad3 sideways = quad3_add(quad3_scale(quad3(basis.right), x), quad3_scale(quad3(basis.up), y));
-    const Quad3 direction = quad3_add(quad3(basis.middle), sideways);
-    return (ReferenceRay){quad3(camera->position), direction, 0, (Quad)FLT_MAX};
-}
-
-// A point of a surface, its unit shading and geometric normals, which face the eye, and the unit direction
-// to the eye.
 typedef struct {
-    Quad3 point, normal, geometric, to_eye;
-    Quad scale; // the point's distance from the ray's origin
-    Quad start; // the surface is at most this far from the point
-    Quad3 lift; // from the point to the start of rays to lights
+    Quad3 point;
+    Quad3 normal, geometric; // unit, facing the eye
+    Quad3 to_eye;            // unit
+    Quad scale;              // the point's distance from the ray's origin
+    Quad start;              // the surface is at most this far from the point
+    Quad3 lift;              // from the point to the start of rays to lights
     bool is_lifted;
     bool entering;
     uint32_t index; // of the object
@@ -44,6 +23,11 @@ typedef struct {
     const Material *material;
     Color base;
 } ShadedPoint;
+
+static const Material *object_material(const Scene *scene, size_t object)
+{
+    return &scene->materials.items[scene->objects.items[object].material];
+}
 
 static Quad square_of(Quad coordinate, double size, Quad *margin)
 {
@@ -72,21 +56,6 @@ static Color checker_color(const Object *object, const Material *material, const
                   square_of(point.z, size, margin);
     }
     return material->checker.colors[QUAD_CALL(fmod)(squares, 2) != 0];
-}
-
-// Returns 1 within half_angle - penumbra, 0 beyond half_angle, and the smooth step 3 x^2 - 2 x^3 of 1 - cos
-// between.
-static Quad spot_factor(const Light *light, Quad3 from_light)
-{
-    const Quad degree = QUAD_CALL(acos)(-1) / 180;
-    Quad along = quad3_dot(quad3_unit(quad3(light->direction)), quad3_unit(from_light));
-    Quad versine = 1 - along;
-    Quad outer = 1 - QUAD_CALL(cos)(light->spot.half_angle * degree);
-    Quad inner = 1 - QUAD_CALL(cos)((light->spot.half_angle - light->spot.penumbra) * degree);
-    if (versine <= inner) return 1;
-    if (versine >= outer) return 0;
-    Quad x = (outer - versine) / (outer - inner);
-    return x * x * (3 - 2 * x);
 }
 
 // Sets the start of shadow rays above a smooth triangle whose normals are all on one side. The point moves,
@@ -120,62 +89,6 @@ static void surface_lift(ShadedPoint *surface)
     if (!agrees) surface->lift = (Quad3){0, 0, 0};
 }
 
-// Returns whether the light reaches the surface.
-static bool add_light(const ReferenceScene *world, const Light *light, const ShadedPoint *surface,
-                      ReferenceColor *sum)
-{
-    const Scene *scene = &world->scene;
-    const Material *material = surface->material;
-    Color base = surface->base;
-    bool directional = light->type == LIGHT_DIRECTIONAL;
-    Quad3 to_light_unnormalized = directional ? quad3_scale(quad3(light->direction), -1)
-                                              : quad3_subtract(quad3(light->position), surface->point);
-    Quad3 to_light = quad3_unit(to_light_unnormalized);
-    Quad facing = quad3_dot(surface->normal, to_light);
-    sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
-    if (facing <= 0) return false;
-
-    const Quad3 way =
-        directional ? to_light_unnormalized : quad3_subtract(to_light_unnormalized, surface->lift);
-    const Quad start = surface->start / quad3_length(way);
-    ReferenceRay shadow = {quad3_add(surface->point, surface->lift), way, start,
-                           directional ? (Quad)LDBL_MAX : 1};
-    Quad strength =
-        light->type == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light_unnormalized, -1)) : 1;
-    if (light_fades(light)) {
-        const Quad distance = quad3_length(to_light_unnormalized);
-        strength /= light->fading[0] + distance * (light->fading[1] + distance * light->fading[2]);
-    }
-    // a light before the shading normal but behind the surface, unless the lifted ray passes over its rim
-    const Quad height = quad3_dot(surface->geometric, quad3_unit(way));
-    sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(height) * surface->scale));
-    bool sinks = height <= 0;
-    if (sinks && surface->is_lifted) {
-        ReferenceRay whole = shadow;
-        whole.tmin = -start;
-        const ReferenceHit own = reference_hit_object(surface->object, &whole);
-        sum->margin = fmin(sum->margin, (double)own.margin);
-        sinks = own.found;
-    }
-    Color passed = sinks ? material_passing(material) : vector_all(1);
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        const Material *medium = &scene->materials.items[object->material];
-        ReferenceHit blocker = reference_scene_hit_object(world, i, &shadow, surface->index);
-        sum->margin = fmin(sum->margin, (double)blocker.margin);
-        if (blocker.found) passed = vector_multiply(passed, material_passing(medium));
-    }
-    double diffuse = (double)(strength * facing);
-    Quad highlight_part =
-        reference_highlight(surface->normal, to_light, surface->to_eye, material->shininess);
-    const Color highlight = vector_scale(tint_factors(material->specular_tint),
-                                         (double)(strength * highlight_part) * material->specular);
-    const Color reflected =
-        vector_add(vector_scale(vector_multiply(material->diffuse, base), diffuse), highlight);
-    sum->color = vector_add(sum->color, vector_multiply(vector_multiply(light->color, passed), reflected));
-    return strength > 0 && vector_largest(passed) > 0;
-}
-
 static Quad3 random_offset(Random *random, double size)
 {
     return quad3(vector_scale(random_in_sphere(random), size));
@@ -196,7 +109,7 @@ static ShadedPoint surface_at(const ReferenceScene *world, const ReferenceRay *r
 {
     const Scene *scene = &world->scene;
     const Object *object = &scene->objects.items[hit->object];
-    const Material *material = &scene->materials.items[object->material];
+    const Material *material = object_material(scene, hit->object);
     Quad length = quad3_length(ray->direction);
     ShadedPoint surface = {.point = reference_point(ray, hit->t),
                            .normal = hit->shading_normal,
@@ -224,16 +137,91 @@ static ShadedPoint surface_at(const ReferenceScene *world, const ReferenceRay *r
     return surface;
 }
 
+// Returns 1 within half_angle - penumbra, 0 beyond half_angle, and the smooth step 3 x^2 - 2 x^3 of 1 - cos
+// between.
+static Quad spot_factor(const Light *light, Quad3 from_light)
+{
+    const Quad degree = QUAD_CALL(acos)(-1) / 180;
+    Quad along = quad3_dot(quad3_unit(quad3(light->direction)), quad3_unit(from_light));
+    Quad versine = 1 - along;
+    Quad outer = 1 - QUAD_CALL(cos)(light->spot.half_angle * degree);
+    Quad inner = 1 - QUAD_CALL(cos)((light->spot.half_angle - light->spot.penumbra) * degree);
+    if (versine <= inner) return 1;
+    if (versine >= outer) return 0;
+    Quad x = (outer - versine) / (outer - inner);
+    return x * x * (3 - 2 * x);
+}
+
+// Returns the part of a light's color that a spot's cone and fading leave at a point.
+static Quad light_strength(const Light *light, Quad3 to_light)
+{
+    const Quad strength = light->type == LIGHT_SPOT ? spot_factor(light, quad3_scale(to_light, -1)) : 1;
+    if (!light_fades(light)) return strength;
+    const Quad distance = quad3_length(to_light);
+    return strength / (light->fading[0] + distance * (light->fading[1] + distance * light->fading[2]));
+}
+
+// Returns the part of a light's color that the objects on the way to it pass.
+static Color light_passed(const ReferenceScene *world, const ShadedPoint *surface, const ReferenceRay *shadow,
+                          double *margin)
+{
+    const Scene *scene = &world->scene;
+    // a light before the shading normal but behind the surface, unless the lifted ray passes over its rim
+    const Quad height = quad3_dot(surface->geometric, quad3_unit(shadow->direction));
+    *margin = fmin(*margin, (double)(2 * quad_absolute(height) * surface->scale));
+    bool sinks = height <= 0;
+    if (sinks && surface->is_lifted) {
+        ReferenceRay whole = *shadow;
+        whole.tmin = -shadow->tmin;
+        const ReferenceHit own = reference_hit_object(surface->object, &whole);
+        *margin = fmin(*margin, (double)own.margin);
+        sinks = own.found;
+    }
+    Color passed = sinks ? material_passing(surface->material) : vector_all(1);
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        const ReferenceHit blocker = reference_scene_hit_object(world, i, shadow, surface->index);
+        *margin = fmin(*margin, (double)blocker.margin);
+        if (blocker.found) passed = vector_multiply(passed, material_passing(object_material(scene, i)));
+    }
+    return passed;
+}
+
+// Adds a light's share of the color. Returns whether the light reaches the surface.
+static bool add_light(const ReferenceScene *world, const Light *light, const ShadedPoint *surface,
+                      ReferenceColor *sum)
+{
+    const Material *material = surface->material;
+    const bool directional = light->type == LIGHT_DIRECTIONAL;
+    const Quad3 way = directional ? quad3_scale(quad3(light->direction), -1)
+                                  : quad3_subtract(quad3(light->position), surface->point);
+    const Quad3 to_light = quad3_unit(way);
+    const Quad facing = quad3_dot(surface->normal, to_light);
+    sum->margin = fmin(sum->margin, (double)(2 * quad_absolute(facing) * surface->scale));
+    if (facing <= 0) return false;
+
+    const Quad3 lifted_way = directional ? way : quad3_subtract(way, surface->lift);
+    const ReferenceRay shadow = {quad3_add(surface->point, surface->lift), lifted_way,
+                                 surface->start / quad3_length(lifted_way), directional ? (Quad)LDBL_MAX : 1};
+    const Color passed = light_passed(world, surface, &shadow, &sum->margin);
+    const Quad strength = light_strength(light, way);
+    const Quad highlight =
+        reference_highlight(surface->normal, to_light, surface->to_eye, material->shininess);
+    const Color reflected = vector_add(
+        vector_scale(vector_multiply(material->diffuse, surface->base), (double)(strength * facing)),
+        vector_scale(tint_factors(material->specular_tint),
+                     (double)(strength * highlight) * material->specular));
+    sum->color = vector_add(sum->color, vector_multiply(vector_multiply(light->color, passed), reflected));
+    return strength > 0 && vector_largest(passed) > 0;
+}
+
 // Returns a surface's color. Sets `shadows`, unless NULL, to whether each light fails to reach the surface.
 static ReferenceColor surface_color(const ReferenceScene *world, const ShadedPoint *surface, double margin,
                                     bool *shadows)
 {
     const Scene *scene = &world->scene;
-    Color base = surface->base;
-    Color ambient = {scene->ambient.x * base.x, scene->ambient.y * base.y, scene->ambient.z * base.z};
-    const Color own =
-        vector_add(vector_scale(ambient, surface->material->ambient), surface->material->emission);
-    ReferenceColor sum = {own, margin};
+    const Color ambient = vector_multiply(scene->ambient, surface->base);
+    ReferenceColor sum = {
+        vector_add(vector_scale(ambient, surface->material->ambient), surface->material->emission), margin};
     for (size_t i = 0; i < scene->lights.count; i++) {
         const bool is_lit = add_light(world, &scene->lights.items[i], surface, &sum);
         if (shadows) shadows[i] = !is_lit;
@@ -260,53 +248,18 @@ ReferenceColor reference_color(const Scene *scene, const ReferenceRay *ray)
     return surface_color(&world, &surface, (double)hit.margin, NULL);
 }
 
-// Refracts by Snell's law: sine behind = eta * sine in front. Returns false if that exceeds 1.
-static bool refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted, double *margin)
-{
-    Quad cosine = -quad3_dot(direction, normal);
-    Quad squared = 1 - eta * eta * (1 - cosine * cosine);
-    *margin = fmin(*margin, (double)quad_absolute(squared));
-    if (squared < 0) return false;
-    *refracted =
-        quad3_add(quad3_scale(direction, eta), quad3_scale(normal, eta * cosine - quad_root(squared)));
-    return true;
-}
+// The medium of a ray: how strongly the body around it, and the one around that, absorb light.
+typedef struct {
+    Color density, outer;
+} Medium;
 
-static Quad3 reflect(Quad3 direction, Quad3 normal)
-{
-    return quad3_subtract(direction, quad3_scale(normal, 2 * quad3_dot(direction, normal)));
-}
-
-// Returns whether a bounced ray stays on its side of the surface, that of the normal or the other. If a
-// smooth triangle's shading normal sends it to the wrong side, the geometric normal is used instead.
-static bool is_on_side(Quad3 direction, Quad3 normal, int side, double *margin)
-{
-    const Quad height = side * quad3_dot(quad3_unit(direction), normal);
-    *margin = fmin(*margin, (double)quad_absolute(height));
-    return height > 0;
-}
-
-// Replaces a hit on a transparent surface by one on an opaque surface that coincides with it.
-static void hit_record_opaque(const ReferenceScene *world, const ReferenceRay *ray, ReferenceHit *hit)
-{
-    const Scene *scene = &world->scene;
-    Quad length = quad3_length(ray->direction), reach = START_PART * hit->t * length;
-    const ReferenceHit transparent = *hit;
-    const ReferenceRay inward = {reference_point(ray, hit->t), quad3_scale(hit->normal, -1), -reach, reach};
-    ReferenceRay around = *ray;
-    around.tmin = hit->t - 2 * reach / (hit->cosine * length);
-    around.tmax = hit->t + 2 * reach / (hit->cosine * length);
-    for (size_t i = 0; i < scene->objects.count; i++) {
-        const Object *object = &scene->objects.items[i];
-        if (scene->materials.items[object->material].transmission > 0) continue;
-        if (!reference_scene_hit_object(world, i, &inward, UINT32_MAX).found) continue;
-        ReferenceHit opaque = reference_scene_hit_object(world, i, &around, UINT32_MAX);
-        if (!opaque.found || (hit->object != transparent.object && opaque.t >= hit->t)) continue;
-        opaque.margin = quad_minimum(opaque.margin, hit->margin);
-        *hit = opaque;
-        hit->object = (uint32_t)i;
-    }
-}
+// A ray of a tree, the object that it leaves, and the part of its light that reaches the eye.
+typedef struct {
+    ReferenceRay ray;
+    uint32_t left; // UINT32_MAX: none
+    Color weight;
+    Medium medium;
+} PathRay;
 
 // The state that all rays of a tree share.
 typedef struct {
@@ -315,8 +268,7 @@ typedef struct {
     double blur;
     Random random;
     Color sum;
-    bool has_first;
-    uint32_t object;    // the object of the first hit
+    uint32_t object;    // of the first hit, UINT32_MAX before it
     double distance;    // to the first hit
     uint32_t signature; // see kernels/types.h
     double margin;
@@ -328,41 +280,6 @@ static void signature_add(PathTree *tree, uint32_t object, uint32_t events)
 {
     tree->signature = (tree->signature ^ ((object + 1) * PATH_EVENTS + events)) * PATH_FACTOR;
 }
-
-// Returns the part of unpolarized light that a body of this index reflects, by Fresnel's equations.
-static Quad reflectance(Quad cosine, Quad ior, bool entering)
-{
-    const Quad eta = entering ? 1 / ior : ior, squared = 1 - eta * eta * (1 - cosine * cosine);
-    if (squared <= 0) return 1;
-    const Quad behind = QUAD_CALL(sqrt)(squared), near = entering ? 1 : ior, far = entering ? ior : 1;
-    const Quad across = (near * cosine - far * behind) / (near * cosine + far * behind),
-               along = (near * behind - far * cosine) / (near * behind + far * cosine);
-    return (across * across + along * along) / 2;
-}
-
-// Returns the part of unpolarized light that a conductor of index m reflects. The amplitude, with M = m^2
-// and q^2 = M - sine^2, is (c - q) / (c + q) across the plane of incidence and (M c - q) / (M c + q) along
-// it.
-static double conductor_reflectance(Quad cosine, double n, double k)
-{
-    const Quad real = (Quad)n * n - (Quad)k * k, imaginary = 2 * (Quad)n * k;
-    const Quad difference = real - (1 - cosine * cosine);
-    const Quad size = QUAD_CALL(sqrt)(difference * difference + imaginary * imaginary);
-    const Quad q_real = QUAD_CALL(sqrt)((size + difference) / 2),
-               q_imaginary = QUAD_CALL(sqrt)((size - difference) / 2);
-    Quad sum = 0;
-    for (int along = 0; along < 2; along++) {
-        const Quad a = along ? real * cosine : cosine, b = along ? imaginary * cosine : 0;
-        sum += ((a - q_real) * (a - q_real) + (b - q_imaginary) * (b - q_imaginary)) /
-               ((a + q_real) * (a + q_real) + (b + q_imaginary) * (b + q_imaginary));
-    }
-    return (double)(sum / 2);
-}
-
-// The medium of a ray: how strongly the body around it, and the one around that, absorb light.
-typedef struct {
-    Color density, outer;
-} Medium;
 
 static double channel_left(double density, double length)
 {
@@ -397,91 +314,156 @@ static bool contributes(PathTree *tree, Color weight)
     return largest >= least;
 }
 
-static void add_path(PathTree *tree, const ReferenceRay *ray, uint32_t left, Color weight, Medium medium,
-                     unsigned bounces_left)
+// Returns the nearest hit of a ray. An opaque surface that coincides with a transparent one covers it.
+static ReferenceHit path_hit(const ReferenceScene *world, const PathRay *path)
+{
+    const Scene *scene = &world->scene;
+    const ReferenceRay *ray = &path->ray;
+    const ReferenceHit first = reference_scene_hit(world, ray, path->left);
+    if (!first.found || object_material(scene, first.object)->transmission <= 0) return first;
+    const Quad length = quad3_length(ray->direction), reach = START_PART * first.t * length;
+    const ReferenceRay inward = {reference_point(ray, first.t), quad3_scale(first.normal, -1), -reach, reach};
+    const Quad depth = 2 * reach / (first.cosine * length);
+    const ReferenceRay around = {ray->origin, ray->direction, first.t - depth, first.t + depth};
+    ReferenceHit hit = first;
+    for (size_t i = 0; i < scene->objects.count; i++) {
+        if (object_material(scene, i)->transmission > 0) continue;
+        if (!reference_scene_hit_object(world, i, &inward, UINT32_MAX).found) continue;
+        ReferenceHit opaque = reference_scene_hit_object(world, i, &around, UINT32_MAX);
+        if (!opaque.found || (hit.object != first.object && opaque.t >= hit.t)) continue;
+        opaque.margin = quad_minimum(opaque.margin, hit.margin);
+        opaque.object = (uint32_t)i;
+        hit = opaque;
+    }
+    return hit;
+}
+
+static void add_background(PathTree *tree, const PathRay *path, Quad margin)
 {
     const Scene *scene = &tree->world->scene;
-    ReferenceHit hit = reference_scene_hit(tree->world, ray, left);
-    if (!hit.found) {
-        tree->has_first = true;
-        tree->margin = fmin(tree->margin, (double)hit.margin);
-        tree->has_texture = tree->has_texture || scene->sky.texture > 0;
-        weight = weight_left(weight, medium.density, INFINITY);
-        tree->sum = vector_add(tree->sum, vector_multiply(background_color(scene, ray->direction), weight));
-        signature_add(tree, UINT32_MAX, 0);
-        return;
+    const Color weight = weight_left(path->weight, path->medium.density, INFINITY);
+    const Color color = background_color(scene, path->ray.direction);
+    tree->sum = vector_add(tree->sum, vector_multiply(color, weight));
+    tree->margin = fmin(tree->margin, (double)margin);
+    tree->has_texture = tree->has_texture || scene->sky.texture > 0;
+    signature_add(tree, UINT32_MAX, 0);
+}
+
+static void add_surface(PathTree *tree, const ShadedPoint *surface, Color weight, Quad margin)
+{
+    if (tree->object == UINT32_MAX) {
+        tree->object = surface->index;
+        tree->distance = (double)surface->scale;
     }
-    if (scene->materials.items[scene->objects.items[hit.object].material].transmission > 0)
-        hit_record_opaque(tree->world, ray, &hit);
-    if (!tree->has_first) {
-        tree->object = hit.object;
-        tree->distance = (double)(hit.t * quad3_length(ray->direction));
-    }
-    tree->has_first = true;
-    ShadedPoint surface = surface_at(tree->world, ray, &hit, tree->blur, &tree->random);
-    const Material *material = surface.material;
-    // a surface that is reached from within defines the medium
-    if (material->transmission > 0 && !surface.entering) medium.density = material->absorption;
-    weight = weight_left(weight, medium.density, (double)surface.scale);
-    const ReferenceColor own = surface_color(tree->world, &surface, (double)hit.margin, tree->shadows);
+    const ReferenceColor own = surface_color(tree->world, surface, (double)margin, tree->shadows);
     tree->shadows = NULL;
     tree->sum = vector_add(tree->sum, vector_multiply(own.color, weight));
     tree->margin = fmin(tree->margin, own.margin);
-    tree->has_texture = tree->has_texture || material->image.texture > 0;
-    if (bounces_left == 0) {
-        signature_add(tree, hit.object, 0);
-        return;
-    }
+    tree->has_texture = tree->has_texture || surface->material->image.texture > 0;
+}
 
-    Quad3 direction = quad3_scale(surface.to_eye, -1);
-    double reflection = material->reflection, transmission = material->transmission;
-    Color reflected_weight = vector_scale(tint_factors(material->reflection_tint), reflection);
-    ReferenceRay refracted = {surface.point, direction, surface.start, (Quad)LDBL_MAX}, reflected = refracted;
-    Quad eta = surface.entering ? 1 / (Quad)material->ior : material->ior;
-    const bool is_smooth = surface.object->type == SHAPE_TRIANGLE && surface.object->as.triangle.smooth;
-    bool is_total = false;
+// Returns whether a bounced ray stays on its side of the surface, that of the normal or the other. If a
+// smooth triangle's shading normal sends it to the wrong side, the geometric normal is used instead.
+static bool is_on_side(Quad3 direction, const ShadedPoint *surface, int side, double *margin)
+{
+    if (surface->object->type != SHAPE_TRIANGLE || !surface->object->as.triangle.smooth) return true;
+    const Quad height = side * quad3_dot(quad3_unit(direction), surface->geometric);
+    *margin = fmin(*margin, (double)quad_absolute(height));
+    return height > 0;
+}
+
+static Quad3 surface_reflect(const ShadedPoint *surface, Quad3 direction, double *margin)
+{
+    const Quad3 reflected = reference_reflect(direction, surface->normal);
+    return is_on_side(reflected, surface, 1, margin) ? reflected
+                                                     : reference_reflect(direction, surface->geometric);
+}
+
+// Returns false at total reflection.
+static bool surface_refract(const ShadedPoint *surface, Quad3 direction, Quad3 *refracted, double *margin)
+{
+    const Quad ior = surface->material->ior, eta = surface->entering ? 1 / ior : ior;
+    if (!reference_refract(direction, surface->normal, eta, refracted, margin)) return false;
+    return is_on_side(*refracted, surface, -1, margin) ||
+           reference_refract(direction, surface->geometric, eta, refracted, margin);
+}
+
+// Sets the parts of a ray's light that its reflected and its refracted ray carry.
+static void surface_split(const ShadedPoint *surface, bool is_total, Color *reflected, Color *refracted)
+{
+    const Material *material = surface->material;
+    const Quad cosine = quad3_dot(surface->to_eye, surface->normal);
+    double transmission = material->transmission, part = is_total;
+    if (material->fresnel && !is_total)
+        part = (double)reference_reflectance(cosine, material->ior, surface->entering || transmission == 0);
+    *reflected = vector_scale(tint_factors(material->reflection_tint), material->reflection);
     if (transmission > 0) {
-        is_total = !refract(direction, surface.normal, eta, &refracted.direction, &tree->margin);
-        if (is_smooth && !is_total && !is_on_side(refracted.direction, surface.geometric, -1, &tree->margin))
-            is_total = !refract(direction, surface.geometric, eta, &refracted.direction, &tree->margin);
-        reflection += is_total ? transmission : 0;
-        if (is_total) reflected_weight = vector_add(reflected_weight, vector_all(transmission));
-        transmission = is_total ? 0 : transmission;
-    }
-    if (material->fresnel && !is_total) {
-        const double part = (double)reflectance(-quad3_dot(direction, surface.normal), (Quad)material->ior,
-                                                surface.entering || material->transmission == 0);
-        if (transmission > 0) {
-            reflection += part * transmission;
-            reflected_weight = vector_add(reflected_weight, vector_all(part * transmission));
-            transmission -= part * transmission;
-        } else {
-            reflection *= part;
-            reflected_weight = vector_scale(reflected_weight, part);
-        }
+        *reflected = vector_add(*reflected, vector_all(part * transmission));
+        transmission -= part * transmission;
+    } else if (material->fresnel) {
+        *reflected = vector_scale(*reflected, part);
     }
     if (material->conductor.n.x > 0) {
         const Color n = material->conductor.n, k = material->conductor.k;
-        const Quad cosine = -quad3_dot(direction, surface.normal);
-        const Color part = {conductor_reflectance(cosine, n.x, k.x), conductor_reflectance(cosine, n.y, k.y),
-                            conductor_reflectance(cosine, n.z, k.z)};
-        reflected_weight = vector_multiply(reflected_weight, part);
+        const Color metal = {reference_conductor_reflectance(cosine, n.x, k.x),
+                             reference_conductor_reflectance(cosine, n.y, k.y),
+                             reference_conductor_reflectance(cosine, n.z, k.z)};
+        *reflected = vector_multiply(*reflected, metal);
     }
-    reflected_weight = weights_multiply(weight, reflected_weight);
-    const Color refracted_weight =
-        weights_multiply(weight, vector_scale(tint_factors(material->transmission_tint), transmission));
-    const bool reflects = reflection > 0 && contributes(tree, reflected_weight),
-               refracts = transmission > 0 && contributes(tree, refracted_weight);
-    signature_add(tree, hit.object,
+    *refracted = vector_scale(tint_factors(material->transmission_tint), transmission);
+}
+
+static void add_path(PathTree *tree, const PathRay *path, unsigned bounces_left);
+
+static void add_bounces(PathTree *tree, const PathRay *path, const ShadedPoint *surface,
+                        unsigned bounces_left)
+{
+    const Material *material = surface->material;
+    const Quad3 direction = quad3_scale(surface->to_eye, -1);
+    PathRay refracted = {{surface->point, direction, surface->start, (Quad)LDBL_MAX},
+                         surface->index,
+                         path->weight,
+                         path->medium};
+    PathRay reflected = refracted;
+    const bool is_total = material->transmission > 0 &&
+                          !surface_refract(surface, direction, &refracted.ray.direction, &tree->margin);
+    Color reflected_part, refracted_part;
+    surface_split(surface, is_total, &reflected_part, &refracted_part);
+    reflected.weight = weights_multiply(path->weight, reflected_part);
+    refracted.weight = weights_multiply(path->weight, refracted_part);
+    const bool reflects = contributes(tree, reflected.weight), refracts = contributes(tree, refracted.weight);
+    signature_add(tree, surface->index,
                   (reflects ? PATH_REFLECTED : 0u) | (refracts ? PATH_REFRACTED : 0u) |
                       (reflects && is_total ? PATH_TOTAL_REFLECTION : 0u));
-    reflected.direction = reflect(direction, surface.normal);
-    if (reflects && is_smooth && !is_on_side(reflected.direction, surface.geometric, 1, &tree->margin))
-        reflected.direction = reflect(direction, surface.geometric);
-    const Medium behind =
-        surface.entering ? (Medium){material->absorption, medium.density} : (Medium){.density = medium.outer};
-    if (reflects) add_path(tree, &reflected, hit.object, reflected_weight, medium, bounces_left - 1);
-    if (refracts) add_path(tree, &refracted, hit.object, refracted_weight, behind, bounces_left - 1);
+    if (reflects) {
+        reflected.ray.direction = surface_reflect(surface, direction, &tree->margin);
+        add_path(tree, &reflected, bounces_left - 1);
+    }
+    if (!refracts) return;
+    refracted.medium = surface->entering ? (Medium){material->absorption, path->medium.density}
+                                         : (Medium){.density = path->medium.outer};
+    add_path(tree, &refracted, bounces_left - 1);
+}
+
+// Adds the light that comes along a ray from its nearest surface, lit and then reflecting and refracting.
+static void add_path(PathTree *tree, const PathRay *path, unsigned bounces_left)
+{
+    ReferenceHit hit = path_hit(tree->world, path);
+    if (!hit.found) {
+        add_background(tree, path, hit.margin);
+        return;
+    }
+    const ShadedPoint surface = surface_at(tree->world, &path->ray, &hit, tree->blur, &tree->random);
+    PathRay arriving = *path;
+    // a surface that is reached from within defines the medium
+    if (surface.material->transmission > 0 && !surface.entering)
+        arriving.medium.density = surface.material->absorption;
+    arriving.weight = weight_left(path->weight, arriving.medium.density, (double)surface.scale);
+    add_surface(tree, &surface, arriving.weight, hit.margin);
+    if (bounces_left == 0)
+        signature_add(tree, surface.index, 0);
+    else
+        add_bounces(tree, &arriving, &surface, bounces_left);
 }
 
 bool reference_is_uncertain(const ReferencePixel *pixel)
@@ -500,10 +482,10 @@ ReferencePixel reference_pixel(const ReferenceScene *scene, const ReferenceRay *
                      .signature = PATH_START,
                      .margin = INFINITY};
     tree.shadows = shadows;
-    ReferenceRay first = *ray;
+    PathRay first = {.ray = *ray, .left = UINT32_MAX, .weight = vector_all(1)};
     Quad3 turn = random_offset(&tree.random, path->blur * (double)quad3_length(ray->direction));
-    first.direction = quad3_add(first.direction, turn);
-    add_path(&tree, &first, UINT32_MAX, vector_all(1), (Medium){0}, path->bounce_count);
+    first.ray.direction = quad3_add(first.ray.direction, turn);
+    add_path(&tree, &first, path->bounce_count);
     const double size = vector_length(quad3_rounded(ray->origin)) + tree.distance;
     return (ReferencePixel){.object = tree.object,
                             .path = tree.signature,

@@ -5,11 +5,6 @@
 #include "host/verify/reference_scene.h"
 #include <stdbool.h>
 
-// Returns the ray through the center of a pixel, exactly that of the camera's vectors in double. Row 0 is at
-// the top (docs/scene-format.md).
-ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
-                                  unsigned row);
-
 typedef struct {
     Color color;
     double margin; // the least of the eye's ray, the shadow rays and a checker's edges

@@ -1,6 +1,7 @@
 #include "host/verify/reference_scene.h"
 
 #include "host/base/memory.h"
+#include "host/compile/camera_basis.h"
 #include "host/scene/mesh.h"
 #include <math.h>
 #include <stdlib.h>
@@ -95,4 +96,25 @@ ReferenceHit reference_scene_hit(const ReferenceScene *scene, const ReferenceRay
     for (size_t i = 0; i < scene->scene.objects.count; i++)
         reference_hit_record(&nearest, reference_scene_hit_object(scene, i, ray, left), (uint32_t)i, ray);
     return nearest;
+}
+
+ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
+                                  unsigned row)
+{
+    const CameraBasis basis = camera_basis(camera, width, height);
+    const Quad x = (Quad)2 * column + 1 - width, y = height - 1 - (Quad)2 * row;
+    if (camera->projection == PROJECTION_EQUIRECTANGULAR) {
+        const Quad half_turn = QUAD_CALL(acos)(-1), longitude = half_turn * x / width,
+                   latitude = half_turn / 2 * y / height;
+        const Quad3 right = quad3(vector_normalize(basis.right)), up = quad3(vector_normalize(basis.up));
+        const Quad3 level = quad3_add(quad3_scale(quad3(basis.forward), QUAD_CALL(cos)(longitude)),
+                                      quad3_scale(right, QUAD_CALL(sin)(longitude)));
+        return (ReferenceRay){quad3(camera->position),
+                              quad3_add(quad3_scale(level, QUAD_CALL(cos)(latitude)),
+                                        quad3_scale(up, QUAD_CALL(sin)(latitude))),
+                              0, (Quad)FLT_MAX};
+    }
+    const Quad3 sideways = quad3_add(quad3_scale(quad3(basis.right), x), quad3_scale(quad3(basis.up), y));
+    const Quad3 direction = quad3_add(quad3(basis.middle), sideways);
+    return (ReferenceRay){quad3(camera->position), direction, 0, (Quad)FLT_MAX};
 }

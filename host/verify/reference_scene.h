@@ -21,3 +21,8 @@ ReferenceHit reference_scene_hit_object(const ReferenceScene *scene, size_t inde
                                         uint32_t left);
 // Returns the nearest hit of all objects.
 ReferenceHit reference_scene_hit(const ReferenceScene *scene, const ReferenceRay *ray, uint32_t left);
+
+// Returns the ray through the center of a pixel, exactly that of the camera's vectors in double. Row 0 is at
+// the top (docs/scene-format.md).
+ReferenceRay reference_camera_ray(const Camera *camera, unsigned width, unsigned height, unsigned column,
+                                  unsigned row);
