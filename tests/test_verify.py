@@ -64,6 +64,24 @@ class VerifyTestCase(TestCase):
         return [case["hash"] for case in self.verify(cases, arguments)["cases"]]
 
 
+class Documentation(unittest.TestCase):
+    def cases_with(self, requirement):
+        """Returns the cases with rays for which host/verify/ray_cases.c has this text, in its order."""
+        table = read(ROOT / "host/verify/ray_cases.c").partition("verify_rays[] = {")[2]
+        rows = re.split(r'\{"(?=[A-Z][1-9]")', " ".join(table.split()))
+        return ", ".join(dict.fromkeys(row[:2] for row in rows if requirement in row))
+
+    def test_requirements_of_rays_are_documented(self):
+        page = " ".join(read(ROOT / "docs/verify.md").split())
+        decided, always, exact, four, *others = map(self.cases_with, ('s = "BCD"', 's = "ABCD"', "EXACTLY, EXACTLY", "ULPS(4, 4, 4)",
+                                                                      ".ulps", ".within"))
+        self.assertIn(f"at B, C and D for the rays of {decided}, and at every tier for those of {always}. "
+                      f"t is exact in {exact}, and within 4 ulp in {four}. ", page)
+        for case in ", ".join(others).split(", ") + ["S4", "S5"]:  # which have limits by ray
+            self.assertTrue(case in exact or re.search(rf"- {case}: (?:(?! - ).)*\bt is within", page), case)
+        self.assertLessEqual(set(re.findall(r"\b[A-Z][1-9]\b", page.partition("## The cases")[2])), set(ALL_CASES))
+
+
 class Verify(VerifyTestCase):
     def test_cases_pass(self):
         self.assertGreater(len(ALL_CASES), 40)
