@@ -27,7 +27,7 @@ typedef struct {
 typedef struct {
     double ulps;  // of t
     double slack; // of t, over the cosine; in u S, or in u size where the forms are compensated
-    double band;  // of a margin within which hit or miss is open; in the same
+    double band;  // of a margin within which hit or miss is open; in the same; a triangle's is TRIANGLE_BAND
     double turn;  // of the normal, in u S over cosine and radius of curvature
     bool compensated;
 } Tolerance;
@@ -83,6 +83,11 @@ static double moved_beyond(const Object *object, const ReferenceHit *hit, Vector
     return cone_moved_by_power(object, point, (double)hit->curvature_radius, u);
 }
 
+static bool is_triangle(const Scene *scene, uint32_t object)
+{
+    return object != UINT32_MAX && scene->objects.items[object].type == SHAPE_TRIANGLE;
+}
+
 static void compare(const Trial *trial, size_t index, const TraceHit *hit, const Scene *scene,
                     bool has_eye_powers, Precision precision, Tally *tally)
 {
@@ -98,6 +103,8 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
     double scale = u * (tolerance->compensated ? trial->radius : distance);
     // Flat shapes have no compensated edges.
     double band = fmax(tolerance->band * scale, 4 * u * distance);
+    if (is_triangle(scene, expected->object) || is_triangle(scene, hit->object))
+        band = TRIANGLE_BAND * u * distance;
     if (expected->margin <= band) return;
 
     tally->compared++;

@@ -44,7 +44,8 @@ static bool is_open(const VerifyRun *run, const VerifyTarget *target, const Refe
 {
     const double u = verify_roundoff(run);
     if (run->tier == TIER_A) return true;
-    if (target->object.type == SHAPE_TRIANGLE) return exact->margin <= 16 * u * target->distance;
+    if (target->object.type == SHAPE_TRIANGLE)
+        return exact->margin <= TRIANGLE_BAND * u * (target->distance + target->bounding_radius);
     if (run->tier == TIER_B) return exact->margin <= 4 * u * fmax(target->distance, target->feature_radius);
     return exact->margin <= 16 * u * target->feature_radius;
 }

@@ -73,6 +73,10 @@ typedef struct {
     ReferenceSheet sheets[6];
 } ReferenceSurface;
 
+// The margin within which a ray may hit or miss a triangle, in u times the distance of the farthest vertex:
+// twice the 8 u by which an edge moves across the ray (docs/numerics.md).
+enum { TRIANGLE_BAND = 16 };
+
 ReferenceSurface reference_surface(const Object *object, Quad3 point);
 Quad reference_surface_distance(const ReferenceSurface *surface); // to its nearest sheet
 

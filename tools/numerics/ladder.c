@@ -137,8 +137,8 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     // a plane may be hit far beyond the reach
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
     double scale = u * (tier->of_size ? shape->radius : distance);
-    // flat shapes have no compensated edges; a triangle's are undecided below 16 u of edge and distance
-    double flat = shape->object.type == SHAPE_TRIANGLE ? 16 : 4;
+    // flat shapes have no compensated edges
+    double flat = shape->object.type == SHAPE_TRIANGLE ? TRIANGLE_BAND : 4;
     bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
 
     tally->compared++;
