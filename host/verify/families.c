@@ -56,14 +56,12 @@ Vector3 random_unit(unsigned seed, uint64_t index, unsigned first_dimension)
     return unit(random_in_cube(seed, index, first_dimension));
 }
 
-// a x + b y + c z + d
-static Vector3 combine(double a, Vector3 x, double b, Vector3 y, double c, Vector3 z, Vector3 d)
+// Returns a x + b y + from.
+static Vector3 combine(double a, Vector3 x, double b, Vector3 y, Vector3 from)
 {
-    return (Vector3){a * x.x + b * y.x + c * z.x + d.x, a * x.y + b * y.y + c * z.y + d.y,
-                     a * x.z + b * y.z + c * z.z + d.z};
+    return vector_add(vector_add(vector_scale(x, a), vector_scale(y, b)), from);
 }
 
-static const Vector3 nowhere;
 const Vector3 sliver_corners[3] = {{1, 2, 3}, {8.5, 5.7, -4.5}, {7.5, 5.8, -3.6}};
 
 static TraceRay ray_along(Vector3 origin, Vector3 direction)
@@ -100,8 +98,8 @@ TraceRay family_disc_rim(uint64_t i)
     double radius = 2 * (1 + side * steps * 0x1p-22);
     double c, s;
     on_circle(random_at(3, i, 5), &c, &s);
-    Vector3 target = combine(radius * c, e, radius * s, f, 0, nowhere, center);
-    return ray_toward(combine(distances[i % 3], away, 0, nowhere, 0, nowhere, center), target);
+    Vector3 target = combine(radius * c, e, radius * s, f, center);
+    return ray_toward(vector_add(vector_scale(away, distances[i % 3]), center), target);
 }
 
 // Aims at a point on an edge, a corner and a point in a face of the room, in turn.
@@ -127,11 +125,11 @@ TraceRay family_cylinder_rim(uint64_t i)
     double c, s;
     on_circle(random_at(14, i, 1), &c, &s);
     double radius = 1 - inset;
-    Vector3 target = combine(radius * c, e, radius * s, f, height, axis, base);
-    Vector3 inner = combine(1, axis, 0, nowhere, 0, nowhere, base);
+    Vector3 target = vector_add(combine(radius * c, e, radius * s, f, vector_scale(axis, height)), base);
+    Vector3 inner = vector_add(axis, base);
     if (!outside) return ray_toward(inner, target);
     Vector3 away = random_unit(14, i, 2);
-    return ray_toward(combine(5, away, 0, nowhere, 0, nowhere, inner), target);
+    return ray_toward(vector_add(vector_scale(away, 5), inner), target);
 }
 
 TraceRay family_along_torus_axis(uint64_t i)
@@ -155,9 +153,9 @@ TraceRay family_beside_sliver(uint64_t i)
     double c, s;
     on_circle(random_at(34, i, 0), &c, &s);
     const double grazing = 0.009076; // the tangent of 0.52 degrees
-    Vector3 direction = unit(combine(c, e, s, f, grazing, n, nowhere));
-    Vector3 target = combine(random_at(34, i, 1), ab, 0.3 * random_symmetric(34, i, 2), ac, 0, nowhere, a);
-    return ray_along(combine(-100, direction, 0, nowhere, 0, nowhere, target), direction);
+    Vector3 direction = unit(combine(c, e, s, f, vector_scale(n, grazing)));
+    Vector3 target = combine(random_at(34, i, 1), ab, 0.3 * random_symmetric(34, i, 2), ac, a);
+    return ray_along(vector_add(vector_scale(direction, -100), target), direction);
 }
 
 Scene scene_empty(void)
@@ -270,8 +268,7 @@ TraceRay family_from_within(uint64_t i)
     double u = 0, v = 0;
     if (i % 5 < 2 || i % 5 == 4) u = random_at(31, i, 3);
     if (i % 5 == 4) v = (1 - u) * random_at(31, i, 4);
-    Vector3 target = combine(u, vector_subtract(b, a), v, vector_subtract(c, a), 0, nowhere, a);
-    return ray_toward(origin, target);
+    return ray_toward(origin, combine(u, vector_subtract(b, a), v, vector_subtract(c, a), a));
 }
 
 void scene_far_sphere(Scene *scene)

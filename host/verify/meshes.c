@@ -68,10 +68,7 @@ void verify_within_triangle(VerifyRun *run)
     enum { COUNT = 100000 };
     TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
     TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
-    for (uint64_t i = 0; i < COUNT; i++) {
-        rays[i] = family_beside_sliver(i);
-        verify_round_ray(run, &rays[i]);
-    }
+    verify_family(run, family_beside_sliver, 0, COUNT, rays);
     Scene scene = scene_empty();
     scene_add_triangle(&scene, sliver_corners);
     verify_trace(run, &scene, false, rays, COUNT, hits);
@@ -220,17 +217,15 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
         if (i % 4 == 1) {
             double parts[] = {0, 0, 0};
             parts[i / 4 % 3] = i / 16 % 2 ? 1 : -1;
-            direction = (Vector3){parts[0], parts[1], parts[2]};
+            direction = verify_vector(parts);
             origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
         }
         if (i % 4 == 2 && i / 4 % 2)
             origin = m6_point_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);
         if (i % 4 == 2) direction = vector_subtract(corner, origin);
         if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
-            const TraceHit *hit = &reflected[i - first - 3];
-            origin = (Vector3){hit->reflected_origin[0], hit->reflected_origin[1], hit->reflected_origin[2]};
-            direction = (Vector3){hit->reflected_direction[0], hit->reflected_direction[1],
-                                  hit->reflected_direction[2]};
+            origin = verify_vector(reflected[i - first - 3].reflected_origin);
+            direction = verify_vector(reflected[i - first - 3].reflected_direction);
         }
         rays[i - first] = verify_ray(run, origin, direction);
     }

@@ -15,8 +15,8 @@ static void angles_make(const VerifyRun *run, TraceRay *rays)
     for (int i = 0; i < ANGLES; i++) {
         int j = i - 2 * AROUND;
         double sine = j <= 0 ? 2.0 / 3 + (i - AROUND) * 0x1p-24 : 1 - ldexp(1, -j);
-        rays[i] = (TraceRay){{0, 0, -1}, {sine, 0, sqrt((1 - sine) * (1 + sine))}, 0, INFINITY};
-        verify_round_ray(run, &rays[i]);
+        const Vector3 direction = {sine, 0, sqrt((1 - sine) * (1 + sine))};
+        rays[i] = verify_ray(run, (Vector3){0, 0, -1}, direction);
     }
 }
 

@@ -159,10 +159,8 @@ void verify_tangent_circle(VerifyRun *run)
     if (run->tier == TIER_A) return;
     TraceRay rays[COUNT];
     TraceHit hits[COUNT];
-    for (size_t i = 0; i < COUNT; i++) {
-        rays[i] = (TraceRay){{-5, 0, heights[i]}, {1, 0, 0}, 0, INFINITY};
-        verify_round_ray(run, &rays[i]);
-    }
+    for (size_t i = 0; i < COUNT; i++)
+        rays[i] = verify_ray(run, (Vector3){-5, 0, heights[i]}, (Vector3){1, 0, 0});
     Scene scene = torus_scene(0.25);
     verify_trace(run, &scene, false, rays, COUNT, hits);
     for (size_t i = 0; i < COUNT; i++) {

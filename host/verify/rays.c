@@ -53,14 +53,22 @@ static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const Veri
     }
 }
 
+void verify_family(const VerifyRun *run, RayFamily family, uint64_t first, size_t count, TraceRay *rays)
+{
+    for (size_t i = 0; i < count; i++) {
+        rays[i] = family(first + i);
+        verify_round_ray(run, &rays[i]);
+    }
+}
+
 VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set)
 {
     VerifyTestRays tests = {0};
     for (size_t i = 0; set->rays && i < set->ray_count; i++)
         test_ray_add(&tests, run, set, &set->rays[i]);
     for (size_t i = 0; set->family && i < set->checked_count; i++) {
-        VerifyTestRay item = {set->family(i), {.decided_tiers = set->decided_tiers, .limits = set->limits}};
-        verify_round_ray(run, &item.ray);
+        VerifyTestRay item = {.required = {.decided_tiers = set->decided_tiers, .limits = set->limits}};
+        verify_family(run, set->family, i, 1, &item.ray);
         array_push(tests, item);
     }
     return tests;
@@ -105,10 +113,7 @@ static void run_family(VerifyRun *run, const VerifyRays *set, const Scene *scene
     const size_t ray_count = verify_part(run, set->ray_count);
     for (size_t first = 0; first < ray_count; first += BATCH) {
         size_t count = ray_count - first < BATCH ? ray_count - first : BATCH;
-        for (size_t i = 0; i < count; i++) {
-            rays[i] = set->family(first + i);
-            verify_round_ray(run, &rays[i]);
-        }
+        verify_family(run, set->family, first, count, rays);
         verify_trace_opened(run, opened, rays, count, hits);
         for (size_t i = 0; i < count; i++) {
             run->result->leaks += set->closed && !verify_is_hit(&hits[i]);

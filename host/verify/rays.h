@@ -53,5 +53,7 @@ typedef ARRAY_OF(VerifyTestRay) VerifyTestRays;
 Scene verify_rays_scene(const VerifyRays *set);
 // Returns the rays of a set that have exact answers, at the precision at work. The caller frees the items.
 VerifyTestRays verify_test_rays(const VerifyRun *run, const VerifyRays *set);
+// Sets rays `first` to `first` + `count` - 1 of a family, rounded to the precision at work.
+void verify_family(const VerifyRun *run, RayFamily family, uint64_t first, size_t count, TraceRay *rays);
 // Traces a set of rays and checks their hits.
 void verify_rays_run(VerifyRun *run, const VerifyRays *set);

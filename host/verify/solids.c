@@ -133,10 +133,7 @@ void verify_points_on_faces(VerifyRun *run)
     if (run->tier == TIER_A) return;
     TraceRay *rays = memory_allocate(COUNT, sizeof *rays);
     TraceHit *hits = memory_allocate(COUNT, sizeof *hits);
-    for (uint64_t i = 0; i < COUNT; i++) {
-        rays[i] = family_in_room(i);
-        verify_round_ray(run, &rays[i]);
-    }
+    verify_family(run, family_in_room, 0, COUNT, rays);
     Scene scene = verify_scene("objects:\n  - box: {min: [-1, -1, -1], max: [1, 1, 1]}\n");
     verify_trace(run, &scene, false, rays, COUNT, hits);
     scene_free(&scene);
