@@ -11,10 +11,9 @@
 // the last, by the rule in kernels/types.h.
 static uint32_t passed_path(const uint32_t *objects, size_t count)
 {
-    const uint32_t events = 8, refracted = 2;
-    uint32_t path = 0x811c9dc5u;
+    uint32_t path = PATH_START;
     for (size_t i = 0; i < count; i++)
-        path = (path ^ ((objects[i] + 1) * events + (i + 1 < count ? refracted : 0))) * 0x01000193u;
+        path = (path ^ ((objects[i] + 1) * PATH_EVENTS + (i + 1 < count ? PATH_REFRACTED : 0))) * PATH_FACTOR;
     return path;
 }
 
@@ -97,9 +96,7 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     for (uint64_t i = 0; i < COUNT; i++) {
         Vector3 from = vector_scale(random_unit(seed, i, 0), 4);
         Vector3 at = vector_scale(random_unit(seed, i, 3), random_at(seed, i, 6));
-        Vector3 d = vector_normalize(vector_subtract(at, from));
-        rays[i] = (TraceRay){{from.x, from.y, from.z}, {d.x, d.y, d.z}, 0, INFINITY};
-        verify_round_ray(run, &rays[i]);
+        rays[i] = verify_ray(run, from, vector_normalize(vector_subtract(at, from)));
     }
     Scene scene = matched_scene(object);
     scene.objects.items[0].as.plane.point.z = 1e6; // out of the way
@@ -107,12 +104,9 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     verify_trace_opened(run, opened, rays, COUNT, first);
     for (size_t i = 0; i < COUNT; i++) {
         inner[i] = rays[i];
-        if (first[i].object != 1) continue;
-        for (size_t axis = 0; axis < 3; axis++) {
-            inner[i].origin[axis] = first[i].refracted_origin[axis];
-            inner[i].direction[axis] = first[i].refracted_direction[axis];
-        }
-        verify_round_ray(run, &inner[i]);
+        if (first[i].object == 1)
+            inner[i] = verify_ray(run, verify_vector(first[i].refracted_origin),
+                                  verify_vector(first[i].refracted_direction));
     }
     verify_trace_opened(run, opened, inner, COUNT, second);
     renderer_close(opened);
