@@ -1,13 +1,13 @@
 # make [BUILD=folder] [WERROR=1]: CC, CPPFLAGS, CFLAGS, LDFLAGS and PKG_CONFIG belong to the user, and a variant is another
-# BUILD folder. One whose name ends in -sanitize is built with ASan and UBSan, at -O1 and with line numbers alone in the debug
-# information, which takes half the time.
+# BUILD folder. One whose name ends in -sanitize is built with ASan and UBSan, at -O1, which takes half the time. The debug
+# information has line numbers alone, which saves a sixth of a build's time.
 VERSION := 0.2.0
 MAKEFLAGS += --no-builtin-rules
 
 BUILD  ?= build
 # The tests' own objects are built alike in every folder.
 ifeq ($(origin CFLAGS),undefined)
-CFLAGS := $(if $(filter %-sanitize,$(BUILD)),-O1 -g1,-O2 -g)
+CFLAGS := $(if $(filter %-sanitize,$(BUILD)),-O1,-O2) -g1
 $(BUILD)/tests/%.o: private CFLAGS := -O1 -g1
 endif
 PKG_CONFIG ?= pkg-config
