@@ -22,9 +22,10 @@ static void *range_run(void *index_range)
 void parallel_run(size_t count, size_t grain_size, void (*work)(void *context, size_t begin, size_t end),
                   void *context)
 {
-    const long cores = sysconf(_SC_NPROCESSORS_ONLN);
+    const size_t most = count / grain_size;
+    const long cores = most > 1 ? sysconf(_SC_NPROCESSORS_ONLN) : 1; // sysconf reads a file
     size_t range_count = cores < 1 ? 1 : cores > THREADS_MAX ? THREADS_MAX : (size_t)cores;
-    if (range_count > count / grain_size) range_count = count < grain_size ? 1 : count / grain_size;
+    if (most > 0 && range_count > most) range_count = most;
     IndexRange ranges[THREADS_MAX];
     size_t started = 0, begin = 0;
     while (started + 1 < range_count) {

@@ -64,7 +64,6 @@ int command_cache(int argument_count, char **arguments)
               stderr);
         return EXIT_USER;
     }
-    status = EXIT_DONE;
     if (options.clears) {
         MessageList messages = {0};
         status = cache_clear(&messages) ? EXIT_DONE : EXIT_USER;

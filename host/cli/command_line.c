@@ -5,6 +5,7 @@
 #include "host/base/text.h"
 #include "host/image/image.h"
 #include "host/scene/scene.h"
+#include <assert.h>
 #include <dirent.h>
 #include <errno.h>
 #include <getopt.h>
@@ -331,6 +332,7 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
         size_t i = 0;
         while (long_options[i].val != code)
             i++;
+        assert(i < count); // getopt_long returns the listed codes
         if (!listed[i].option->read(listed[i].option, optarg, listed[i].fields)) return EXIT_USER;
         listed[i].is_given = true;
     }
