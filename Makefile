@@ -209,13 +209,13 @@ endif
 $(BUILD)/fuzz: $(fuzz_objects)
 	$(CC) $(OURS) $(CFLAGS) -fsanitize=fuzzer $(LDFLAGS) $^ $(LIBS) -o $@
 
-# What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/features SCENE.
-features: $(BUILD)/tools/features
+# What each feature of the kernel costs a scene without it (docs/performance.md): build/tools/measure/features SCENE.
+features: $(BUILD)/tools/measure/features
 
-# The kernel's text, for tools/gpu-resources and tools/spirv-form.
-kernel_text: $(BUILD)/tools/kernel_text
+# The kernel's text, for tools/kernels/gpu-resources and tools/kernels/spirv-form.
+kernel_text: $(BUILD)/tools/kernels/kernel_text
 
-$(BUILD)/tools/features $(BUILD)/tools/kernel_text: %: %.o $(library)
+$(BUILD)/tools/measure/features $(BUILD)/tools/kernels/kernel_text: %: %.o $(library)
 	$(CC) $(OURS) $(CFLAGS) $(LDFLAGS) $^ $(LIBS) -o $@
 
 # These two change only when what they hold does, and what depends on it is then built anew.
@@ -276,7 +276,7 @@ CPPCHECK     ?= cppcheck
 LINT_JOBS    ?= $(shell nproc)
 LINT_FAST    ?= # 1 omits clang's static analyzer and cppcheck, which take most of the time
 for_embree := $(embree_sources) tools/peers/hard-cases.c
-linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/features.c tools/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
+linted := $(sources) $(test_programs) $(test_helpers) $(failing) tools/measure/features.c tools/kernels/kernel_text.c tools/numerics/ladder.c tools/chaos.c tests/fuzz/readers.c \
           $(if $(has_embree),$(for_embree)) $(if $(mpi_flags),$(wildcard host/mpi/*.c))
 
 formatted := $(linted) $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h tools/numerics/*.h host/*/*.h host/*/*/*.h tests/*.h \
@@ -312,7 +312,7 @@ worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
           $(filter-out kernels/shading/path.h kernels/shading/phong.h,\
                        $(wildcard kernels/*.h kernels/*.cl kernels/numerics/*.h kernels/shading/*.h kernels/shapes/*.h)) \
           $(filter-out tests/lint_words.sh,$(wildcard $(foreach folder,tests tests/*,$(folder)/*.[ch] $(folder)/*.py $(folder)/*.sh)) tests/support.bash) \
-          $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/numerics/* tools/peers/* tools/peers/embree/*))
+          $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/kernels/* tools/measure/* tools/numerics/* tools/peers/* tools/peers/embree/*))
 
 lint-words:
 	@tools/lint-words $(worded)
@@ -400,4 +400,4 @@ clean:
 .PHONY: all mpi fuzz tests test ladder features kernel_text bench-peers bench-growth format lint lint-format lint-tidy lint-cppcheck lint-man docs-measurements library wheel install install-library uninstall clean FORCE
 .SECONDARY:
 .DELETE_ON_ERROR:
--include $(objects:.o=.d) $(window_objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,features.d kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)
+-include $(objects:.o=.d) $(window_objects:.o=.d) $(BUILD)/tests/fuzz/readers.d $(mpi_objects:.o=.d) $(addprefix $(BUILD)/tools/,measure/features.d kernels/kernel_text.d numerics/ladder.d) $(tests:=.d) $(test_objects:.o=.d) $(failing_objects:.o=.d)

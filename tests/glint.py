@@ -124,11 +124,11 @@ def broken_at_single():
 
 
 def need_clang(tool):
-    """Builds what one of tools/ needs to compile kernels by clang. Returns the version of clang. Skips the whole test if
+    """Builds what one of tools/kernels/ needs to compile kernels by clang. Returns the version of clang. Skips the whole test if
     clang is missing, and for a sanitized build, which has the same kernels as the plain one."""
     if IS_SANITIZED:
         skip_all("the plain build's kernels are the same")
-    process = subprocess.run([ROOT / "tools" / tool, "--clang"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    process = subprocess.run([ROOT / "tools/kernels" / tool, "--clang"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if process.returncode == 77:
         skip_all(process.stdout)
     build = os.environ.get("BUILD", PROGRAM.parent)

@@ -16,7 +16,7 @@ for document in "${documents[@]}"; do
     done
 done
 
-check "docs/measurements/README.md shows what is simulated" tools/scaling --check --ranks 10,100
+check "docs/measurements/README.md shows what is simulated" tools/measure/scaling --check --ranks 10,100
 
 # Changed figures are written, as they would be by a new measurement.
 sed -i 's/"median": [0-9.e+-]*/"median": 12345.678/' "$scratch/docs/measurements/accuracy.json"

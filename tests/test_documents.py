@@ -192,7 +192,7 @@ def perturbed_others():
 
 
 def scaling_cell(image, ranks):
-    """Returns the value in the table that tools/scaling --check tests."""
+    """Returns the value in the table that tools/measure/scaling --check tests."""
     row = next(line for line in read(ROOT / "docs/measurements/README.md").splitlines() if line.startswith(f"| {image} | {ranks} |"))
     return float(row.split("|")[3])
 

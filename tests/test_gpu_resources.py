@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Checks that kernels compiled for GPUs without one (tools/gpu-resources) need no more private memory than the scene's pending
+"""Checks that kernels compiled for GPUs without one (tools/kernels/gpu-resources) need no more private memory than the scene's pending
 children and bounces, and spill nothing."""
 import json
 import subprocess
@@ -14,7 +14,7 @@ SCENES = list(MOST_STACK) if glint.IS_LONG else ["bunny"]
 
 class GpuResources(glint.TestCase):
     def test_single_precision_stays_within_its_bounds(self):
-        command = [glint.ROOT / "tools/gpu-resources", "--json", *SCENES]
+        command = [glint.ROOT / "tools/kernels/gpu-resources", "--json", *SCENES]
         rows = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
         self.assertEqual([row["scene"] for row in rows], SCENES)
         for row in rows:

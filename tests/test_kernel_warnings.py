@@ -7,7 +7,7 @@ import sys
 
 import glint
 
-sys.path.insert(0, str(glint.ROOT / "tools"))
+sys.path.insert(0, str(glint.ROOT / "tools/kernels"))
 import kernel_clang  # noqa: E402
 
 KERNELS = ["render", "aov", "path", "coverage", "trace"] if glint.IS_LONG else ["render"]

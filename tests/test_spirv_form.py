@@ -1,5 +1,5 @@
 #!/usr/bin/env -S python3 -B
-"""Checks that the kernels' SPIR-V has the form that drivers for Vulkan need, and that tools/spirv-form names the place of each
+"""Checks that the kernels' SPIR-V has the form that drivers for Vulkan need, and that tools/kernels/spirv-form names the place of each
 fault."""
 import subprocess
 
@@ -81,7 +81,7 @@ kernel void sound(global int *a, global int *b, uint n)
 
 class SpirvForm(glint.TestCase):
     def form(self, *arguments):
-        command = [glint.ROOT / "tools/spirv-form", *arguments]
+        command = [glint.ROOT / "tools/kernels/spirv-form", *arguments]
         return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def check(self, text, fault):

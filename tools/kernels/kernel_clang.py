@@ -1,4 +1,4 @@
-"""Compiles the kernels with clang for one ray per work-item, for tools/gpu-resources and tools/spirv-form."""
+"""Compiles the kernels with clang for one ray per work-item, for tools/kernels/gpu-resources and tools/kernels/spirv-form."""
 import functools
 import os
 import shutil
@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("BUILD", ROOT / "build"))
 OLDEST_CLANG, NEWEST_CLANG = 15, 40
 FIRST_FILE = '#line 1 "render.cl"'  # follows the scene's definitions
@@ -42,7 +42,7 @@ def clang(version, source, output, *options):
 
 @functools.lru_cache(maxsize=None)
 def scene_definitions(path, precision):
-    text = run(BUILD / "tools/kernel_text", path, precision)
+    text = run(BUILD / "tools/kernels/kernel_text", path, precision)
     return text[:text.index(FIRST_FILE)]
 
 
