@@ -366,7 +366,7 @@ static void threads_write_what_one_does(void **state)
 {
     const bool is_double = *(const bool *)*state;
     enum { COUNT = 2 * FLAT_RANGE_MIN + 1, PART = 331 };
-    _Static_assert(COUNT % PART == 0 && PART < FLAT_RANGE_MIN, "equal parts, each for one thread");
+    _Static_assert(COUNT % PART == 0 && (int)PART < (int)FLAT_RANGE_MIN, "equal parts, each for one thread");
     FlatLayout layouts[FLAT_COUNT];
     layouts_of_host(layouts, true);
     for (size_t type = 0; type < FLAT_COUNT; type++) {
