@@ -309,8 +309,7 @@ lint-man:
 # What is free of the wording that tools/lint-words finds.
 worded := $(wildcard *.md docs/*.md docs/measurements/*.md docs/*.[15] \
           $(foreach room,base cli compile image import measure mpi opencl render scene verify view,host/$(room)/*.[ch] host/$(room)/*/*.[ch])) \
-          $(filter-out kernels/shading/path.h kernels/shading/phong.h,\
-                       $(wildcard kernels/*.h kernels/*.cl kernels/numerics/*.h kernels/shading/*.h kernels/shapes/*.h)) \
+          $(wildcard kernels/*.h kernels/*.cl kernels/*/*.h) \
           $(filter-out tests/lint_words.sh,$(wildcard $(foreach folder,tests tests/*,$(folder)/*.[ch] $(folder)/*.py $(folder)/*.sh)) tests/support.bash) \
           $(filter-out %.desktop %.svg %.xml,$(wildcard tools/* tools/kernels/* tools/measure/* tools/numerics/* tools/peers/* tools/peers/embree/*))
 

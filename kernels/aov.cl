@@ -1,7 +1,7 @@
 // Fills the AOVs at each pixel's center.
 #include "aovs.h"
 #include "film.h"
-#include "shading/phong.h"
+#include "shading/light_visibility.h"
 
 // Returns the distance of a hit, or infinity on a miss. Infinity is made from its bits, since
 // -cl-finite-math-only (--build-options) assumes that it does not occur.

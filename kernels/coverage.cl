@@ -1,7 +1,7 @@
 // Computes the fraction of each pixel that objects cover, and the background's light in the remainder.
 #include "aovs.h"
 #include "film.h"
-#include "shading/texture.h"
+#include "shading/sky.h"
 #include "traversal/traversal.h"
 
 static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, global const scalar *offsets,
@@ -23,9 +23,7 @@ static OUT_OF_LINE void tile_coverage(const Scene *scene, const Tile *tile, glob
         compensated_add(&light, &lost, vector_select(found, black, seen));
     }
     film_store(coverage, tile, 1, 0, real_divide(covered, divisor));
-    film_store_color(backdrop, tile,
-                     (Vector){real_divide(light.x, divisor), real_divide(light.y, divisor),
-                              real_divide(light.z, divisor)});
+    film_store_color(backdrop, tile, color_divide(light, divisor));
 }
 
 kernel void coverage(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffsets layers,

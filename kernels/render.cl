@@ -49,8 +49,7 @@ static OUT_OF_LINE void tiles_render(const Scene *scene, const Band *band, uint 
     if (last_sample < count) film_store_tiles(compensation, tiles, lost);
     for (uint i = 0; i < PACKETS && count > 1 && last_sample == count; i++) {
         real divisor = (real)((scalar)count);
-        sums[i] = (Color3){real_divide(sums[i].x, divisor), real_divide(sums[i].y, divisor),
-                           real_divide(sums[i].z, divisor)};
+        sums[i] = color_divide(sums[i], divisor);
     }
     film_store_tiles(film, tiles, sums);
     for (uint i = 0; i < PACKETS && IS_PIXEL_LIST && band_film && last_sample == count; i++)

@@ -64,9 +64,9 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
     result[RESULT_UNCERTAIN].all =
         IS_CERTIFIED ? lanes_select(hit.uncertain, (real)(1), (real)(0)) : (real)(0);
 #if TRACES_BOUNCES
-    const Color3 white = {(real)(1), (real)(1), (real)(1)}, black = {(real)(0), (real)(0), (real)(0)};
-    Bounce reflected = {origin, direction, black}, refracted = reflected;
-    surface_bounce(&surface, vector_normalize(direction), white, true, &reflected, &refracted);
+    Bounces bounces = bounces_none(&ray, 1);
+    surface_bounce(&surface, vector_normalize(direction), color_gray((real)(1)), true, &bounces);
+    const Bounce reflected = bounces.reflected, refracted = bounces.refracted;
     vector_store(reflected.origin, result + RESULT_REFLECTED_ORIGIN);
     vector_store(reflected.direction, result + RESULT_REFLECTED_DIRECTION);
     vector_store(refracted.origin, result + RESULT_REFRACTED_ORIGIN);

@@ -262,8 +262,8 @@ typedef struct {
 // The enlargement of cull spheres in units of roundoff, relative to |v|^2 and to the ray's direction squared.
 enum { CULL_SPHERE_SLACK = 256, CULL_DIRECTION_SLACK = 128 };
 // At `certified` the exact shadow ray may be off by SHADOW_ERROR_MAX u of the distance
-// (kernels/shading/phong.h), and near misses count. So the lights' spheres, whose radius is below |v|, are
-// also enlarged by that.
+// (kernels/shading/certain_light.h), and near misses count. So the lights' spheres, whose radius is below
+// |v|, are also enlarged by that.
 enum { CERTIFIED_CULL_SPHERE_SLACK = 1 << 10, CERTIFIED_CULL_DIRECTION_SLACK = 1 << 10 };
 
 enum { COMMON_ORIGIN_NONE, COMMON_ORIGIN_EYE, COMMON_ORIGIN_FIRST_LIGHT };

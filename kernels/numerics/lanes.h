@@ -307,6 +307,12 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
+// Replaces a value in some lanes.
+static inline void real_replace(real *value, mask where, real other)
+{
+    *value = lanes_select(where, other, *value);
+}
+
 // Holds eight vectors in `all`, which lane_minima_reduce replaces by the smallest lane of each in `each`.
 enum { MINIMA_COUNT = 8 };
 typedef union {

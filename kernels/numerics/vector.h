@@ -46,6 +46,12 @@ static inline Vector vector_select(mask condition, Vector yes, Vector no)
                     lanes_select(condition, yes.z, no.z)};
 }
 
+// Replaces a vector in some lanes.
+static inline void vector_replace(Vector *vector, mask where, Vector other)
+{
+    *vector = vector_select(where, other, *vector);
+}
+
 static inline real vector_dot(Vector a, Vector b)
 {
     return real_fma(a.x, b.x, real_fma(a.y, b.y, a.z * b.z));
@@ -155,6 +161,28 @@ static inline Vector pair_vector_cross_once(PairVector a, Vector b)
     return (Vector){high.x + real_fma(a.y.low, b.z, -(a.z.low * b.y)),
                     high.y + real_fma(a.z.low, b.x, -(a.x.low * b.z)),
                     high.z + real_fma(a.x.low, b.y, -(a.y.low * b.x))};
+}
+
+// A vector whose lanes are set and read one by one.
+typedef struct {
+    RealLanes x, y, z;
+} VectorLanes;
+
+static inline VectorLanes vector_lanes_zero(void)
+{
+    return (VectorLanes){{(real)(0)}, {(real)(0)}, {(real)(0)}};
+}
+
+static inline void vector_lanes_set(VectorLanes *lanes, uint lane, scalar4 value)
+{
+    lanes->x.each[lane] = value.x;
+    lanes->y.each[lane] = value.y;
+    lanes->z.each[lane] = value.z;
+}
+
+static inline Vector vector_of_lanes(const VectorLanes *lanes)
+{
+    return (Vector){lanes->x.all, lanes->y.all, lanes->z.all};
 }
 
 #if LANES > 1

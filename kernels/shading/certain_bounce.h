@@ -14,7 +14,7 @@ static inline void bounce_set_chord(Bounce *bounce, const Chord *chord, mask ins
     bounce->chord_turn = lanes_select(inside, chord->turn, NEVER);
     bounce->chord_end_place = lanes_select(inside, chord->end_place, NEVER);
     real error = real_min(bounce->direction_error, chord->direction_error);
-    bounce->direction_error = lanes_select(inside, error, bounce->direction_error);
+    real_replace(&bounce->direction_error, inside, error);
 }
 
 // The incidence of a ray on a surface.
@@ -109,8 +109,7 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
                                        Bounce *refracted)
 {
     const real one = (real)(1), normal_error = surface->normal_error;
-    mask transparent = incidence->found & (surface->transmission > (real)(0)),
-         refracts = transparent & !total;
+    mask transparent = incidence->found & surface_is_transparent(surface), refracts = transparent & !total;
     real angle_error = incidence->angle_error;
     if (HAS_CHORDS)
         angle_error =
@@ -136,11 +135,12 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     return uncertain | (refracts & (inward <= refracted->direction_error + normal_error));
 }
 
-// Sets the bounds of a surface's reflected and refracted ray. Uncertain lanes are not traced further.
-static inline void bounces_set_errors(const Surface *surface, const Ray *ray, mask total, Bounce *reflected,
-                                      Bounce *refracted, mask *uncertain)
+// Sets the bounds of a surface's bounces. Uncertain lanes are not traced further.
+static inline void bounces_set_errors(const Surface *surface, const Ray *ray, Bounces *bounces,
+                                      mask *uncertain)
 {
-    const Color3 none = {(real)(0), (real)(0), (real)(0)};
+    Bounce *reflected = &bounces->reflected, *refracted = &bounces->refracted;
+    const Color3 none = color_gray((real)(0));
     const Incidence incidence = surface_incidence(surface, ray);
     reflected->origin_error = surface->line_error;
     reflected->start_error = surface->start_error;
@@ -152,9 +152,9 @@ static inline void bounces_set_errors(const Surface *surface, const Ray *ray, ma
     refracted->direction_error = (real)(0);
     *uncertain = *uncertain | reflected_set_error(surface, ray, &incidence, reflected);
     if (HAS_TRANSMISSION)
-        *uncertain = *uncertain | refracted_set_error(surface, &incidence, total, refracted);
-    reflected->weight = vector_select(*uncertain, none, reflected->weight);
-    refracted->weight = vector_select(*uncertain, none, refracted->weight);
+        *uncertain = *uncertain | refracted_set_error(surface, &incidence, bounces->total, refracted);
+    vector_replace(&reflected->weight, *uncertain, none);
+    vector_replace(&refracted->weight, *uncertain, none);
 }
 
 #endif

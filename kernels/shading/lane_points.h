@@ -5,19 +5,6 @@
 #include "shading/normal_map.h"
 #include "traversal/traversal.h"
 
-typedef Vector Color3;
-
-static inline Color3 color_multiply(Color3 a, Color3 b)
-{
-    return (Color3){a.x * b.x, a.y * b.y, a.z * b.z};
-}
-
-static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
-{
-    return (Color3){real_fma(weight.x, color.x, sum.x), real_fma(weight.y, color.y, sum.y),
-                    real_fma(weight.z, color.z, sum.z)};
-}
-
 static inline SurfacePoint shape_surface_point(const Scene *scene, uint type, uint index, const Ray *ray,
                                                real t)
 {

@@ -10,8 +10,8 @@
 // entered before.
 static inline Medium medium_before(Medium medium, const Surface *surface)
 {
-    mask inside = surface_found(surface) & !surface->entering & (surface->transmission > (real)(0));
-    medium.density = vector_select(inside, surface->absorption, medium.density);
+    mask inside = surface_found(surface) & !surface->entering & surface_is_transparent(surface);
+    vector_replace(&medium.density, inside, surface->absorption);
     return medium;
 }
 
@@ -19,9 +19,8 @@ static inline Medium medium_before(Medium medium, const Surface *surface)
 // one.
 static inline Medium medium_behind(Medium medium, const Surface *surface)
 {
-    const Color3 clear = {(real)(0), (real)(0), (real)(0)};
     return (Medium){vector_select(surface->entering, surface->absorption, medium.outer),
-                    vector_select(surface->entering, medium.density, clear)};
+                    vector_select(surface->entering, medium.density, color_gray((real)(0)))};
 }
 
 // The length over which rays that hit nothing are absorbed completely. Its products with densities do not

@@ -4,8 +4,8 @@
 #define PATH_H
 
 #include "shading/certain_bounce.h"
+#include "shading/light_visibility.h"
 #include "shading/medium.h"
-#include "shading/phong.h"
 
 // The hits of a packet of rays, shaded.
 typedef struct {
@@ -21,49 +21,54 @@ typedef struct {
 // hit one.
 static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *traversal, ShadedHit *hit)
 {
-    if (IS_CERTIFIED) traversal_classify(traversal);
     hit->surface.object = traversal->hit.object;
-    hit->color = background_color(scene, ray->direction, RAY_ACTIVE(ray) & !surface_found(&hit->surface));
+    const mask found = surface_found(&hit->surface);
+    hit->color = background_color(scene, ray->direction, RAY_ACTIVE(ray) & !found);
     if (HAS_ABSORPTION) hit->t = traversal->hit.t;
     if (IS_CERTIFIED) {
         hit->uncertain = traversal->hit.uncertain;
-        hit->color_error = (real)(0);
-        if (HAS_SKY) {
-            real error =
-                (real)(scene->header->sky_up.w) * (ray->direction_error + (real)(16 * UNIT_ROUNDOFF));
-            hit->color_error = lanes_select(surface_found(&hit->surface), (real)(0), error);
-        }
+        hit->color_error = HAS_SKY ? lanes_select(found, (real)(0), sky_color_error(scene, ray)) : (real)(0);
     }
-    mask found = surface_found(&hit->surface);
     if (!lanes_any(found)) return false;
     hit->surface = visible_surface(scene, ray, &traversal->hit);
     if (IS_CERTIFIED) hit->uncertain = hit->uncertain | (found & hit->surface.uncertain);
-    hit->color = vector_select(found, hit->surface.ambient, hit->color);
+    vector_replace(&hit->color, found, hit->surface.ambient);
     return true;
 }
 
 // Adds the contribution of a light to which a packet's shadow rays have been traced.
-static inline void hit_add_light(const Scene *scene, uint index, LightVisibility *light, Traversal *traversal,
-                                 ShadedHit *hit)
+static inline void hit_add_light(const Scene *scene, uint index, LightVisibility *light,
+                                 const Traversal *occlusion, ShadedHit *hit)
 {
+    const real strength = light->fraction;
+    light_occlude(light, occlusion);
     if (IS_CERTIFIED) {
-        traversal_classify(traversal);
-        mask glossy = hit->surface.specular > (real)(0);
-        light_add_uncertainty(light, &traversal->hit);
-        mask matters = glossy | !light->facing_uncertain;
-        hit->uncertain = hit->uncertain | (light->uncertain & matters) | (light->facing_uncertain & glossy);
-    }
-    Color3 fractions;
-    if (HAS_FILTERS) fractions = vector_scale(traversal_filter(traversal), light->fraction);
-    light_occlude(light, traversal_transmittance(traversal));
-    if (IS_CERTIFIED)
+        // at an uncertain facing only highlights count
+        const mask glossy = hit->surface.specular > (real)(0), faint = light->facing_uncertain & !glossy;
+        hit->uncertain = hit->uncertain | (light->uncertain & !faint) | (light->facing_uncertain & glossy);
         hit->color_error = hit->color_error +
                            lanes_select(light->lit | light->facing_uncertain, light->color_error, (real)(0));
-    const Color3 black = {(real)(0), (real)(0), (real)(0)};
-    Color3 arriving = vector_of(scene->lights[index].color);
-    arriving = HAS_FILTERS ? color_multiply(arriving, fractions) : vector_scale(arriving, light->fraction);
-    Color3 reflected = vector_select(light->lit, color_multiply(light->reflected, arriving), black);
-    hit->color = vector_add(hit->color, reflected);
+    }
+    const Color3 color = vector_of(scene->lights[index].color);
+    const Color3 arriving = HAS_FILTERS
+                                ? color_multiply(color, vector_scale(traversal_filter(occlusion), strength))
+                                : vector_scale(color, light->fraction);
+    const Color3 reflected = color_multiply(light->reflected, arriving);
+    hit->color = vector_add(hit->color, vector_select(light->lit, reflected, color_gray((real)(0))));
+}
+
+// Traces those of `count` packets of rays that are in `packets`, given as bits.
+static inline void packets_trace(Traversal *traversals, const Scene *scene, Ray *rays, uint count,
+                                 uint packets, Query query)
+{
+    const uint near = packets_near(scene, rays, packets);
+    uint in_bvh = 0;
+    for (uint i = 0; i < count; i++)
+        if (packets >> i & 1 && traversal_begin(&traversals[i], scene, &rays[i], query, near))
+            in_bvh |= 1u << i;
+    if (HAS_BVH) packets_traverse_bvh(traversals, scene, rays, in_bvh);
+    for (uint i = 0; i < count && IS_CERTIFIED; i++)
+        if (packets >> i & 1) traversal_classify(&traversals[i]);
 }
 
 // Traces `count` packets of rays and shades their hits, without lights if COMPUTE_SIGNATURE.
@@ -73,22 +78,14 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
     Ray shadow_rays[PACKETS];
     LightVisibility lights[PACKETS];
     const uint light_count = COMPUTE_SIGNATURE ? 0 : scene->header->image.w;
-    uint packets = 0, found = 0; // as bits: those that traverse the BVH, and those that hit anything
-    uint near = packets_near(scene, rays, (1u << count) - 1);
-    for (uint i = 0; i < count; i++)
-        if (traversal_begin(&traversals[i], scene, &rays[i], CLOSEST_HIT, near)) packets |= 1u << i;
-    if (HAS_BVH) packets_traverse_bvh(traversals, scene, rays, packets);
+    uint found = 0; // the packets that hit anything, as bits
+    packets_trace(traversals, scene, rays, count, (1u << count) - 1, CLOSEST_HIT);
     for (uint i = 0; i < count; i++)
         if (hit_shade(scene, &rays[i], &traversals[i], &hits[i])) found |= 1u << i;
     for (uint light = 0; found != 0 && light < light_count; light++) {
-        packets = 0;
         for (uint i = 0; i < count; i++)
             if (found >> i & 1) lights[i] = light_reach(scene, &hits[i].surface, light, &shadow_rays[i]);
-        near = packets_near(scene, shadow_rays, found);
-        for (uint i = 0; i < count; i++)
-            if (found >> i & 1 && traversal_begin(&traversals[i], scene, &shadow_rays[i], OCCLUSION, near))
-                packets |= 1u << i;
-        if (HAS_BVH) packets_traverse_bvh(traversals, scene, shadow_rays, packets);
+        packets_trace(traversals, scene, shadow_rays, count, found, OCCLUSION);
         for (uint i = 0; i < count; i++)
             if (found >> i & 1) hit_add_light(scene, light, &lights[i], &traversals[i], &hits[i]);
     }
@@ -96,24 +93,46 @@ static OUT_OF_LINE void rays_shade(const Scene *scene, Ray *rays, uint count, Sh
 
 // Adds a ray's hit and its bounces to the signature.
 static inline unsigned_integer path_signature_add(unsigned_integer path, const Ray *ray, integer object,
-                                                  mask reflected, mask refracted, mask total)
+                                                  const Bounces *bounces)
 {
     const integer none = (integer)(0);
+    const mask reflected = bounce_is_active(&bounces->reflected),
+               refracted = bounce_is_active(&bounces->refracted);
     integer events = lanes_select(reflected, (integer)(PATH_REFLECTED), none) |
                      lanes_select(refracted, (integer)(PATH_REFRACTED), none) |
-                     lanes_select(reflected & total, (integer)(PATH_TOTAL_REFLECTION), none);
+                     lanes_select(reflected & bounces->total, (integer)(PATH_TOTAL_REFLECTION), none);
     unsigned_integer word = unsigned_from_integer((object + (integer)(1)) * (integer)(PATH_EVENTS) + events);
     unsigned_integer longer =
         ((path ^ word) * (unsigned_integer)(PATH_FACTOR)) & (unsigned_integer)(0xffffffffu);
     return lanes_select(ray->active, longer, path);
 }
 
-// Returns the lanes whose color may be off by more than CERTIFIED_COLOR_ERROR, of which a 16th is reserved
-// for the roundings of the sum.
+// The part of CERTIFIED_COLOR_ERROR that the bounds may reach. The remainder is for the roundings of the sum.
+#define COLOR_ERROR_PART (1 - 0x1p-4f)
+
+// Returns the lanes whose color may be off by more than CERTIFIED_COLOR_ERROR.
 static inline mask color_is_uncertain(Color3 color, real error)
 {
-    real largest = real_max(real_max(color.x, color.y), real_max(color.z, (real)(1)));
-    return !(error <= (real)((1 - 0x1p-4f) * CERTIFIED_COLOR_ERROR) * largest);
+    real largest = real_max(color_largest(color), (real)(1));
+    return !(error <= (real)(COLOR_ERROR_PART * CERTIFIED_COLOR_ERROR) * largest);
+}
+
+// Sets the bounces of a ray at its hit. `traced` is the bounce that the ray is. Adds the lanes where they are
+// uncertain to *uncertain.
+static inline void hit_bounce(const Scene *scene, const Ray *ray, const Surface *surface,
+                              const Bounce *traced, Bounces *bounces, mask *uncertain)
+{
+    surface_bounce(surface, vector_renormalize(ray->direction), traced->weight, false, bounces);
+    if (scene->header->sample.w > 0) {
+        const real least = (real)(scene->header->sample.w);
+        bounces->reflected.weight = weight_cut(bounces->reflected.weight, least, uncertain);
+        bounces->refracted.weight = weight_cut(bounces->refracted.weight, least, uncertain);
+    }
+    if (IS_CERTIFIED) bounces_set_errors(surface, ray, bounces, uncertain);
+    if (HAS_ABSORPTION) {
+        bounces->reflected.medium = traced->medium;
+        bounces->refracted.medium = medium_behind(traced->medium, surface);
+    }
 }
 
 // Traces a ray tree depth first, reflected before refracted, and returns its color. *shaded, an element of
@@ -124,77 +143,59 @@ static inline mask color_is_uncertain(Color3 color, real error)
 static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded, ShadedHit *shaded,
                                     unsigned_integer *path, mask *uncertain)
 {
+    const Color3 black = color_gray((real)(0));
     *uncertain = mask_none();
     *path = (unsigned_integer)(PATH_START);
+    Color3 color = black;
     real color_error = (real)(0);
-    const Color3 black = {(real)(0), (real)(0), (real)(0)}, white = {(real)(1), (real)(1), (real)(1)};
-    Color3 color = black, weight = white;
-    Medium medium = {black, black};
+    Bounce traced = {ray.origin, ray.direction, color_gray((real)(1)), 0};
+    if (HAS_ABSORPTION) traced.medium = (Medium){black, black};
     Ray rays[1] = {ray};         // an array, or Mesa 22.3 crashes in compiling rays_shade's loops
     Bounce pending[PENDING_MAX]; // refracted rays, while the reflected ones are traced; one per depth
-    uint pending_count = 0, depth = 0;
+    uint pending_count = 0;
     for (;;) {
-        if (depth > 0 || !is_shaded) rays_shade(scene, rays, 1, shaded);
-        if (IS_CERTIFIED) *uncertain = *uncertain | (rays[0].active & shaded->uncertain);
-        if (depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, surface_found(&shaded->surface));
+        if (traced.depth > 0 || !is_shaded) rays_shade(scene, rays, 1, shaded);
+        const mask active = rays[0].active, found = surface_found(&shaded->surface);
+        if (IS_CERTIFIED) *uncertain = *uncertain | (active & shaded->uncertain);
+        if (traced.depth == 0) ray_counter_add(scene, RAYS_CAMERA_HITS, found);
+        Bounces bounces = bounces_none(&rays[0], traced.depth + 1);
         // without secondary rays the color is the camera ray's and needs no weights
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
-            if (COMPUTE_SIGNATURE)
-                *path = path_signature_add(*path, rays, shaded->surface.object, mask_none(), mask_none(),
-                                           mask_none());
-            if (IS_CERTIFIED & !COMPUTE_SIGNATURE)
-                *uncertain =
-                    *uncertain | (rays[0].active & color_is_uncertain(shaded->color, shaded->color_error));
-            return shaded->color;
+            if (COMPUTE_SIGNATURE) *path = path_signature_add(*path, rays, shaded->surface.object, &bounces);
+            color = shaded->color;
+            color_error = shaded->color_error;
+            break;
         }
-        mask found = surface_found(&shaded->surface);
         if (HAS_ABSORPTION) {
-            if (lanes_any(found)) medium = medium_before(medium, &shaded->surface);
-            weight = weight_absorbed(weight, &medium, found, shaded->t);
+            if (lanes_any(found)) traced.medium = medium_before(traced.medium, &shaded->surface);
+            traced.weight = weight_absorbed(traced.weight, &traced.medium, found, shaded->t);
         }
+        const Color3 shown = vector_select(active, shaded->color, black);
+        color = color_add_weighted(color, traced.weight, shown);
         if (IS_CERTIFIED)
-            color_error = real_fma(weight_largest(weight),
-                                   lanes_select(rays[0].active, shaded->color_error, (real)(0)), color_error);
-        color = color_add_weighted(color, weight, vector_select(rays[0].active, shaded->color, black));
+            color_error = real_fma(weight_largest(traced.weight),
+                                   lanes_select(active, shaded->color_error, (real)(0)), color_error);
 
-        Bounce reflected = {rays[0].origin, rays[0].direction, black, depth + 1};
-        Bounce refracted = reflected;
-        mask total = mask_none();
-        if (lanes_any(found) && depth < scene->header->bounces.x) {
-            total = surface_bounce(&shaded->surface, vector_renormalize(rays[0].direction), weight, false,
-                                   &reflected, &refracted);
-            if (scene->header->sample.w > 0) {
-                const real least = (real)(scene->header->sample.w);
-                reflected.weight = weight_cut(reflected.weight, least, uncertain);
-                refracted.weight = weight_cut(refracted.weight, least, uncertain);
-            }
-            if (IS_CERTIFIED)
-                bounces_set_errors(&shaded->surface, rays, total, &reflected, &refracted, uncertain);
-            if (HAS_ABSORPTION) {
-                reflected.medium = medium;
-                refracted.medium = medium_behind(medium, &shaded->surface);
-            }
-        }
-        if (COMPUTE_SIGNATURE)
-            *path = path_signature_add(*path, rays, shaded->surface.object, bounce_is_active(&reflected),
-                                       bounce_is_active(&refracted), total);
-        ray_counter_add(scene, RAYS_REFLECTED, bounce_is_active(&reflected));
-        ray_counter_add(scene, RAYS_REFRACTED, bounce_is_active(&refracted));
-        Bounce next = reflected;
-        if (!lanes_any(bounce_is_active(&reflected)))
-            next = refracted;
-        else if (HAS_TRANSMISSION && lanes_any(bounce_is_active(&refracted)))
-            pending[pending_count++] = refracted;
-        if (!lanes_any(bounce_is_active(&next))) {
+        if (lanes_any(found) && traced.depth < scene->header->bounces.x)
+            hit_bounce(scene, rays, &shaded->surface, &traced, &bounces, uncertain);
+        if (COMPUTE_SIGNATURE) *path = path_signature_add(*path, rays, shaded->surface.object, &bounces);
+        const mask reflects = bounce_is_active(&bounces.reflected),
+                   refracts = bounce_is_active(&bounces.refracted);
+        ray_counter_add(scene, RAYS_REFLECTED, reflects);
+        ray_counter_add(scene, RAYS_REFRACTED, refracts);
+        if (lanes_any(reflects)) {
+            if (HAS_TRANSMISSION && lanes_any(refracts)) pending[pending_count++] = bounces.refracted;
+            traced = bounces.reflected;
+        } else if (lanes_any(refracts)) {
+            traced = bounces.refracted;
+        } else {
             if (pending_count == 0) break;
-            next = pending[--pending_count];
+            traced = pending[--pending_count];
         }
-        rays[0] = bounce_ray(&next);
-        weight = next.weight;
-        if (HAS_ABSORPTION) medium = next.medium;
-        depth = next.depth;
+        rays[0] = bounce_ray(&traced);
     }
-    if (IS_CERTIFIED & !COMPUTE_SIGNATURE) *uncertain = *uncertain | color_is_uncertain(color, color_error);
+    if (IS_CERTIFIED & !COMPUTE_SIGNATURE)
+        *uncertain = *uncertain | (ray.active & color_is_uncertain(color, color_error));
     return color;
 }
 

@@ -5,6 +5,7 @@
 
 #include "numerics/angle.h"
 #include "scene.h"
+#include "shading/color.h"
 #include "shapes/surface_point.h"
 
 // u runs along the texture's rows and v from bottom to top, from 0 to 1. Beyond that the texture wraps.
@@ -88,7 +89,7 @@ static inline TextureCoordinates texture_coordinates(const Scene *scene, uint ty
     return (TextureCoordinates){grid.u, grid.v, (real)(material->reflection_transmission_ior.w)};
 }
 
-// The functions from here on treat one lane at a time, since each lane reads different texels.
+// The functions up to image_filtered treat one lane at a time, since each lane reads different texels.
 
 // Returns the texture coordinate wrapped to 0..1, or 0 if it is NaN.
 static inline scalar wrap_unit(scalar a, uint wrap)
@@ -160,81 +161,20 @@ static inline scalar4 image_filtered(const Scene *scene, uint4 image, scalar u, 
     return scalar4_between(color, coarser, part);
 }
 
-// Returns the filtered color of each lane in `wanted`.
+// Returns the filtered color of each lane in `wanted`, 0 in the others.
 static inline Vector image_color(const Scene *scene, uint4 image, real along, real across, real width,
                                  mask wanted)
 {
     RealLanes u = {along}, v = {across}, footprint = {width};
-    RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
+    VectorLanes colors = vector_lanes_zero();
     IntegerLanes lanes = {wanted};
     for (uint lane = 0; lane < LANES; lane++) {
         if (lanes.each[lane] == 0) continue;
-        scalar4 color = image_filtered(scene, image, wrap_unit(u.each[lane], image.z),
-                                       wrap_unit(v.each[lane], image.w), footprint.each[lane]);
-        red.each[lane] = color.x;
-        green.each[lane] = color.y;
-        blue.each[lane] = color.z;
+        vector_lanes_set(&colors, lane,
+                         image_filtered(scene, image, wrap_unit(u.each[lane], image.z),
+                                        wrap_unit(v.each[lane], image.w), footprint.each[lane]));
     }
-    return (Vector){red.all, green.all, blue.all};
-}
-
-// Returns the color of a sky without an image, for the sine of a latitude.
-static inline Vector sky_blended_color(global const SceneHeader *header, real sine)
-{
-    const real zero = (real)(0);
-    Vector color =
-        vector_fma(vector_of(header->sky_above), real_max(sine, zero), vector_of(header->background));
-    return vector_fma(vector_of(header->sky_below), real_max(-sine, zero), color);
-}
-
-// Returns the color of the texel of the sky's image in which a direction lies, for each lane in `wanted`.
-static inline Vector sky_texel_color(const Scene *scene, real longitude_turns, real latitude_turns,
-                                     mask wanted)
-{
-    uint4 level = scene->texture_levels[scene->header->sky_texture.x - 1].place;
-    const real one_half = (real)(0.5f);
-    RealLanes column = {(longitude_turns + one_half) * (real)((scalar)level.y)};
-    RealLanes row = {(one_half - latitude_turns - latitude_turns) * (real)((scalar)level.z)};
-    RealLanes red = {(real)(0)}, green = {(real)(0)}, blue = {(real)(0)};
-    IntegerLanes lanes = {wanted};
-    for (uint lane = 0; lane < LANES; lane++) {
-        if (lanes.each[lane] == 0) continue;
-        uint x = min((uint)column.each[lane], level.y - 1), y = min((uint)row.each[lane], level.z - 1);
-        scalar4 color = texel_color(scene, level.x + y * level.y + x);
-        red.each[lane] = color.x;
-        green.each[lane] = color.y;
-        blue.each[lane] = color.z;
-    }
-    return (Vector){red.all, green.all, blue.all};
-}
-
-// Returns the color of the sky's image along a unit direction, for the lanes in `wanted`. The footprint is
-// measured in texels at the horizon or of their height, whichever are denser.
-static inline Vector sky_image_color(const Scene *scene, Vector direction, mask wanted)
-{
-    global const SceneHeader *header = scene->header;
-    const real one_half = (real)(0.5f), two = (real)(2);
-    uint4 level = scene->texture_levels[header->sky_texture.x - 1].place;
-    real x = vector_dot(direction, vector_of(header->sky_right));
-    real y = vector_dot(direction, vector_of(header->sky_up));
-    real z = vector_dot(direction, vector_of(header->sky_forward));
-    real across = real_sqrt(real_fma(x, x, z * z));
-    scalar texels = max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
-    Vector color = image_color(scene, image_wrapped(header->sky_texture, true), one_half + real_turns(z, x),
-                               real_fma(two, real_turns(across, y), one_half),
-                               (real)(header->sample.x * texels), wanted);
-    return vector_scale(color, (real)(header->sky_forward.w));
-}
-
-// Returns the color of the background along a unit direction, for the lanes in `wanted`.
-static inline Vector background_color(const Scene *scene, Vector direction, mask wanted)
-{
-    global const SceneHeader *header = scene->header;
-    Vector color = vector_of(header->background);
-    if (!HAS_SKY) return color;
-    if (HAS_IMAGES && header->sky_texture.x > 0)
-        return lanes_any(wanted) ? sky_image_color(scene, direction, wanted) : color;
-    return sky_blended_color(header, vector_dot(direction, vector_of(header->sky_up)));
+    return vector_of_lanes(&colors);
 }
 
 // The part of a surface that a pixel sees: its width across the ray, and the cosine of incidence, by which it

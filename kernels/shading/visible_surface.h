@@ -2,7 +2,7 @@
 #ifndef VISIBLE_SURFACE_H
 #define VISIBLE_SURFACE_H
 
-#include "shading/surface.h"
+#include "shading/interaction.h"
 
 // Returns the origin of a secondary ray, on the side that the ray came from or, if `through`, on the other.
 // It lies off the surface by twice the bound on the position's error: once for that error and once for the
@@ -34,7 +34,7 @@ static inline mask may_be_in_contact(const Scene *scene, Vector p, real reach)
 // would be crossed by a short line along the normal.
 static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
 {
-    mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
+    mask transparent = surface_found(surface) & surface_is_transparent(surface);
     real reach = (real)(16) * surface->place_error;
     transparent = transparent & may_be_in_contact(scene, surface->position, reach);
     if (!lanes_any(transparent)) return mask_none();
@@ -52,7 +52,7 @@ static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *s
 // refracted ray starts halfway to it.
 static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit *hit)
 {
-    mask transparent = surface_found(surface) & (surface->transmission > (real)(0));
+    mask transparent = surface_found(surface) & surface_is_transparent(surface);
     transparent = transparent & may_be_in_contact(scene, surface->position, (real)(0));
     if (!lanes_any(transparent)) return mask_none();
     real error = surface->error, offset = error + error;
@@ -64,7 +64,7 @@ static inline mask surface_find_opaque(const Scene *scene, Surface *surface, Hit
     mask found = hit_found(&opaque);
     real gap = opaque.t - offset;
     mask touches = found & (gap <= error);
-    surface->refracted_offset = lanes_select(found & !touches, (real)(0.5f) * gap, surface->refracted_offset);
+    real_replace(&surface->refracted_offset, found & !touches, (real)(0.5f) * gap);
     hit->object = lanes_select(touches, opaque.object, hit->object);
     return touches;
 }

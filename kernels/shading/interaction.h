@@ -1,0 +1,125 @@
+// Computes the surface at the closest hit of each ray of a packet.
+#ifndef INTERACTION_H
+#define INTERACTION_H
+
+#include "shading/triangle_points.h"
+
+// Turns both normals to the side that the ray comes from.
+static inline void surface_set_point(Surface *surface, const SurfacePoint *point, const Ray *ray)
+{
+    if (IS_CERTIFIED) {
+        surface_set_errors(surface, point, ray);
+        surface_set_line_error(surface, point);
+    }
+    surface->position = point->position;
+    if (HAS_SMOOTH_NORMALS) surface->lift = point->lift;
+    if (HAS_SMOOTH_NORMALS && IS_CERTIFIED) surface->lift_error = point->lift_error;
+    mask along = vector_dot(point->normal, ray->direction) > (real)(0);
+    if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
+    Vector normal = vector_select(along, vector_negate(point->normal), point->normal);
+    if (HAS_SHADING_NORMALS) surface->normal = normal;
+    mask opposite = vector_dot(point->shading_normal, normal) < (real)(0);
+    surface->shading_normal =
+        vector_select(opposite, vector_negate(point->shading_normal), point->shading_normal);
+    if (IS_CERTIFIED) return; // rays start on the surface
+    surface->error =
+        (real)(UNIT_ROUNDOFF)*real_fma((real)(POINT_SCALE_ERROR), point->rounding_scale,
+                                       (real)(POINT_POSITION_ERROR)*vector_norm1(point->position));
+    if (HAS_TRANSMISSION) surface->refracted_offset = surface->error + surface->error;
+}
+
+// Returns what the ray and its t alone decide of the surface, with the material of the background.
+static inline Surface surface_start(const Ray *ray, const Hit *hit)
+{
+    Surface surface;
+    surface.object = hit->object;
+    surface.ambient = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
+    surface.specular = surface.shininess = (real)(0);
+    if (HAS_REFLECTION) surface.reflection = (real)(0);
+    if (HAS_TINTS) surface.reflection_tint = surface.specular_tint = surface.ambient;
+    if (HAS_FRESNEL) surface.fresnel = mask_none();
+    if (HAS_CONDUCTORS) {
+        surface.conductor = mask_none();
+        surface.conductor_real = surface.conductor_imaginary_squared = surface.ambient;
+    }
+    if (HAS_FILTERS) surface.transmission_tint = surface.ambient;
+    if (HAS_ABSORPTION) surface.absorption = surface.ambient;
+    if (HAS_TRANSMISSION) {
+        surface.transmission = (real)(0);
+        surface.ior = (real)(1);
+    }
+    if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
+    if (HAS_AREA_LIGHTS) surface.sample = ray->sample;
+    surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
+    if (IS_CERTIFIED) {
+        surface_set_place_error(&surface, ray, hit);
+        surface.eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+        surface.uncertain = hit->uncertain;
+        if (HAS_CHORDS) surface.chord_end = chord_end_none();
+    }
+    return surface;
+}
+
+// Sets the point and the material in the lanes of *pending that hit one of their objects, or triangles of its
+// material, and removes them. Returns false if none is pending. A call would keep the surface out of
+// registers, and Oclgrind does not know what clang makes of an inlined function that returns a struct.
+static inline ALWAYS_INLINE bool surface_add_object(Surface *surface, SurfacePoint *point, integer *pending,
+                                                    const Scene *scene, const Ray *ray, const Hit *hit)
+{
+    const scalar_integer object = lanes_smallest(*pending);
+    if (object == INT_MAX) return false;
+    const ObjectRange range = object_range(scene, (uint)object);
+    uint4 entry = range_entry(scene, &range, object);
+    LaneSurfacePoints found;
+    if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
+        // other precisions pass no pointer, which would keep the surface out of registers
+        found = triangles_surface_point(scene, *pending, &range, entry.z, ray, hit->t,
+                                        IS_CERTIFIED ? surface : 0);
+    } else {
+        found.lanes = *pending == (integer)(object);
+        found.point = shape_surface_point(scene, entry.x, entry.y, ray, hit->t);
+    }
+    found.entry = entry;
+    found.uncertain = mask_none();
+    // the exact hit lies as near to the ray's own point as place_error says
+    if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
+#if IS_CERTIFIED
+    if (HAS_CHORDS && entry.x == TYPE_SPHERES) {
+        Sphere sphere = scene->spheres[entry.y];
+        surface_set_chord_end(surface, &sphere, ray, hit, &found);
+    }
+    shape_set_errors(scene, &found, ray, hit->t, surface->place_error);
+    if (!HAS_TRIANGLES || entry.x != TYPE_TRIANGLES)
+        surface_narrow_place(surface, found.lanes & (found.point.height < NEVER), found.point.height,
+                             least_cosine(found.point.normal, ray));
+#endif
+    Material material = scene->materials[entry.z];
+    if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
+        hit_set_images(&found, scene, &material, ray, surface->travelled);
+    if (HAS_NORMAL_MAPS && material.normal_map.x > 0)
+        found.point.shading_normal =
+            normal_tilted(scene, &material, entry.x, &found.images, found.point.shading_normal, found.lanes);
+    // storing the zero in every surface would cost 2 % of a frame's time
+    Color3 color =
+        object_color(scene, &material, &found, ray, IS_CERTIFIED ? surface->place_error : (real)(0));
+    if (IS_CERTIFIED) surface->uncertain = surface->uncertain | (found.lanes & found.uncertain);
+    surface_set_material(surface, scene, found.lanes, &material, color);
+    *pending = lanes_select(found.lanes, NO_OBJECT, *pending);
+    surface_point_replace(point, found.lanes, &found.point);
+    return true;
+}
+
+// Returns the surface at the closest hit. Rays of a packet mostly hit one or two objects, so each object is
+// looked up once, for all its lanes.
+static inline Surface surface_interaction(const Scene *scene, const Ray *ray, const Hit *hit)
+{
+    Surface surface = surface_start(ray, hit);
+    SurfacePoint point = surface_point_make(ray->origin, ray->direction, (real)(0));
+    integer pending = lanes_select(hit_found(hit), hit->object, NO_OBJECT);
+    while (surface_add_object(&surface, &point, &pending, scene, ray, hit)) {
+    }
+    surface_set_point(&surface, &point, ray);
+    return surface;
+}
+
+#endif

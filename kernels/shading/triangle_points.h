@@ -1,0 +1,121 @@
+// Computes the surface points of triangles. In a fine mesh each lane hits a different triangle.
+#ifndef TRIANGLE_POINTS_H
+#define TRIANGLE_POINTS_H
+
+#include "shading/certain_surface.h"
+#include "shapes/instance.h"
+#include "shapes/triangle_normals.h"
+
+// Marks finished lanes. It is larger than any id.
+#define NO_OBJECT ((integer)(INT_MAX))
+
+// Triangles of one material, one per lane.
+typedef struct {
+    mask lanes, next_to_eye; // next_to_eye: those with has_eye_height
+    Corners corners, normals, uvs;
+    Vector normal;          // geometric
+    real liftable, density; // liftable: whether the normals are on one side of the triangle, 1 or 0
+    bool smooth;            // some have normals
+} LaneTriangles;
+
+// Returns the triangles of one material among the objects hit that are in the range. In a fine mesh each lane
+// hits a different triangle, so vertices are gathered triangle by triangle.
+static inline LaneTriangles triangles_gather(const Scene *scene, integer objects, const ObjectRange *range,
+                                             uint material)
+{
+    const Vector zero = {(real)(0), (real)(0), (real)(0)};
+    const Corners none = {zero, zero, zero};
+    const real density = (real)(scene->materials[material].reflection_transmission_ior.w);
+    LaneTriangles hit = {mask_none(), mask_none(), none, none, none, zero, (real)(0), density, false};
+    for (;;) {
+        scalar_integer object = lanes_smallest(objects);
+        if (object == INT_MAX) break;
+        if (HAS_INSTANCES && object >= (scalar_integer)range->end) break;
+        mask same = objects == (integer)(object);
+        objects = lanes_select(same, NO_OBJECT, objects);
+        uint4 entry = range_entry(scene, range, object);
+        if (entry.x != TYPE_TRIANGLES || entry.z != material) continue;
+        hit.lanes = hit.lanes | same;
+        Triangle triangle = scene->triangles[entry.y];
+        if (has_eye_height(triangle.id)) hit.next_to_eye = hit.next_to_eye | same;
+        hit.corners = corners_select(same, corners_of(triangle.a, triangle.b, triangle.c), hit.corners);
+        vector_replace(&hit.normal, same, triangle_normal(&triangle));
+        if (HAS_SMOOTH_NORMALS && triangle.id.y > 0) {
+            hit.smooth = true;
+            TriangleNormals own = scene->triangle_normals[triangle.id.y - 1];
+            hit.normals = corners_select(same, corners_of(own.a, own.b, own.c), hit.normals);
+            real_replace(&hit.liftable, same, (real)(own.a.w));
+        }
+        if (HAS_IMAGES && triangle.id.z > 0) {
+            TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
+            const Corners uvs = corners_of(own.a_b, (scalar4)(own.a_b.zw, 0, 0), own.c_density);
+            hit.uvs = corners_select(same, uvs, hit.uvs);
+            real_replace(&hit.density, same, (real)(own.c_density.z));
+        }
+    }
+    return hit;
+}
+
+// Sets the points of flat triangles and returns their weights. Maps the triangles from an instance's space.
+static inline TriangleWeights triangles_set_point(LaneTriangles *hit, const Scene *scene,
+                                                  const ObjectRange *range, const Ray *ray, real t,
+                                                  SurfacePoint *point)
+{
+    if (!HAS_INSTANCES || !range->is_instance) {
+        const TriangleWeights weights = triangle_weights(hit->corners, ray);
+        *point = corners_surface_point(hit->corners, hit->normal, weights, hit->next_to_eye, ray, t);
+        return weights;
+    }
+    const Instance instance = scene->instances[range->instance];
+    Ray own = instance_ray(&instance, ray);
+    ray_prepare(&own);
+    const TriangleWeights weights = triangle_weights(hit->corners, &own);
+    *point = instance_surface_point(&instance, hit->corners, hit->normal, weights);
+    if (hit->smooth) hit->normals = instance_normals(&instance, hit->normals);
+    if (hit->smooth || HAS_NORMAL_MAPS) hit->corners = instance_corners(&instance, hit->corners);
+    const real stretch = instance_stretch(&instance, hit->normal);
+    if (HAS_IMAGES) hit->density = real_divide(hit->density, lanes_select(hit->lanes, stretch, (real)(1)));
+    return weights;
+}
+
+// Returns the surface points of the triangles of one material among the objects hit that are in the range,
+// evaluated for all lanes at once.
+static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene, integer objects,
+                                                             const ObjectRange *range, uint material,
+                                                             const Ray *ray, real t, Surface *surface)
+{
+    LaneTriangles triangles = triangles_gather(scene, objects, range, material);
+    LaneSurfacePoints hit;
+    hit.lanes = triangles.lanes;
+    const TriangleWeights weights = triangles_set_point(&triangles, scene, range, ray, t, &hit.point);
+    const Corners corners = triangles.corners, normals = triangles.normals;
+    TriangleHeights heights = {(real)(0), (real)(0), (real)(0), (real)(0)};
+    real side = triangles.liftable;
+    if (triangles.smooth) {
+        triangle_smooth(normals, weights, &hit.point);
+        mask along = vector_dot(hit.point.normal, ray->direction) > (real)(0),
+             opposite = vector_dot(hit.point.normal, hit.point.shading_normal) < (real)(0);
+        side = lanes_select(along ^ opposite, -side, side);
+        heights = triangle_lift(corners, normals, weights, side, &hit.point);
+    }
+#if IS_CERTIFIED
+    const real slimness = triangle_slimness(corners), cosine = least_cosine(hit.point.normal, ray),
+               height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t)),
+               weights_error = triangle_weights_error(corners, ray, cosine);
+    triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);
+    surface_narrow_place(surface, hit.lanes, height, cosine);
+    if (triangles.smooth)
+        triangle_set_lift_error(corners, heights, side, slimness, surface->place_error + weights_error,
+                                &hit.point);
+    else
+        hit.point.height = height;
+#endif
+    if (HAS_IMAGES) {
+        Vector uv = triangle_blend(weights, triangles.uvs);
+        hit.images.coordinates = (TextureCoordinates){uv.x, uv.y, triangles.density};
+        if (HAS_NORMAL_MAPS) hit.images.tangents = triangle_tangents(corners, triangles.uvs);
+    }
+    return hit;
+}
+
+#endif
