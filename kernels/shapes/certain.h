@@ -59,7 +59,7 @@ static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask per
 // Moves a hit to t, which may be far from the middle of its bounds, unless t is outside them.
 static inline CertainHit certain_at(CertainHit hit, real t)
 {
-    hit.t = lanes_select((t >= hit.low) & (t <= hit.high), t, hit.t);
+    real_replace(&hit.t, (t >= hit.low) & (t <= hit.high), t);
     return hit;
 }
 

@@ -105,7 +105,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
                second = certain_select(swaps, hits[0], hits[1]);
     mask mixes = one & other & !(second.low > first.high);
     mask at_apex = lanes & leaves & (fabs(radius) <= error);
-    first.low = lanes_select(at_apex, ray->tmin, first.low);
+    real_replace(&first.low, at_apex, ray->tmin);
     first.uncertain = first.uncertain | (first.found & mixes) | at_apex;
     first.found = first.found & !first.uncertain;
     return first;
@@ -166,8 +166,8 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
                                             : (at.rho + fabs(at.radius)) * ((real)(1) + fabs(round->slope)));
     mask near_end = from_end <= error, near_side = fabs(at.value) <= at.band + side_band;
     mask on_cap = near_end & !near_side;
-    point->curvature = lanes_select(on_cap, (real)(0), point->curvature);
-    point->normal_error = lanes_select(on_cap, (real)(4) * turned, point->normal_error);
+    real_replace(&point->curvature, on_cap, (real)(0));
+    real_replace(&point->normal_error, on_cap, (real)(4) * turned);
     return near_end & near_side;
 }
 

@@ -82,9 +82,9 @@ static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray 
                                   TRIANGLE_NORMAL_ERROR, ray, &plane);
     plane = intervals_common(*bounds, plane);
     lanes = lanes & (plane.near <= plane.far);
-    bounds->near = lanes_select(lanes, plane.near, bounds->near);
-    bounds->far = lanes_select(lanes, plane.far, bounds->far);
-    *t = lanes_select(lanes, interval_middle(plane), *t);
+    real_replace(&bounds->near, lanes, plane.near);
+    real_replace(&bounds->far, lanes, plane.far);
+    real_replace(t, lanes, interval_middle(plane));
 }
 
 // Returns the crossing with bounds. t is between those of the vertices, weighted by the edge functions. The
@@ -123,7 +123,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     mask slim = perhaps & !(narrows & (t_error <= (real)(4) * vertex_error));
     if (lanes_any(slim)) triangle_narrow_by_plane(triangle, ray, slim, &bounds, &t);
     if (HAS_SMOOTH_NORMALS) {
-        bounds.near = lanes_select(sinks, real_max(bounds.near, (real)(SMALLEST_RATIO)), bounds.near);
+        real_replace(&bounds.near, sinks, real_max(bounds.near, (real)(SMALLEST_RATIO)));
         bounds.far = real_max(bounds.near, bounds.far);
     }
     CertainHit hit = certain_crossing(ray, signs.certain, perhaps, bounds.near, bounds.far);

@@ -63,9 +63,9 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
             RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
         if (lanes_any(grazing)) {
             DiscCrossing compensated = disc_crossing_compensated(disc, ray);
-            crossing.height = lanes_select(grazing, compensated.height, crossing.height);
-            crossing.along = lanes_select(grazing, compensated.along, crossing.along);
-            crossing.across = vector_select(grazing, compensated.across, crossing.across);
+            real_replace(&crossing.height, grazing, compensated.height);
+            real_replace(&crossing.along, grazing, compensated.along);
+            vector_replace(&crossing.across, grazing, compensated.across);
         }
     }
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);

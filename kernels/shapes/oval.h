@@ -125,7 +125,7 @@ static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
         // a ray that starts at a hit, whose t was rounded, hits the shape there once more
         mask passed = hit & !(*t > ray->tmin) & (unit_t > own.ray.tmin);
         if (!lanes_any(passed)) break;
-        own.ray.tmin = lanes_select(passed, unit_t, own.ray.tmin);
+        real_replace(&own.ray.tmin, passed, unit_t);
     }
     return hit & (*t > ray->tmin) & (*t < (real)(LARGEST));
 }

@@ -60,7 +60,7 @@ static inline QuadraticRoots revolution_roots(const RevolutionQuadric *quadric, 
         // with a near 0 a step may pass through infinity, which would swap inside and outside
         real polished = revolution_polish(quadric, roots.q_over_a);
         mask same_side = (polished < roots.c_over_q) == (roots.q_over_a < roots.c_over_q);
-        roots.q_over_a = lanes_select(same_side & !quadric->compensated, polished, roots.q_over_a);
+        real_replace(&roots.q_over_a, same_side & !quadric->compensated, polished);
     }
     return roots;
 }
@@ -78,8 +78,8 @@ static inline EndedCrossings revolution_crossings(const Revolution *shape, bool 
     }
     // along a cylinder's axis, or along a cone's through its apex, the ray is inside everywhere or nowhere
     const mask along = (quadric->a == zero) & (quadric->b == zero) & (quadric->discriminant <= zero);
-    crossings.side.near = lanes_select(along, -everywhere, crossings.side.near);
-    crossings.side.far = lanes_select(along, everywhere, crossings.side.far);
+    real_replace(&crossings.side.near, along, -everywhere);
+    real_replace(&crossings.side.far, along, everywhere);
     crossings.real_roots = (has_roots & !along) | (along & (quadric->c <= zero));
     return crossings;
 }

@@ -52,7 +52,7 @@ static inline void revolution_quadric_from_eye(RevolutionQuadric *quadric, const
     mask near_side = revolution_near_side(c.high, quadric->m);
     real discriminant = pair_subtract(pair_multiply(b, b), pair_multiply(a, c)).high;
     quadric->c = c.high;
-    quadric->discriminant = lanes_select(near_side, discriminant, quadric->discriminant);
+    real_replace(&quadric->discriminant, near_side, discriminant);
 }
 
 static inline RevolutionQuadric revolution_quadric_compensated(const Revolution *shape, bool sloped,
@@ -162,7 +162,7 @@ static OUT_OF_LINE void revolution_quadric_refine(RevolutionQuadric *quadric, co
                                                   bool sloped, const Ray *ray, mask near_side)
 {
     mask leaves = near_side & revolution_leaves_outward(quadric, shape, ray);
-    quadric->discriminant = lanes_select(leaves, (real)(-1), quadric->discriminant);
+    real_replace(&quadric->discriminant, leaves, (real)(-1));
     near_side = near_side & !leaves;
     if (!lanes_any(near_side)) return;
     *quadric =

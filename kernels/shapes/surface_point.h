@@ -49,24 +49,23 @@ static inline void surface_point_move_to_ray(SurfacePoint *point, const Ray *ray
     if (RARELY(lanes_any(path_length < limit))) {
         real ray_scale = vector_norm1(ray->origin) + path_length;
         mask close = ray_scale < limit;
-        point->position = vector_select(close, ray_point(ray, t), point->position);
-        point->rounding_scale = lanes_select(close, real_fma((real)(UNIT_ROUNDOFF), shape_scale, ray_scale),
-                                             point->rounding_scale);
+        vector_replace(&point->position, close, ray_point(ray, t));
+        real_replace(&point->rounding_scale, close, real_fma((real)(UNIT_ROUNDOFF), shape_scale, ray_scale));
     }
 }
 
 static inline void surface_point_replace(SurfacePoint *point, mask where, const SurfacePoint *other)
 {
-    point->position = vector_select(where, other->position, point->position);
-    point->normal = vector_select(where, other->normal, point->normal);
-    point->shading_normal = vector_select(where, other->shading_normal, point->shading_normal);
-    point->rounding_scale = lanes_select(where, other->rounding_scale, point->rounding_scale);
-    if (HAS_SMOOTH_NORMALS) point->lift = vector_select(where, other->lift, point->lift);
+    vector_replace(&point->position, where, other->position);
+    vector_replace(&point->normal, where, other->normal);
+    vector_replace(&point->shading_normal, where, other->shading_normal);
+    real_replace(&point->rounding_scale, where, other->rounding_scale);
+    if (HAS_SMOOTH_NORMALS) vector_replace(&point->lift, where, other->lift);
     if (!IS_CERTIFIED) return;
-    point->curvature = lanes_select(where, other->curvature, point->curvature);
-    point->normal_error = lanes_select(where, other->normal_error, point->normal_error);
-    point->height = lanes_select(where, other->height, point->height);
-    if (HAS_SMOOTH_NORMALS) point->lift_error = lanes_select(where, other->lift_error, point->lift_error);
+    real_replace(&point->curvature, where, other->curvature);
+    real_replace(&point->normal_error, where, other->normal_error);
+    real_replace(&point->height, where, other->height);
+    if (HAS_SMOOTH_NORMALS) real_replace(&point->lift_error, where, other->lift_error);
 }
 
 #endif

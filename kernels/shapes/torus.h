@@ -139,7 +139,7 @@ static inline mask torus_tube_hit(const Torus *torus, const Ray *ray, mask hit, 
         }
         mask first = hit & !found & (entering != (value_at_end > (real)(0)));
         if (lanes_any(first)) {
-            *t = lanes_select(first, torus_tube_zero(&tube, ray, (Interval){low, end}, entering), *t);
+            real_replace(t, first, torus_tube_zero(&tube, ray, (Interval){low, end}, entering));
             found = found | first;
         }
         low = high;
@@ -180,7 +180,7 @@ static inline mask torus_hit(const Torus *torus, const Ray *ray, real *t)
         }
         before = after;
     }
-    *t = lanes_select(found, torus_line_t(&line, found_s), *t);
+    real_replace(t, found, torus_line_t(&line, found_s));
     return found;
 }
 
@@ -281,8 +281,8 @@ static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ra
         point = torus_point(torus, ray, t);
         steepness = fabs(point.distance.slope);
         mask before = point.outside == entering;
-        bracket.near = lanes_select(point.known & before, real_max(bracket.near, t), bracket.near);
-        bracket.far = lanes_select(point.known & !before, real_min(bracket.far, t), bracket.far);
+        real_replace(&bracket.near, point.known & before, real_max(bracket.near, t));
+        real_replace(&bracket.far, point.known & !before, real_min(bracket.far, t));
         real next = bracket_narrow(&computed, before, t, point.distance.value, point.distance.slope);
         mask settled = fabs(next - t) * steepness <= (real)(0.0625f) * point.place;
         next = lanes_select(settled, t, next);
@@ -296,8 +296,8 @@ static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ra
         TorusPoint side = torus_point(torus, ray, sides[i]);
         mask certain = steep & side.known & (sides[i] > bracket.near) & (sides[i] < bracket.far);
         mask before = side.outside == entering;
-        bracket.near = lanes_select(certain & before, sides[i], bracket.near);
-        bracket.far = lanes_select(certain & !before, sides[i], bracket.far);
+        real_replace(&bracket.near, certain & before, sides[i]);
+        real_replace(&bracket.far, certain & !before, sides[i]);
     }
     return certain_at(certain_crossing(ray, crosses, crosses, bracket.near, bracket.far), t);
 }

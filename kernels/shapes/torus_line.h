@@ -95,7 +95,7 @@ static inline real torus_cubic(real p, real q, real s, real *slope)
 // iterate: Newton's step if it lies inside, else the middle.
 static inline real bracket_narrow(Interval *bracket, mask before, real s, real value, real slope)
 {
-    bracket->near = lanes_select(before, s, bracket->near);
+    real_replace(&bracket->near, before, s);
     bracket->far = lanes_select(before, bracket->far, s);
     mask usable = quotient_is_bounded(value, slope);
     real newton = s - real_divide(value, lanes_select(usable, slope, (real)(1)));

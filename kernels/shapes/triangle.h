@@ -215,8 +215,7 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
         remaining = hit & !plane.well_conditioned;
         *t = real_divide(plane.height, lanes_select(plane.well_conditioned, plane.along, (real)(1)));
     }
-    if (lanes_any(remaining))
-        *t = lanes_select(remaining, triangle_t_robust(triangle, &edges, ray, remaining), *t);
+    if (lanes_any(remaining)) real_replace(t, remaining, triangle_t_robust(triangle, &edges, ray, remaining));
     return hit & (*t > ray->tmin);
 }
 

@@ -178,7 +178,7 @@ static inline integer rays_intersect_children(const RayGroup *group, uint lanes,
         real ray_entry;
         mask hits = ray_intersects_children(&group->spilled->rays, lane, boxes, tmax.each[lane], &ray_entry);
         hit_by = lanes_select(hits, hit_by | (integer)((scalar_integer)1 << lane), hit_by);
-        *entry = lanes_select(hits & (ray_entry < *entry), ray_entry, *entry);
+        real_replace(entry, hits & (ray_entry < *entry), ray_entry);
     }
     return hit_by;
 }

@@ -116,7 +116,7 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
     integer object = (integer)((scalar_integer)id);
     mask tie = (t == hit->t) & (object < hit->object);
     mask closer = found & ((t < hit->t) | tie);
-    hit->t = lanes_select(closer, t, hit->t);
+    real_replace(&hit->t, closer, t);
     hit->object = lanes_select(closer, object, hit->object);
 }
 
@@ -139,11 +139,11 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
     mask closer = found->found & is_new & (found->t < hit->t);
     // the bound of the hit that is not kept, the farther or the uncertain one
     real other = lanes_select(closer, hit->low, found->low);
-    traversal->rival = lanes_select(is_new, real_min(traversal->rival, other), traversal->rival);
+    real_replace(&traversal->rival, is_new, real_min(traversal->rival, other));
     // bounds the exact ray's first hit, whichever shape has it
-    hit->high = lanes_select(found->found, real_min(hit->high, found->high), hit->high);
-    hit->t = lanes_select(closer, found->t, hit->t);
-    hit->low = lanes_select(closer, found->low, hit->low);
+    real_replace(&hit->high, found->found, real_min(hit->high, found->high));
+    real_replace(&hit->t, closer, found->t);
+    real_replace(&hit->low, closer, found->low);
     hit->object = lanes_select(closer, object, hit->object);
 }
 
