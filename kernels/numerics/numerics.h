@@ -110,6 +110,16 @@ static inline real inverse_root_estimate(real a)
     return device_divide((real)(1), device_sqrt(a));
 }
 
+// A factor by which a bound is enlarged for the roundings in computing it.
+#define BOUND_SLACK ((real)(1 + 16 * UNIT_ROUNDOFF))
+
+// Returns an upper bound on the root of a^2 + b^2 for a, b >= 0. It is convex in the smaller number, so that
+// the larger one plus sqrt(2) - 1 times the smaller one is not below it.
+static inline real hypotenuse_above(real a, real b)
+{
+    return real_fma((real)(0.4143f), real_min(a, b), real_max(a, b));
+}
+
 // Returns whether |a / b| < 1 / SMALLEST_RATIO, without dividing. Scales b, because the product of
 // SMALLEST_RATIO with the height of a shadow ray's start above the plane it leaves is subnormal, which costs
 // x86 processors more than a hundred cycles.

@@ -99,11 +99,11 @@ static inline real vector_norm1(Vector a)
     return fabs(a.x) + fabs(a.y) + fabs(a.z);
 }
 
-// Returns the 1-norm of the components along a unit normal, which is how far errors proportional to
-// coordinates move a point off a surface. Errors along the surface do not.
-static inline real vector_norm1_along(Vector unit, Vector a)
+// Returns the sum of the magnitudes of the terms of n . a. For a unit normal n this is how far errors
+// proportional to the coordinates a move a point off a surface. Errors along the surface do not.
+static inline real vector_norm1_along(Vector n, Vector a)
 {
-    return real_fma(fabs(unit.x), fabs(a.x), real_fma(fabs(unit.y), fabs(a.y), fabs(unit.z) * fabs(a.z)));
+    return real_fma(fabs(n.x), fabs(a.x), real_fma(fabs(n.y), fabs(a.y), fabs(n.z) * fabs(a.z)));
 }
 
 // Vectors of pairs, for compensated forms.

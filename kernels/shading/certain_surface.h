@@ -12,37 +12,42 @@ static inline real least_cosine(Vector normal, const Ray *ray)
     return real_max(fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) - error, (real)(0));
 }
 
-// Returns an upper bound on the root of a^2 + b^2, for a, b >= 0.
-static inline real hypotenuse_above(real a, real b)
-{
-    return real_fma((real)(0.4143f), real_min(a, b), real_max(a, b));
-}
+// Exceeds 1 + 3/2 g for the largest error g of a ray's direction, BOUNCE_ERROR_MAX. By g the exact ray is off
+// the right angle between the errors along and across, and the latter grows over the former.
+#define PLACE_SLACK ((real)(1.04f))
+// Exceeds the roundings of a position that is narrowed, whose cosine of incidence is at least
+// NARROWED_COSINE_MIN.
+#define NARROWED_SLACK      ((real)(1.01f))
+#define NARROWED_COSINE_MIN ((real)(0x1p-6f))
 
 // Lowers the bound on the position's error where the surface is flat. The exact hit is where the exact ray,
 // line_error off, crosses a plane that the position is `height` above; `cosine` is its least_cosine.
 static inline void surface_narrow_place(Surface *surface, mask lanes, real height, real cosine)
 {
     const real one = (real)(1), across = surface->line_error;
-    lanes = lanes & (cosine > (real)(0x1p-6f));
+    lanes = lanes & (cosine > NARROWED_COSINE_MIN);
     const real sine =
         real_sqrt(real_max(real_fma(-cosine, cosine, one), (real)(0)) + (real)(16 * UNIT_ROUNDOFF));
     const real along = real_divide(real_fma(across, sine, height), lanes_select(lanes, cosine, one));
     const real both = hypotenuse_above(across, along);
-    real_replace(&surface->place_error, lanes, real_min(surface->place_error, (real)(1.01f) * both));
+    real_replace(&surface->place_error, lanes, real_min(surface->place_error, NARROWED_SLACK * both));
 }
 
-// Bounds how far a hit's position may be from the exact one: across the ray by the ray's error, along it by
-// that of t, and by the roundings of ray_point and those of the shape.
-static inline void surface_set_place_error(Surface *surface, const Ray *ray, const Hit *hit)
+// Sets the bounds that the ray and its t alone decide. The position may be off across the ray by the ray's
+// error, along it by that of t, and by the roundings of ray_point and those of the shape.
+static inline void surface_start_errors(Surface *surface, const Ray *ray, const Hit *hit)
 {
-    real length = ray->length * (real)(1 + 16 * UNIT_ROUNDOFF), t = fabs(hit->t);
+    surface->eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+    surface->uncertain = hit->uncertain;
+    if (HAS_CHORDS) surface->chord_end = chord_end_none();
+    real length = ray->length * BOUND_SLACK, t = fabs(hit->t);
     real rounding =
         (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(ray->origin) + vector_norm1(ray->direction) * t);
     real across = ray_place_error(ray, length * t),
          along = length * real_max(hit->high - hit->t, hit->t - hit->low);
-    surface->place_error = real_fma((real)(1.04f), hypotenuse_above(across, along), rounding);
-    surface->line_error = across * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding; // excludes the surface
-    surface->start_error = along * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
+    surface->place_error = real_fma(PLACE_SLACK, hypotenuse_above(across, along), rounding);
+    surface->line_error = across * BOUND_SLACK + rounding; // excludes the surface
+    surface->start_error = along * BOUND_SLACK + rounding;
 }
 
 // Sets the error of a reflected ray's line. A flat mirror that is `height` off moves that line by twice the
@@ -65,6 +70,23 @@ static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere,
     surface->chord_end = chord_end_select(found->lanes, end, surface->chord_end);
 }
 
+// Sets the bounds of the lanes that hit one object, for their position and for their point's normal.
+static inline void surface_set_point_errors(Surface *surface, LaneSurfacePoints *found, const Scene *scene,
+                                            const Ray *ray, const Hit *hit)
+{
+    SurfacePoint *point = &found->point;
+    // the exact hit lies as near to the ray's own point as place_error says
+    point->position = ray_point(ray, hit->t);
+    if (HAS_CHORDS && found->entry.x == TYPE_SPHERES) {
+        Sphere sphere = scene->spheres[found->entry.y];
+        surface_set_chord_end(surface, &sphere, ray, hit, found);
+    }
+    shape_set_errors(scene, found, ray, hit->t, surface->place_error);
+    if (!HAS_TRIANGLES || found->entry.x != TYPE_TRIANGLES)
+        surface_narrow_place(surface, found->lanes & (point->height < NEVER), point->height,
+                             least_cosine(point->normal, ray));
+}
+
 // Sets the bounds at a hit. Marks the lanes where the side that the ray comes from, or that of the shading
 // normal, is uncertain.
 static inline void surface_set_errors(Surface *surface, const SurfacePoint *point, const Ray *ray)
@@ -84,6 +106,8 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
     is_open = is_open | !(cosine > cosine_error * ray->length);
     surface->uncertain = surface->uncertain | (surface_found(surface) & is_open);
+    surface_set_line_error(surface, point);
+    if (HAS_SMOOTH_NORMALS) surface->lift_error = point->lift_error;
 }
 
 #endif

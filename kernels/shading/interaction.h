@@ -7,13 +7,9 @@
 // Turns both normals to the side that the ray comes from.
 static inline void surface_set_point(Surface *surface, const SurfacePoint *point, const Ray *ray)
 {
-    if (IS_CERTIFIED) {
-        surface_set_errors(surface, point, ray);
-        surface_set_line_error(surface, point);
-    }
+    if (IS_CERTIFIED) surface_set_errors(surface, point, ray);
     surface->position = point->position;
     if (HAS_SMOOTH_NORMALS) surface->lift = point->lift;
-    if (HAS_SMOOTH_NORMALS && IS_CERTIFIED) surface->lift_error = point->lift_error;
     mask along = vector_dot(point->normal, ray->direction) > (real)(0);
     if (HAS_TRANSMISSION || IS_CERTIFIED) surface->entering = !along;
     Vector normal = vector_select(along, vector_negate(point->normal), point->normal);
@@ -33,7 +29,7 @@ static inline Surface surface_start(const Ray *ray, const Hit *hit)
 {
     Surface surface;
     surface.object = hit->object;
-    surface.ambient = surface.diffuse = (Color3){(real)(0), (real)(0), (real)(0)};
+    surface.ambient = surface.diffuse = color_gray((real)(0));
     surface.specular = surface.shininess = (real)(0);
     if (HAS_REFLECTION) surface.reflection = (real)(0);
     if (HAS_TINTS) surface.reflection_tint = surface.specular_tint = surface.ambient;
@@ -51,12 +47,7 @@ static inline Surface surface_start(const Ray *ray, const Hit *hit)
     if (HAS_IMAGES) surface.travelled = ray->travelled + hit->t;
     if (HAS_AREA_LIGHTS) surface.sample = ray->sample;
     surface.to_eye = vector_scale(ray->direction, -real_sqrt(ray->inverse_squared));
-    if (IS_CERTIFIED) {
-        surface_set_place_error(&surface, ray, hit);
-        surface.eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
-        surface.uncertain = hit->uncertain;
-        if (HAS_CHORDS) surface.chord_end = chord_end_none();
-    }
+    if (IS_CERTIFIED) surface_start_errors(&surface, ray, hit);
     return surface;
 }
 
@@ -81,18 +72,7 @@ static inline ALWAYS_INLINE bool surface_add_object(Surface *surface, SurfacePoi
     }
     found.entry = entry;
     found.uncertain = mask_none();
-    // the exact hit lies as near to the ray's own point as place_error says
-    if (IS_CERTIFIED) found.point.position = ray_point(ray, hit->t);
-#if IS_CERTIFIED
-    if (HAS_CHORDS && entry.x == TYPE_SPHERES) {
-        Sphere sphere = scene->spheres[entry.y];
-        surface_set_chord_end(surface, &sphere, ray, hit, &found);
-    }
-    shape_set_errors(scene, &found, ray, hit->t, surface->place_error);
-    if (!HAS_TRIANGLES || entry.x != TYPE_TRIANGLES)
-        surface_narrow_place(surface, found.lanes & (found.point.height < NEVER), found.point.height,
-                             least_cosine(found.point.normal, ray));
-#endif
+    if (IS_CERTIFIED) surface_set_point_errors(surface, &found, scene, ray, hit);
     Material material = scene->materials[entry.z];
     if (HAS_IMAGES && (material.texture.x > 0 || material.normal_map.x > 0))
         hit_set_images(&found, scene, &material, ray, surface->travelled);

@@ -26,7 +26,6 @@ typedef struct {
     mask uncertain;    // at `certified`
 } LaneSurfacePoints;
 
-#if IS_CERTIFIED
 // Sets the errors of the point and the lanes that may be at an edge.
 static inline void shape_set_errors(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, real t,
                                     real place_error)
@@ -38,7 +37,6 @@ static inline void shape_set_errors(const Scene *scene, LaneSurfacePoints *hit, 
     }
     SHAPE_LIST(SHAPE_SET_ERRORS)
 }
-#endif
 
 // Bounds the error of the shading normal.
 static inline real point_normal_error(const SurfacePoint *point, real place_error)
@@ -53,9 +51,12 @@ static inline mask floor_is_uncertain(real a, real error)
     return !(real_floor(a - error) == real_floor(a + error));
 }
 
+// How far behind the surface the cubes of a checker are looked up, in cubes, so that a face on the border
+// between cubes has one color.
+#define CHECKER_DEPTH 0x1p-10f
+
 // Returns the lanes where the checker has its second color. Adds to the hit those where that is uncertain. On
-// planes and discs squares lie in the surface. Elsewhere they are cubes in space, looked up a 1024th of a
-// cube behind the surface, so that a face on the border between cubes has one color.
+// planes and discs squares lie in the surface. Elsewhere they are cubes in space.
 static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, scalar4 grid,
                                real place_error)
 {
@@ -74,12 +75,12 @@ static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const
         mask along = vector_dot(point->normal, ray->direction) > (real)(0);
         Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
         Vector cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
-        cell = vector_fma(inward, (real)(0x1p-10f), cell);
+        cell = vector_fma(inward, (real)(CHECKER_DEPTH), cell);
         cells = real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z);
         if (IS_CERTIFIED) {
             const scalar cells_per_unit = fabs(grid.w);
             real error = (real)(cells_per_unit)*place_error +
-                         (real)(0x1p-9f) * point_normal_error(point, place_error) +
+                         (real)(2 * CHECKER_DEPTH) * point_normal_error(point, place_error) +
                          (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
                                                       vector_norm1(vector_of(grid)) + (real)(1));
             uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |

@@ -66,12 +66,11 @@ static inline GridCoordinates grid_coordinates(const Scene *scene, uint type, ui
 // Bounds the error of grid coordinates, for a position that is off by `place_error`.
 static inline real grid_error(const Scene *scene, uint type, uint index, Vector position, real place_error)
 {
-    GridAxes axes = grid_axes(scene, type, index);
-    scalar4 grid_u = fabs(axes.u), grid_v = fabs(axes.v);
-    Vector p = {fabs(position.x), fabs(position.y), fabs(position.z)};
-    real moved = real_max(vector_norm1(vector_of(grid_u)), vector_norm1(vector_of(grid_v)));
-    real size = real_max(vector_dot(p, vector_of(grid_u)) + (real)(grid_u.w),
-                         vector_dot(p, vector_of(grid_v)) + (real)(grid_v.w));
+    const GridAxes axes = grid_axes(scene, type, index);
+    const Vector u = vector_of(axes.u), v = vector_of(axes.v);
+    const real moved = real_max(vector_norm1(u), vector_norm1(v)),
+               size = real_max(vector_norm1_along(u, position) + (real)(fabs(axes.u.w)),
+                               vector_norm1_along(v, position) + (real)(fabs(axes.v.w)));
     return real_fma(moved, place_error, (real)(8 * UNIT_ROUNDOFF) * size);
 }
 

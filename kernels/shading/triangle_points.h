@@ -48,8 +48,7 @@ static inline LaneTriangles triangles_gather(const Scene *scene, integer objects
         }
         if (HAS_IMAGES && triangle.id.z > 0) {
             TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
-            const Corners uvs = corners_of(own.a_b, (scalar4)(own.a_b.zw, 0, 0), own.c_density);
-            hit.uvs = corners_select(same, uvs, hit.uvs);
+            hit.uvs = corners_select(same, corners_of_uvs(own), hit.uvs);
             real_replace(&hit.density, same, (real)(own.c_density.z));
         }
     }
@@ -98,18 +97,18 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         side = lanes_select(along ^ opposite, -side, side);
         heights = triangle_lift(corners, normals, weights, side, &hit.point);
     }
-#if IS_CERTIFIED
-    const real slimness = triangle_slimness(corners), cosine = least_cosine(hit.point.normal, ray),
-               height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t)),
-               weights_error = triangle_weights_error(corners, ray, cosine);
-    triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);
-    surface_narrow_place(surface, hit.lanes, height, cosine);
-    if (triangles.smooth)
-        triangle_set_lift_error(corners, heights, side, slimness, surface->place_error + weights_error,
-                                &hit.point);
-    else
-        hit.point.height = height;
-#endif
+    if (IS_CERTIFIED) {
+        const real slimness = triangle_slimness(corners), cosine = least_cosine(hit.point.normal, ray),
+                   height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t)),
+                   weights_error = triangle_weights_error(corners, ray, cosine);
+        triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);
+        surface_narrow_place(surface, hit.lanes, height, cosine);
+        if (triangles.smooth)
+            triangle_set_lift_error(corners, heights, side, slimness, surface->place_error + weights_error,
+                                    &hit.point);
+        else
+            hit.point.height = height;
+    }
     if (HAS_IMAGES) {
         Vector uv = triangle_blend(weights, triangles.uvs);
         hit.images.coordinates = (TextureCoordinates){uv.x, uv.y, triangles.density};

@@ -7,23 +7,30 @@
 #include "shapes/surface_point.h"
 
 // Returns the interval of t where the ray is between low and high on one axis. A direction of exactly 0, of
-// either sign, is always or never between them, which comparisons decide, since 0 times infinity is NaN.
-static inline Interval slab_crossings(real low, real high, real origin, real direction, real inverse)
+// either sign, is always or never between them, which comparisons decide, since 0 times infinity is NaN. At
+// `certified` both planes are moved outward by `more`, and directions too small to divide by count as 0;
+// `inverse` is exact within 2 u.
+static inline Interval slab_crossings(real low, real high, real more, real origin, real direction,
+                                      real inverse)
 {
-    mask parallel = direction == (real)(0);
-    mask between = (origin >= low) & (origin <= high);
-    real to_low, to_high;
+    const real from = low - origin, to = high - origin;
+    const mask parallel = IS_CERTIFIED ? fabs(direction) <= (real)(SMALLEST_RATIO) : direction == (real)(0);
+    const mask between = (from <= more) & (to >= -more);
+    real to_low = from * inverse, to_high = to * inverse;
     if (IS_COMPENSATED) {
-        real divisor = lanes_select(parallel, (real)(1), direction);
-        to_low = real_divide(low - origin, divisor);
-        to_high = real_divide(high - origin, divisor);
-    } else {
-        to_low = (low - origin) * inverse;
-        to_high = (high - origin) * inverse;
+        const real divisor = lanes_select(parallel, (real)(1), direction);
+        to_low = real_divide(from, divisor);
+        to_high = real_divide(to, divisor);
     }
-    real always = lanes_select(between, (real)(LARGEST), (real)(-LARGEST));
-    return (Interval){lanes_select(parallel, -always, real_min(to_low, to_high)),
-                      lanes_select(parallel, always, real_max(to_low, to_high))};
+    Interval crossings = {real_min(to_low, to_high), real_max(to_low, to_high)};
+    if (IS_CERTIFIED) {
+        const real more_t = more * fabs(inverse);
+        crossings = (Interval){crossings.near - more_t, crossings.far + more_t};
+    }
+    const real always = lanes_select(between, (real)(LARGEST), (real)(-LARGEST));
+    real_replace(&crossings.near, parallel, -always);
+    real_replace(&crossings.far, parallel, always);
+    return crossings;
 }
 
 // The intervals of t where a ray is between the two faces across each axis.
@@ -31,12 +38,13 @@ typedef struct {
     Interval x, y, z;
 } BoxSlabs;
 
-static inline BoxSlabs box_slabs(const Box *box, const Ray *ray)
+// Returns the slabs, at `certified` those of the box enlarged by `more`.
+static inline BoxSlabs box_slabs(const Box *box, const Ray *ray, real more)
 {
-    Vector low = vector_of(box->low), high = vector_of(box->high);
-    return (BoxSlabs){slab_crossings(low.x, high.x, ray->origin.x, ray->direction.x, ray->inverse.x),
-                      slab_crossings(low.y, high.y, ray->origin.y, ray->direction.y, ray->inverse.y),
-                      slab_crossings(low.z, high.z, ray->origin.z, ray->direction.z, ray->inverse.z)};
+    Vector low = vector_of(box->low), high = vector_of(box->high), o = ray->origin, d = ray->direction;
+    return (BoxSlabs){slab_crossings(low.x, high.x, more, o.x, d.x, ray->inverse.x),
+                      slab_crossings(low.y, high.y, more, o.y, d.y, ray->inverse.y),
+                      slab_crossings(low.z, high.z, more, o.z, d.z, ray->inverse.z)};
 }
 
 // Returns the interval where a ray is between all faces.
@@ -47,7 +55,7 @@ static inline Interval slabs_common(BoxSlabs slabs)
 
 static inline mask box_hit(const Box *box, const Ray *ray, real *t)
 {
-    const Interval inside = slabs_common(box_slabs(box, ray));
+    const Interval inside = slabs_common(box_slabs(box, ray, (real)(0)));
     *t = ray_first(ray, inside.near, inside.far);
     return RAY_ACTIVE(ray) & (inside.near <= inside.far) & (*t > ray->tmin);
 }
@@ -72,7 +80,7 @@ static inline real slab_clamp(real value, real low, real high)
 static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
 {
     Vector low = vector_of(box->low), high = vector_of(box->high);
-    const BoxSlabs slabs = box_slabs(box, ray);
+    const BoxSlabs slabs = box_slabs(box, ray, (real)(0));
     mask low_x, low_y, low_z;
     real to_x = slab_distance(slabs.x, ray->direction.x, t, &low_x);
     real to_y = slab_distance(slabs.y, ray->direction.y, t, &low_y);
@@ -95,27 +103,6 @@ static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, rea
     return surface_point_make(position, normal, zero);
 }
 
-// Returns the interval where the ray is between two planes across an axis, for a box enlarged by `more`.
-// ray_prepare sets `inverse`, which is exact within 2 u.
-static inline Interval certain_slab(real low, real high, real more, real origin, real direction, real inverse)
-{
-    mask parallel = fabs(direction) <= (real)(SMALLEST_RATIO);
-    real from = low - origin, to = high - origin;
-    real a = from * inverse, b = to * inverse, more_t = more * fabs(inverse);
-    mask between = (from <= more) & (to >= -more);
-    real always = lanes_select(between, NEVER, -NEVER);
-    return (Interval){lanes_select(parallel, -always, real_min(a, b) - more_t),
-                      lanes_select(parallel, always, real_max(a, b) + more_t)};
-}
-
-static inline Interval certain_box(const Box *box, const Ray *ray, real more)
-{
-    Vector low = vector_of(box->low), high = vector_of(box->high), o = ray->origin, d = ray->direction;
-    return slabs_common((BoxSlabs){certain_slab(low.x, high.x, more, o.x, d.x, ray->inverse.x),
-                                   certain_slab(low.y, high.y, more, o.y, d.y, ray->inverse.y),
-                                   certain_slab(low.z, high.z, more, o.z, d.z, ray->inverse.z)});
-}
-
 // Returns the hit with bounds. The enlarged box contains the interval of the exact crossings, and the shrunk
 // box lies within it.
 static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
@@ -128,12 +115,11 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
                                           real_max(fabs(to_low.z), fabs(to_high.z))});
     real place = ray_place_error(ray, distance) +
                  (real)(UNIT_ROUNDOFF)*real_fma((real)(8), distance, (real)(2) * vector_norm1(ray->origin));
-    Interval outer = certain_box(box, ray, place);
+    Interval outer = slabs_common(box_slabs(box, ray, place));
     mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
     if (!lanes_any(perhaps)) return certain_miss();
-    Interval inner = certain_box(box, ray, -place);
-    mask certain = perhaps & (inner.near < inner.far),
-         leaves = ray->origin_object == (integer)((scalar_integer)box->id.x);
+    Interval inner = slabs_common(box_slabs(box, ray, -place));
+    mask certain = perhaps & (inner.near < inner.far), leaves = ray_starts_on(ray, box->id.x);
     const CertainInterval inside = {outer, inner, {-NEVER, NEVER}, certain, perhaps};
     return certain_interval_hit(&inside, ray, leaves & certain);
 }

@@ -12,6 +12,27 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
+// A number and a bound on its error, which only `certified` sets.
+typedef struct {
+    real value, error;
+} Bounded;
+
+// A divisor must exceed its error by this factor. The exact divisor is then at least 7/8 of the computed one,
+// and 8/7 is below DIVISOR_SLACK.
+#define DIVISOR_MIN   ((real)(8))
+#define DIVISOR_SLACK ((real)(1.2f))
+
+// Returns a / b, with an error of NEVER where b is too uncertain to divide by.
+static inline Bounded bounded_quotient(Bounded a, Bounded b)
+{
+    const mask usable = fabs(b.value) > DIVISOR_MIN * b.error;
+    const real inverse = real_divide((real)(1), lanes_select(usable, b.value, (real)(1)));
+    const real quotient = a.value * inverse;
+    const real error = DIVISOR_SLACK * real_fma(fabs(quotient), b.error, a.error) * fabs(inverse) +
+                       (real)(8 * UNIT_ROUNDOFF) * fabs(quotient);
+    return (Bounded){quotient, lanes_select(usable, error, NEVER)};
+}
+
 // The answer of a lane: a hit, where the exact ray's t is between low and high and near t; a miss; or
 // uncertain, where a hit, if any, is not before low.
 typedef struct {
@@ -25,19 +46,30 @@ static inline real ray_place_error(const Ray *ray, real distance)
     return real_fma(ray->direction_error, distance, ray->origin_error);
 }
 
+// Returns the lanes whose ray starts on the object with this id.
+static inline mask ray_starts_on(const Ray *ray, uint id)
+{
+    return ray->origin_object == (integer)((scalar_integer)id);
+}
+
 // Returns the lanes whose ray starts on this shape and does not hit it again, because it is flat, or convex
 // and left outward.
 static inline mask ray_cannot_rehit(const Ray *ray, uint id, bool is_flat)
 {
-    mask leaves = ray->origin_object == (integer)((scalar_integer)id);
-    return is_flat ? leaves : leaves & ray->leaves_outward;
+    return is_flat ? ray_starts_on(ray, id) : ray_starts_on(ray, id) & ray->leaves_outward;
 }
 
-// Returns the lanes whose crossing between low and high lies before the ray's start or beyond its end, which
-// for a ray to a light is t = 1, from which tmax differs by rounding.
+// Returns a t that is not before the exact ray's end. For a ray to a light that is t = 1, and its tmax is 32
+// u less.
+static inline real ray_end_above(const Ray *ray)
+{
+    return ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
+}
+
+// Returns the lanes whose crossing between low and high lies before the ray's start or beyond its end.
 static inline mask ray_excludes(const Ray *ray, real low, real high)
 {
-    return (low > ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF)) | (high < ray->tmin);
+    return (low > ray_end_above(ray)) | (high < ray->tmin);
 }
 
 // Classifies a crossing by the ray's start and end. The line certainly crosses in the lanes `certain`, and
@@ -133,6 +165,21 @@ static inline real sphere_far(const CertainSphere *sphere, const Ray *ray)
     return sphere_refine(sphere, ray, sphere->middle_t + sphere->half_chord, sphere->inverse_slope);
 }
 
+// A place that moves by p moves the crossing by p over the cosine there, the least half chord over r. With
+// x = band / h^2 for the half chord h, that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + SPHERE_STEEPENING x
+// up to x = 3/4. Beyond that, h changes by at most h x (1 + x) / 2 across the ray, and p counts along it,
+// where SPHERE_ALONG x exceeds 1.
+#define SPHERE_STEEPENING ((real)(1.6f))
+#define SPHERE_ALONG      ((real)(1.4f))
+// The band counts by half, as it is about 2 r p, and a 50th more for roundings.
+#define SPHERE_HALF_BAND ((real)(0.51f))
+// The roundings of a crossing after a Newton step, relative to the distance.
+#define SPHERE_REFINED_ERROR ((real)(2.5f * UNIT_ROUNDOFF))
+// Before the step a crossing is off by no more than twice the closest point's error along the ray. The step
+// squares that and divides by twice the half chord. It is taken where the half chord exceeds the closest
+// point's error by this factor, so that at most a 32nd of that error remains.
+#define SPHERE_REFINING ((real)(64))
+
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
 {
     CertainSphere crossed;
@@ -148,15 +195,14 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
                                                    real_fma((real)(6), radius, vector_norm1(ray->origin)));
     // neither crossings nor the closest point are farther than this and the place
     real farthest = distance - radius;
-    real place = ray_place_error(ray, farthest) * (real)(1 + 16 * UNIT_ROUNDOFF) + rounding;
+    real place = ray_place_error(ray, farthest) * BOUND_SLACK + rounding;
     place = real_fma(ray->direction_error, place, place);
     real along = (real)(16 * UNIT_ROUNDOFF) * distance; // error of the closest point along the ray
     real band = real_fma(place * (real)(1 + 8 * UNIT_ROUNDOFF), radius + radius + place, along * along);
     // excluded if all of it lies behind the start or beyond the end
     const real inverse_length = ray_inverse_length(ray);
     real reach = inverse_length * (radius + (real)(2) * (place + along));
-    real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF);
-    mask apart = (crossed.middle_t + reach < ray->tmin) | (crossed.middle_t - reach > end);
+    mask apart = ray_excludes(ray, crossed.middle_t - reach, crossed.middle_t + reach);
     crossed.certain = lanes & (squared > band);
     crossed.perhaps = lanes & !((squared < -band) | apart);
     crossed.half_chord = crossed.inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
@@ -167,19 +213,15 @@ static inline CertainSphere certain_sphere(Vector center, real radius, const Ray
     mask usable = crossed.half_chord > (real)(0);
     real inverse = real_divide((real)(1), lanes_select(usable, crossed.half_chord, (real)(1)));
     crossed.inverse_slope = (real)(0.5f) * ray->inverse_squared * inverse;
-    // A place that moves by p moves the crossing by p over the cosine there, the least half chord over r.
-    // With x = band / h^2 that is h sqrt(1 - x), and 1 / sqrt(1 - x) < 1 + 1.6 x up to x = 0.75. Beyond that,
-    // h changes by at most h x (1 + x) / 2 across the ray, and p, at most 1.4 x p, counts along it.
     real inverse_chord = inverse * inverse_length;
     real x = band * (inverse_chord * inverse_chord);
-    real steepness = real_fma((real)(1.6f) * inverse_chord, x, inverse_chord);
+    real steepness = real_fma(SPHERE_STEEPENING * inverse_chord, x, inverse_chord);
     const real few_squares = (real)(4 * UNIT_ROUNDOFF) * (radius * radius);
-    real moved = real_fma(real_fma((real)(0.51f), band, real_fma(place, place, few_squares)), steepness,
-                          (real)(1.4f) * x * place);
+    real moved = real_fma(real_fma(SPHERE_HALF_BAND, band, real_fma(place, place, few_squares)), steepness,
+                          SPHERE_ALONG * x * place);
     crossed.middle_error = inverse_length * (place + along);
-    // the crossings are off by no more than twice `along`, which the step squares
-    crossed.refines = (real)(64) * along * steepness < (real)(1);
-    real computed = lanes_select(crossed.refines, (real)(2.5f * UNIT_ROUNDOFF) * distance, along + along);
+    crossed.refines = SPHERE_REFINING * along * steepness < (real)(1);
+    real computed = lanes_select(crossed.refines, SPHERE_REFINED_ERROR * distance, along + along);
     crossed.t_error = inverse_length * (moved + computed);
     return crossed;
 }

@@ -114,7 +114,7 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
 static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool two_nappes, const Ray *ray)
 {
     const Round *round = &solid->round;
-    mask leaves = ray->origin_object == (integer)((scalar_integer)id.x), lanes = RAY_ACTIVE(ray);
+    mask leaves = ray_starts_on(ray, id.x), lanes = RAY_ACTIVE(ray);
     Interval part;
     if (solid->is_finite) {
         const BoundedLine bounded =

@@ -26,6 +26,19 @@ static inline TriangleSizes triangle_sizes(const Triangle *triangle)
     return (TriangleSizes){norm_above(largest), norm_above(high - low)};
 }
 
+// The rounding of a vertex to u of its distance from the eye, and the second order of the other errors.
+#define VERTEX_ROUNDING ((real)(1.05f))
+// sqrt(3), rounded up, which bounds the length of a normal whose components are at most 1.
+#define STORED_NORMAL_LENGTH ((real)(1.7321f))
+// The edge functions of a triangle that is hit are off by at most EDGE_FIRST_ORDER A D p + EDGE_SECOND_ORDER
+// p^2, for the longest edge D, the error p of vertices, and a bound A on the frame's vectors, whose norm is
+// below 1.23 A (docs/numerics.md).
+#define EDGE_FIRST_ORDER  3.5f
+#define EDGE_SECOND_ORDER 24
+// Weights are off by the errors of all edge functions and by as much of the determinant's, over at least 7/8
+// of the determinant: 16/7, rounded up.
+#define WEIGHTS_ERROR ((real)(2.5f))
+
 // The signs of the edge functions. If a vertex is off by `error` along each axis of the ray's frame, they are
 // off by that times the coordinates that they are made of.
 typedef struct {
@@ -58,7 +71,7 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
 static inline real triangle_place_error(const Ray *ray, real distance, real size)
 {
     return ray_place_error(ray, distance) +
-           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, (real)(1.05f) * size);
+           (real)(UNIT_ROUNDOFF)*real_fma((real)(TRIANGLE_ERROR), distance, VERTEX_ROUNDING * size);
 }
 
 // Returns a bound on the error of the vertices' coordinates in the ray's frame.
@@ -78,7 +91,7 @@ static inline void triangle_narrow_by_plane(const Triangle *triangle, const Ray 
                                             Interval *bounds, real *t)
 {
     Interval plane;
-    lanes = lanes & certain_plane(vector_of(triangle->a), triangle_normal(triangle), (real)(1.7321f),
+    lanes = lanes & certain_plane(vector_of(triangle->a), triangle_normal(triangle), STORED_NORMAL_LENGTH,
                                   TRIANGLE_NORMAL_ERROR, ray, &plane);
     plane = intervals_common(*bounds, plane);
     lanes = lanes & (plane.near <= plane.far);
@@ -109,11 +122,10 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     if (!lanes_any(perhaps)) return certain_miss();
     real edge_error = signs.coordinates * real_min(error, place * ray->across_length);
     // applies to uncertain lanes, which are hit, if at all, where the weights say
-    mask narrows = perhaps & (fabs(edges->determinant) > (real)(8) * edge_error);
+    mask narrows = perhaps & (fabs(edges->determinant) > DIVISOR_MIN * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
     real t = c_t + real_fma(a_t - c_t, edges->u * inverse, (b_t - c_t) * (edges->v * inverse));
-    // for all weights, the edge functions' errors and as much of the determinant's, over 7/8 of it: 16/7
-    real part = (real)(2.5f) * edge_error * fabs(inverse);
+    real part = WEIGHTS_ERROR * edge_error * fabs(inverse);
     real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
                    real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
     low = low - vertex_error;
@@ -145,7 +157,8 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     TriangleEdges edges = triangle_edges(corners_of(triangle->a, triangle->b, triangle->c), ray);
     TriangleSizes sizes = triangle_sizes(triangle);
     real error = triangle_frame_error(&edges, ray, (real)(sizes.size));
-    real edge_error = error * real_fma(error, (real)(24), ray->across_length * (real)(3.5f * sizes.longest));
+    real edge_error = error * real_fma(error, (real)(EDGE_SECOND_ORDER),
+                                       ray->across_length * (real)(EDGE_FIRST_ORDER * sizes.longest));
     real highest = real_max(real_max(edges.u, edges.v), edges.w),
          lowest = real_min(real_min(edges.u, edges.v), edges.w);
     mask lanes = RAY_ACTIVE(ray) & !((highest > edge_error) & (lowest < -edge_error));
@@ -168,10 +181,8 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
                                         const Ray *ray, mask lanes)
 {
     uint4 ids_sides = neighbors->ids_sides;
-    integer by_a = (integer)((scalar_integer)ids_sides.x), by_b = (integer)((scalar_integer)ids_sides.y),
-            by_c = (integer)((scalar_integer)ids_sides.z);
-    mask over_a = lanes & (ray->origin_object == by_a), over_b = lanes & (ray->origin_object == by_b),
-         over_c = lanes & (ray->origin_object == by_c);
+    mask over_a = lanes & ray_starts_on(ray, ids_sides.x), over_b = lanes & ray_starts_on(ray, ids_sides.y),
+         over_c = lanes & ray_starts_on(ray, ids_sides.z);
     if (!lanes_any(over_a | over_b | over_c)) return mask_none();
     const integer none = (integer)(0);
     integer sides = lanes_select(over_a, (integer)((scalar_integer)(ids_sides.w & 15)), none);
@@ -186,12 +197,11 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
     mask in_front = (sides & (integer)(NEIGHBOR_IN_FRONT)) != none,
          behind = (sides & (integer)(NEIGHBOR_BEHIND)) != none;
     Vector normal = triangle_normal(triangle);
-    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
     real turned = ray->direction_error + (real)(2 * UNIT_ROUNDOFF + 2 * TRIANGLE_NORMAL_ERROR);
     real moved = real_fma(ray->length, turned, ray->ends_at_light ? ray->origin_error : (real)(0));
     real along = vector_dot(normal, ray->direction);
-    real error = (real)(8 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
-                 vector_norm1(normal) * moved;
+    real error =
+        (real)(8 * UNIT_ROUNDOFF) * vector_norm1_along(normal, ray->direction) + vector_norm1(normal) * moved;
     return (is_behind & ray->leaves_outward) | (in_front & (along > error)) | (behind & (along < -error));
 }
 

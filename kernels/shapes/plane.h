@@ -16,24 +16,37 @@ static inline mask plane_quotient(real height, real along, const Ray *ray, real 
     return hit & (*t > ray->tmin);
 }
 
-// Computes t = n . (p - o) / n . d, with the difference first. Only n . d = 0 is not a hit, since a threshold
-// would cut the horizon.
-static inline mask plane_crossing(Vector point, Vector normal, const Ray *ray, real *t)
+// Returns n . (p - from), with the difference first. Components of n are rounded; n is also off by up to
+// `normal_error`, an absolute error.
+static inline Bounded plane_height(Vector point, Vector normal, scalar normal_error, Vector from)
 {
-    real along, height;
-    if (IS_COMPENSATED) {
-        along = vector_dot_compensated(normal, ray->direction);
-        height = pair_vector_dot_once(pair_vector_difference(point, ray->origin), normal);
-    } else {
-        along = vector_dot(normal, ray->direction);
-        height = vector_dot(normal, vector_subtract(point, ray->origin));
-    }
-    return plane_quotient(height, along, ray, t);
+    const Vector to_point = vector_subtract(point, from);
+    Bounded height = {IS_COMPENSATED ? pair_vector_dot_once(pair_vector_difference(point, from), normal)
+                                     : vector_dot(normal, to_point),
+                      (real)(0)};
+    if (!IS_CERTIFIED) return height;
+    height.error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(normal, to_point) +
+                                            (real)(2) * vector_norm1_along(normal, point));
+    if (normal_error > 0) height.error = real_fma((real)(normal_error), vector_norm1(to_point), height.error);
+    return height;
 }
 
+// Returns n . d.
+static inline Bounded plane_along(Vector normal, Vector direction)
+{
+    Bounded along = {IS_COMPENSATED ? vector_dot_compensated(normal, direction)
+                                    : vector_dot(normal, direction),
+                     (real)(0)};
+    if (IS_CERTIFIED) along.error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(normal, direction);
+    return along;
+}
+
+// Computes t = n . (p - o) / n . d. Only n . d = 0 is not a hit, since a threshold would cut the horizon.
 static inline mask plane_hit(const Plane *plane, const Ray *ray, real *t)
 {
-    return plane_crossing(vector_of(plane->point), vector_of(plane->normal), ray, t);
+    const Vector normal = vector_of(plane->normal);
+    const real height = plane_height(vector_of(plane->point), normal, 0, ray->origin).value;
+    return plane_quotient(height, plane_along(normal, ray->direction).value, ray, t);
 }
 
 // Returns the ray's point, moved onto the plane once. The normal's w is one over its length.
@@ -59,29 +72,18 @@ static inline SurfacePoint plane_surface_point(const Plane *plane, const Ray *ra
 static inline mask certain_plane(Vector point, Vector normal, real size, scalar normal_error, const Ray *ray,
                                  Interval *crossing)
 {
-    Vector to_point = vector_subtract(point, ray->origin);
-    real height = vector_dot(normal, to_point), along = vector_dot(normal, ray->direction);
-    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
-    real height_error = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
-                                                 (real)(2) * vector_norm1_along(unsigned_normal, point)) +
-                        size * ray->origin_error;
-    real along_error = (real)(5 * UNIT_ROUNDOFF) * vector_norm1_along(unsigned_normal, ray->direction) +
-                       size * (ray->length * ray->direction_error);
-    if (normal_error > 0) {
-        height_error = real_fma((real)(normal_error), vector_norm1(to_point), height_error);
-        along_error = real_fma((real)(normal_error), ray->length, along_error);
-    }
-    mask crosses = fabs(along) > (real)(8) * along_error;
-    real inverse = real_divide((real)(1), lanes_select(crosses, along, (real)(1)));
-    real t = height * inverse;
-    // the exact n . d is at least 7/8 of this one, and 8/7 < 1.2
-    real t_error = (real)(1.2f) * real_fma(fabs(t), along_error, height_error) * fabs(inverse) +
-                   (real)(8 * UNIT_ROUNDOFF) * fabs(t);
-    *crossing = (Interval){t - t_error, t + t_error};
+    Bounded height = plane_height(point, normal, normal_error, ray->origin),
+            along = plane_along(normal, ray->direction);
+    height.error = height.error + size * ray->origin_error;
+    along.error = along.error + size * (ray->length * ray->direction_error);
+    if (normal_error > 0) along.error = real_fma((real)(normal_error), ray->length, along.error);
+    const Bounded t = bounded_quotient(height, along);
+    const mask crosses = t.error < NEVER;
+    *crossing = (Interval){t.value - t.error, t.value + t.error};
     if (lanes_all(crosses)) return crosses;
     // nearly parallel, it crosses beyond the least distance over the greatest approach
-    real least = real_max(fabs(height) - height_error, (real)(0));
-    real greatest = (fabs(along) + along_error) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    real least = real_max(fabs(height.value) - height.error, (real)(0));
+    real greatest = (fabs(along.value) + along.error) * BOUND_SLACK;
     real parallel_low = divide_or(least, greatest, (real)(LARGEST)) * (real)(1 - 16 * UNIT_ROUNDOFF);
     crossing->near = lanes_select(crosses, crossing->near, parallel_low);
     crossing->far = lanes_select(crosses, crossing->far, (real)(LARGEST));
@@ -110,12 +112,8 @@ static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
 // off by up to `normal_error`.
 static inline real certain_plane_height(Vector point, Vector normal, scalar normal_error, Vector position)
 {
-    Vector to_point = vector_subtract(point, position);
-    Vector unsigned_normal = {fabs(normal.x), fabs(normal.y), fabs(normal.z)};
-    real rounding = (real)(UNIT_ROUNDOFF) * ((real)(6) * vector_norm1_along(unsigned_normal, to_point) +
-                                             (real)(2) * vector_norm1_along(unsigned_normal, point));
-    if (normal_error > 0) rounding = real_fma((real)(normal_error), vector_norm1(to_point), rounding);
-    return (fabs(vector_dot(normal, to_point)) + rounding) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    const Bounded height = plane_height(point, normal, normal_error, position);
+    return (fabs(height.value) + height.error) * BOUND_SLACK;
 }
 
 static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real place_error,

@@ -38,7 +38,7 @@ static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
         from = vector_dot(has_eye_power(shape->id) ? ray->origin : f, axis);
         towards = vector_dot(ray->direction, axis);
     }
-    return slab_crossings((real)(shape->range.w), (real)(shape->range.x), from, towards,
+    return slab_crossings((real)(shape->range.w), (real)(shape->range.x), (real)(0), from, towards,
                           real_inverse_or_zero(towards));
 }
 

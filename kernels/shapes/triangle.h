@@ -21,6 +21,12 @@ static inline Corners corners_of(scalar4 a, scalar4 b, scalar4 c)
     return (Corners){vector_of(a), vector_of(b), vector_of(c)};
 }
 
+// Returns the texture coordinates, u and v in x and y.
+static inline Corners corners_of_uvs(TriangleUvs uvs)
+{
+    return corners_of(uvs.a_b, (scalar4)(uvs.a_b.zw, 0, 0), uvs.c_density);
+}
+
 static inline Corners corners_select(mask condition, Corners yes, Corners no)
 {
     return (Corners){vector_select(condition, yes.a, no.a), vector_select(condition, yes.b, no.b),

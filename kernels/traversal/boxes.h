@@ -51,8 +51,7 @@ static inline real bounds_place_error(const Ray *ray, scalar4 bounds)
         origin_error = lanes_select(
             far, real_divide(origin_error * reach, lanes_select(far, length, (real)(1))), origin_error);
     }
-    return real_fma(ray->direction_error, bounds_farthest(ray->origin, bounds), origin_error) *
-           (real)(1 + 16 * UNIT_ROUNDOFF);
+    return real_fma(ray->direction_error, bounds_farthest(ray->origin, bounds), origin_error) * BOUND_SLACK;
 }
 
 // Returns the slack for hits in the scene's BVH, relative to the distance to the farthest corner. It

@@ -22,9 +22,8 @@ static inline TextureCoordinates cutout_coordinates(const Scene *scene, uint4 en
     if (HAS_TRIANGLES && entry.x == TYPE_TRIANGLES) {
         const Triangle triangle = scene->triangles[entry.y];
         if (triangle.id.z == 0) return coordinates;
-        const TriangleUvs own = scene->triangle_uvs[triangle.id.z - 1];
         const Corners corners = corners_of(triangle.a, triangle.b, triangle.c),
-                      uvs = corners_of(own.a_b, (scalar4)(own.a_b.zw, 0, 0), own.c_density);
+                      uvs = corners_of_uvs(scene->triangle_uvs[triangle.id.z - 1]);
         Vector uv = triangle_blend(triangle_weights(corners, ray), uvs);
         coordinates.u = uv.x;
         coordinates.v = uv.y;

@@ -117,9 +117,8 @@ static inline Vector frame_load(const OriginFrame *frame, global const scalar *r
 static inline real tile_reach(const MacroTile *tile, uint packet)
 {
     const Traversal *traversal = &tile->traversals[packet];
-    real t = (real)(1 + 16 * UNIT_ROUNDOFF); // the product below needs 2 u
-    real limit = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;
-    if (tile->frame.leaving) t = t * real_min(limit, (real)(LARGEST / 2));
+    real t = BOUND_SLACK; // the product below needs 2 u
+    if (tile->frame.leaving) t = t * real_min(hit_limit(&traversal->hit), (real)(LARGEST / 2));
     return lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
 }
 

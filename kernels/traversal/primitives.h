@@ -14,7 +14,6 @@ static inline void object_prefetch(const Scene *scene, uint type, uint4 id)
         memory_prefetch((global const char *)&scene->triangle_normals[id.y - 1], sizeof(TriangleNormals));
 }
 
-#if IS_CERTIFIED
 // Clears the uncertain lanes of rays that leave a neighbor of a triangle and so cannot hit the triangle.
 static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ray *ray, CertainHit *hit)
 {
@@ -23,7 +22,6 @@ static inline void triangle_skip_neighbors(const Scene *scene, uint id, const Ra
     TriangleNeighbors neighbors = scene->triangle_neighbors[id];
     hit->uncertain = hit->uncertain & !triangle_left_behind(&triangle, &neighbors, ray, hit->uncertain);
 }
-#endif
 
 // Tests one primitive and records its hit. Returns whether any lane hits or may hit it.
 #if IS_CERTIFIED

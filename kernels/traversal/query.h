@@ -156,12 +156,18 @@ static inline void traversal_classify(Traversal *traversal)
         traversal->hit.uncertain = traversal->active & !(traversal->rival > traversal->hit.high);
 }
 
+// Returns the t beyond which nothing is hit first.
+static inline real hit_limit(const Hit *hit)
+{
+    return IS_CERTIFIED ? hit->high : hit->t;
+}
+
 // Returns the tmax of each lane, -LARGEST in finished lanes. It is below LARGEST, the entry distance of a
 // child that no ray hits.
 static inline real traversal_tmax(const Traversal *traversal)
 {
-    real t = IS_CERTIFIED ? traversal->hit.high : traversal->hit.t;
-    return lanes_select(traversal->active, real_min(t, (real)(LARGEST / 2)), (real)(-LARGEST));
+    return lanes_select(traversal->active, real_min(hit_limit(&traversal->hit), (real)(LARGEST / 2)),
+                        (real)(-LARGEST));
 }
 
 #endif
