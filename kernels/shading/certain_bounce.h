@@ -6,6 +6,9 @@
 
 // The largest error of a bounced ray's direction with which it is still traced.
 #define BOUNCE_ERROR_MAX ((real)(0x1p-6f))
+// A vector that is off by e of its length is off by at most e / (1 - e) as a unit vector, which for e up to
+// BOUNCE_ERROR_MAX is below this times e.
+#define UNIT_VECTOR_ERROR ((real)(1.02f))
 // The relative rounding error of a bounced ray's direction and of its terms.
 #define BOUNCE_ROUNDING ((real)(32 * UNIT_ROUNDOFF))
 
@@ -118,10 +121,8 @@ static inline mask refracted_set_error(const Surface *surface, const Incidence *
     // s - sqrt(s^2 - k) changes most where s is least
     real least = real_max(snell.s - snell.s_error, (real)(0));
     real change = real_divide(real_max(fabs(least - snell.least_root), snell.root - least), snell.least_root);
-    // Relative to the length before it is made a unit vector: n on entering, 1 on leaving. A vector that is
-    // off by e of its length is off by at most e / (1 - e) as a unit vector, with e at most 2^-6 unless it is
-    // uncertain.
-    real inverse_length = real_divide((real)(1.02f), lanes_select(surface->entering, surface->ior, one));
+    // the vector's length is n on entering, 1 on leaving
+    real inverse_length = real_divide(UNIT_VECTOR_ERROR, lanes_select(surface->entering, surface->ior, one));
     real roundings = snell.scale + snell.s + snell.root + real_divide(snell.squares, snell.least_root);
     real computed = real_fma(BOUNCE_ROUNDING * roundings, inverse_length, BOUNCE_ROUNDING);
     real error =

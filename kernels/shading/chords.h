@@ -73,6 +73,12 @@ static inline ChordEnd chord_end_select(mask condition, ChordEnd yes, ChordEnd n
         lanes_select(condition, yes.turn, no.turn)};
 }
 
+// asin(s) / s, to which an angle across the plane of incidence is unrolled, is convex in s squared, from 1 to
+// pi / 2. So it is at most ARC_LEAST + ARC_RISE s^2, the latter being pi / 2 - 1, rounded up, and the former
+// making up for CHORD_TURN_MAX.
+#define ARC_LEAST ((real)(1.0001f))
+#define ARC_RISE  ((real)(0.571f))
+
 // Returns the chord that starts at `end`, for the cosine of the inner angle of incidence. Its direction is
 // off, seen from the normal, by the end's turn and by `turned`, or by `turned_first` if no chord ended
 // there.
@@ -82,9 +88,7 @@ static inline Chord chord_start(const ChordEnd *end, real place_error, real cosi
     real moved = divide_or(end->off, cosine, NEVER);
     mask continues = end->turn < NEVER;
     real sine_squared = real_min((real)(1) + CHORD_TURN_MAX - cosine * cosine, (real)(1));
-    // asin(s) / s, to which an angle across the plane of incidence is unrolled, is convex in s squared, from
-    // 1 to pi / 2
-    real unrolled = real_fma((real)(0.571f), sine_squared, (real)(1.0001f));
+    real unrolled = real_fma(ARC_RISE, sine_squared, ARC_LEAST);
     real inverse = real_divide((real)(1), lanes_select(end->radius > (real)(0), end->radius, (real)(1)));
     real added = unrolled * (lanes_select(continues, turned, turned_first) + moved * inverse);
     real turn = lanes_select(continues, end->turn, (real)(0)) + added,

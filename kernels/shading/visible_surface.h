@@ -30,18 +30,23 @@ static inline mask may_be_in_contact(const Scene *scene, Vector p, real reach)
            (p.y <= high.y + reach) & (p.z >= low.z - reach) & (p.z <= high.z + reach);
 }
 
+// The line that searches for an opaque surface reaches this many errors of the surface's position to both
+// sides of it, and its own start is off by CONTACT_START_ERRORS of them.
+#define CONTACT_REACH        ((real)(16))
+#define CONTACT_START_ERRORS ((real)(1.5f))
+
 // Returns the lanes of a transparent surface that an opaque one may touch. An opaque surface that lies in it
 // would be crossed by a short line along the normal.
 static inline mask surface_may_touch_opaque(const Scene *scene, const Surface *surface)
 {
     mask transparent = surface_found(surface) & surface_is_transparent(surface);
-    real reach = (real)(16) * surface->place_error;
+    real reach = CONTACT_REACH * surface->place_error;
     transparent = transparent & may_be_in_contact(scene, surface->position, reach);
     if (!lanes_any(transparent)) return mask_none();
     Ray inward = ray_make_unit(vector_fma(surface_normal(surface), reach, surface->position),
                                vector_negate(surface_normal(surface)), transparent);
     inward.tmax = reach + reach;
-    inward.origin_error = surface->place_error * (real)(1.5f);
+    inward.origin_error = CONTACT_START_ERRORS * surface->place_error;
     Hit opaque = closest_opaque_hit(scene, &inward);
     return transparent & (hit_found(&opaque) | opaque.uncertain);
 }

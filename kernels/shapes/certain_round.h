@@ -75,8 +75,7 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     real value = (point.rho - point.radius) * sum;
     if (round->has_power) value = lanes_select(point.radius < (real)(0), value, from_eye);
     point.value = value;
-    point.band =
-        real_fma(place * (real)(1 + 16 * UNIT_ROUNDOFF), real_fma(fabs(round->slope), sum, sum), power_band);
+    point.band = real_fma(place * BOUND_SLACK, real_fma(fabs(round->slope), sum, sum), power_band);
     return point;
 }
 
@@ -132,6 +131,10 @@ static inline mask height_is_positive(real height, real slope, real slope_error,
            ((slope >= slope_error) | (ends & (at_to > (real)(0))));
 }
 
+// A plane between an unbounded ray and the side is tilted by this many errors of the ray's direction: one to
+// face away from the ray, one for its own error, and slack.
+#define ROUND_TILT_ERRORS ((real)(2.5f))
+
 // Returns whether the exact ray misses the side in a part of the line, which starts at 0 or later, and beyond
 // except in the lanes `ends`. At t1, about its closest approach, a plane separates it from the side, or from
 // a parallel surface. Tilted slightly, the plane does so for unbounded rays: rho is at least n . x for n =
@@ -142,7 +145,7 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
     const real zero = (real)(0), one = (real)(1);
     real qq = vector_dot(quadratic->q, quadratic->q), q_length = real_sqrt(qq), t1;
     real rise_error = real_fma(round->error_per_t, fabs(round->slope), round->error_per_t);
-    real h = real_fma((real)(2.5f), rise_error, quadratic->h);
+    real h = real_fma(ROUND_TILT_ERRORS, rise_error, quadratic->h);
     mask tilts = fabs(h) < q_length;
     if (round->curves) {
         t1 = divide_or(-quadratic->b, qq, zero);
@@ -160,7 +163,7 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
     if (round->curves) {
         slope = real_fma(-round->k, quadratic->rise, along + along);
         slope_error = round->error_per_t * (point.rho + point.rho + round->k);
-        tilted_slope = (real)(2.5f) * slope_error;
+        tilted_slope = ROUND_TILT_ERRORS * slope_error;
         real tilt = divide_or((real)(0.5f) * (tilted_slope - slope), q_length, zero);
         tilted = real_fma(-tilt, tilt, height);
         tilts = q_length > zero;
@@ -182,6 +185,11 @@ static inline mask round_misses(const Round *round, const RoundQuadratic *quadra
            (tilts & height_is_positive(tilted, tilted_slope, slope_error, t1, part, ends));
 }
 
+// The choice of points next to a root: how much larger the root is than a step that may refine it, and the
+// distance in bands, where an eighth allows for a wider band and a rough root.
+#define ROOT_OVER_STEP  ((real)(0x1p6f))
+#define ROOT_SIDE_BANDS ((real)(1.125f))
+
 // Returns the interval where the exact ray is inside the side. Roots are searched in a part of the line,
 // beyond which nothing matters if `is_finite`. `perhaps` applies to t >= tmin.
 static inline CertainInterval round_interval(const Round *round, const Ray *ray, mask lanes, Interval part,
@@ -191,7 +199,7 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
     interval.outer = interval.inner = interval.roots = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     interval.certain = mask_none();
     const RoundQuadratic quadratic = round_quadratic(round, ray);
-    real end = ray->tmax * (real)(1 + 64 * UNIT_ROUNDOFF); // for rays to a light
+    real end = ray_end_above(ray);
     mask ends = is_finite ? mask_all() : end < part.far;
     const Interval ahead = {real_max(part.near, ray->tmin), real_max(real_min(part.far, end), ray->tmin)};
     interval.perhaps = lanes & !round_misses(round, &quadratic, ray, ahead, ends);
@@ -208,10 +216,10 @@ static inline CertainInterval round_interval(const Round *round, const Ray *ray,
         real slope = real_fma(a, t, quadratic.b); // half the slope
         real step = divide_or((real)(0.5f) * point.value, slope, (real)(0));
         // otherwise it was not a root; from an end, where it is clamped, a step would lead beyond the end
-        mask settles = (t == roots[i]) & (fabs(step) * (real)(0x1p6f) < fabs(t));
+        mask settles = (t == roots[i]) & (fabs(step) * ROOT_OVER_STEP < fabs(t));
         roots[i] = t = lanes_select(settles, t - step, t);
-        // one band away the sign is certain; an eighth more allows for a wider band and a rough root
-        real band = (real)(1.125f) * point.band, bend = fabs(a) * band;
+        // the sign is certain one band away
+        real band = ROOT_SIDE_BANDS * point.band, bend = fabs(a) * band;
         real steepness = real_max(fabs(slope), (real)(0.5f) * real_sqrt(bend));
         real width =
             divide_or(band, steepness + real_sqrt(real_max(real_fma(steepness, steepness, -bend), (real)(0))),

@@ -83,7 +83,7 @@ static inline void oval_ray_set_errors(Ray *own, const Oval *oval, const Ray *ra
                         few * vector_norm1(affine_reach(oval->inverses, from));
     own->direction_error = (norm * (ray->length * ray->direction_error) +
                             few * vector_norm1(affine_reach(oval->inverses, ray->direction))) *
-                           ray_inverse_length(own) * (real)(1 + 16 * UNIT_ROUNDOFF);
+                           ray_inverse_length(own) * BOUND_SLACK;
     own->origin_object = ray->origin_object;
     own->leaves_outward = ray->leaves_outward;
 }
@@ -157,9 +157,16 @@ static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
     return certain_miss();
 }
 
-// Sets the errors of a point. A normal that is off by e is, mapped to length l and normalized, off by up to
-// x (1 + x) for x = |V| e / l. The factors cover the second order, and all normals from a 16th on
-// (docs/numerics.md).
+// A normal that is off by e is, mapped to length l and normalized, off by up to x (1 + x) for x = |V| e / l,
+// and e itself grows with the second order of the turn (docs/numerics.md). The factor covers both: LOW up to
+// an x of LOW_MAX, HIGH up to HIGH_MAX, and ANY_NORMAL, with which every normal is within the error, beyond.
+#define MAPPED_NORMAL_LOW      ((real)(1.1f))
+#define MAPPED_NORMAL_LOW_MAX  ((real)(0x1p-6f))
+#define MAPPED_NORMAL_HIGH     ((real)(1.5f))
+#define MAPPED_NORMAL_HIGH_MAX ((real)(0x1p-4f))
+#define ANY_NORMAL             ((real)(32))
+
+// Sets the errors of a point.
 static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, real place_error,
                                    SurfacePoint *point)
 {
@@ -178,8 +185,9 @@ static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, rea
     OVAL_LIST(OVAL_SET_ERRORS)
     real growth = divide_or(norm, vector_norm(affine_normal(oval->inverses, unit.normal)), NEVER);
     const real first_order = growth * unit.curvature * real_fma(norm, place_error, moved);
-    const real factor = lanes_select(first_order < (real)(0x1p-6f), (real)(1.1f), (real)(1.5f));
-    growth = growth * lanes_select(first_order < (real)(0x1p-4f), factor, (real)(32));
+    const real factor =
+        lanes_select(first_order < MAPPED_NORMAL_LOW_MAX, MAPPED_NORMAL_LOW, MAPPED_NORMAL_HIGH);
+    growth = growth * lanes_select(first_order < MAPPED_NORMAL_HIGH_MAX, factor, ANY_NORMAL);
     const real turned = unit.curvature * moved; // with all orders of both turns
     point->curvature = growth * norm * unit.curvature;
     point->normal_error =

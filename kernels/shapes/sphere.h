@@ -161,7 +161,7 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
 static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray)
 {
     const real zero = (real)(0);
-    mask leaves = ray->origin_object == (integer)((scalar_integer)sphere->id.x);
+    mask leaves = ray_starts_on(ray, sphere->id.x);
     mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
     Round round;
     round.start = ray->origin;
@@ -179,10 +179,14 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
     return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, leaves);
 }
 
+// A ray that starts on the sphere crosses it again twice as far as the closest point, whose error counts
+// twice, and a 20th more for the error of the start.
+#define CHORD_END_ERRORS ((real)(2.1f))
+
 static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
 {
     if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray);
-    mask leaves = ray->origin_object == (integer)((scalar_integer)sphere->id.x);
+    mask leaves = ray_starts_on(ray, sphere->id.x);
     mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
     if (!lanes_any(lanes)) return certain_miss();
     CertainSphere crossed =
@@ -200,7 +204,7 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
                          hit);
     if (!lanes_any(leaves)) return hit;
     // one crossing is the start, and the other lies twice as far as the closest point
-    real t = (real)(2) * crossed.middle_t, t_error = (real)(2.1f) * crossed.middle_error;
+    real t = (real)(2) * crossed.middle_t, t_error = CHORD_END_ERRORS * crossed.middle_error;
     CertainHit other = certain_crossing(ray, leaves, leaves, real_max(t - t_error, far_low),
                                         real_min(t + t_error, far_high));
     return certain_select(leaves, other, hit);

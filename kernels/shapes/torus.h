@@ -268,9 +268,19 @@ static inline real torus_departure(const CertainTorus *torus, const Ray *ray)
     return lanes_select(known, (real)(0.5f) * cosine * least * ray_inverse_length(ray), (real)(0));
 }
 
+// The search of a crossing, whose constants only choose points: the part of a point's error below which a
+// step ends it; the least slope per length at which points next to the zero are evaluated; and their
+// distance, in errors over the slope, where a quarter allows for a rough zero and for the curvature.
+#define TORUS_SETTLED     ((real)(0x1p-4f))
+#define TORUS_STEEPNESS   ((real)(0x1p-10f))
+#define TORUS_SIDE_ERRORS ((real)(1.25f))
+// At a break, a turning point within rounding, the distance is off by BREAK_ERRORS times a point's error and
+// by BREAK_BEND (R + r) / r times it, for the torus' radii.
+#define BREAK_ERRORS ((real)(2))
+#define BREAK_BEND   ((real)(0.125f))
+
 // Returns the crossing in a bracket at whose ends the exact ray is certainly on different sides. The bracket
-// is narrowed. Only signs beyond `place` count, and the constants only choose the points. The sign is
-// certain beyond `place` over the slope, and a quarter more allows for a rough zero and for the curvature.
+// is narrowed. Only signs beyond `place` count.
 static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ray, Interval bracket,
                                         mask crosses, mask entering)
 {
@@ -284,13 +294,13 @@ static inline CertainHit torus_crossing(const CertainTorus *torus, const Ray *ra
         real_replace(&bracket.near, point.known & before, real_max(bracket.near, t));
         real_replace(&bracket.far, point.known & !before, real_min(bracket.far, t));
         real next = bracket_narrow(&computed, before, t, point.distance.value, point.distance.slope);
-        mask settled = fabs(next - t) * steepness <= (real)(0.0625f) * point.place;
+        mask settled = fabs(next - t) * steepness <= TORUS_SETTLED * point.place;
         next = lanes_select(settled, t, next);
         if (lanes_all(next == t)) break;
         t = next;
     }
-    mask steep = steepness * ray_inverse_length(ray) > (real)(0x1p-10f);
-    real width = real_divide((real)(1.25f) * point.place, lanes_select(steep, steepness, (real)(1)));
+    mask steep = steepness * ray_inverse_length(ray) > TORUS_STEEPNESS;
+    real width = real_divide(TORUS_SIDE_ERRORS * point.place, lanes_select(steep, steepness, (real)(1)));
     const real sides[2] = {t - width, t + width};
     for (uint i = 0; i < 2; i++) {
         TorusPoint side = torus_point(torus, ray, sides[i]);
@@ -314,12 +324,11 @@ static inline CertainHit torus_certain_hit(const Torus *torus, const Ray *ray)
     real breaks[TORUS_BREAKS];
     torus_breaks(&line, breaks);
 
-    mask leaves = ray->origin_object == (integer)((scalar_integer)torus->id.x);
+    mask leaves = ray_starts_on(ray, torus->id.x);
     real departure = torus_departure(&certain, ray);
     real before = lanes_select(leaves, departure, real_max(bounded.part.near, ray->tmin));
     TorusPoint point = torus_point(&certain, ray, before);
-    // a break is a turning point within rounding; its distance moves by less than this part of the rounding
-    const real margin = real_fma(radius, real_divide((real)(0.125f), certain.minor), (real)(2));
+    const real margin = real_fma(radius, real_divide(BREAK_BEND, certain.minor), BREAK_ERRORS);
     mask outside = lanes_select(leaves, ray->leaves_outward, point.outside),
          known = point.known & (!leaves | ((departure > (real)(0)) & (outside == point.outside))),
          enters = !leaves & (bounded.part.near > ray->tmin);

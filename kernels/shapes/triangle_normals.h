@@ -76,6 +76,10 @@ static inline real triangle_weights_error(Corners corners, const Ray *ray, real 
     return real_fma((real)(4 * UNIT_ROUNDOFF), size, divide_or(across, cosine, NEVER));
 }
 
+// A vector that is off by e is, once normalized, off by up to 2 e over its length. The remainder is for
+// roundings.
+#define BLENDED_NORMAL_ERROR ((real)(2.5f))
+
 // Sets the errors of the normals. If they are blended, they move with the weights.
 static inline void triangle_set_normal_errors(Corners normals, TriangleWeights weights, real slimness,
                                               real weights_error, SurfacePoint *point)
@@ -84,7 +88,7 @@ static inline void triangle_set_normal_errors(Corners normals, TriangleWeights w
     real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
     Vector blend = triangle_blend(weights, normals);
     real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
-    point->curvature = (real)(2.5f) * bend * slimness;
+    point->curvature = BLENDED_NORMAL_ERROR * bend * slimness;
     point->normal_error = real_fma(weights_error, point->curvature, (real)(2 * TRIANGLE_NORMAL_ERROR));
 }
 

@@ -130,14 +130,14 @@ static inline Ray ray_make(Vector origin, Vector direction, real tmin, real tmax
     // 0 in inactive lanes, which only a sphere around the origin still examines
     real divisor = lanes_select(ray.active, ray.squared, (real)(1));
     ray.inverse_squared = lanes_select(ray.active, real_divide((real)(1), divisor), (real)(0));
-    if (IS_CERTIFIED) ray.length = real_sqrt(ray.squared) * (real)(1 + 16 * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) ray.length = real_sqrt(ray.squared) * BOUND_SLACK;
     return ray;
 }
 
 // Returns one over the direction's length, not below the exact value, within 80 u.
 static inline real ray_inverse_length(const Ray *ray)
 {
-    return ray->inverse_squared * ray->length * (real)(1 + 16 * UNIT_ROUNDOFF);
+    return ray->inverse_squared * ray->length * BOUND_SLACK;
 }
 
 // Returns 1 / direction, huge where a component is 0.
@@ -162,11 +162,9 @@ static inline void ray_prepare(Ray *ray)
     real scale = real_inverse_power_of_two(largest);
     if (IS_CERTIFIED) {
         shear_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
-        // sqrt(1 + x^2) <= 1 + 0.42 x for x <= 1
         real least = real_min(real_min(fabs(d.x), fabs(d.y)), fabs(d.z)),
              second = vector_norm1(d) - largest - least;
-        ray->across_length =
-            (real)(1 + 16 * UNIT_ROUNDOFF) * scale * real_fma((real)(0.42f), second, largest);
+        ray->across_length = BOUND_SLACK * scale * hypotenuse_above(second, largest);
     } else {
         frame_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
     }
@@ -177,7 +175,7 @@ static inline void ray_prepare(Ray *ray)
 static inline Ray ray_make_unit(Vector origin, Vector direction, mask active)
 {
     Ray ray = ray_make(origin, direction, (real)(0), (real)(LARGEST), active);
-    if (IS_CERTIFIED) ray.length = (real)(1 + 16 * UNIT_ROUNDOFF);
+    if (IS_CERTIFIED) ray.length = BOUND_SLACK;
     if (IS_COMPENSATED) return ray;
     ray.inverse_squared = lanes_select(ray.active, (real)(2) - ray.squared, (real)(0));
     return ray;
