@@ -38,6 +38,19 @@ static inline Vector round_across(const Round *round, Vector v)
     return vector_fma(round->axis, -vector_dot(round->axis, v), v);
 }
 
+// Returns rho^2 less the radius squared, or less k z, at x and the height z. It is computed from the eye's
+// power, so that it does not cancel next to the eye.
+static inline Bounded round_value_from_eye(const Round *round, Vector x, real z)
+{
+    const real rise = round->slope * z, twice = round->radius + round->radius, size = vector_norm1(x),
+               lift = round->curves ? round->k * z : rise * (twice + rise),
+               terms = real_fma(size, size + round->foot_norm1 + round->foot_norm1,
+                                fabs(lift) + fabs(rise) * fabs(twice));
+    const Vector beyond = vector_fma(round->foot, (real)(-2), x);
+    return (Bounded){round->power + (vector_dot(round_across(round, x), round_across(round, beyond)) - lift),
+                     (real)(UNIT_ROUNDOFF) * ((real)(16) * terms + (real)(4) * fabs(round->power))};
+}
+
 static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
 {
     RoundPoint point;
@@ -52,30 +65,22 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     point.rho = vector_norm(point.across);
     point.radius = real_fma(round->slope, z, round->radius);
     // the contribution of z, since the axis' length is off by 14 u, to the squared distance from the axis
-    real left_of_z = (real)(20 * UNIT_ROUNDOFF) * z, power_band = left_of_z * left_of_z;
-    real from_eye = (real)(0), lift = round->k * z;
+    const real left_of_z = (real)(20 * UNIT_ROUNDOFF) * z;
+    real band = left_of_z * left_of_z;
+    Bounded from_eye = {(real)(0), (real)(0)};
     if (round->has_power) {
-        // rho^2 - radius^2 without cancellation next to the eye
-        real rise = round->slope * z, twice = round->radius + round->radius;
-        if (!round->curves) lift = rise * (twice + rise);
-        Vector beyond = vector_fma(round->foot, (real)(-2), x);
-        from_eye = round->power + (vector_dot(round_across(round, x), round_across(round, beyond)) - lift);
-        real size = vector_norm1(x);
-        power_band +=
-            (real)(UNIT_ROUNDOFF) * ((real)(16) * real_fma(size, size + round->foot_norm1 + round->foot_norm1,
-                                                           fabs(lift) + fabs(rise) * fabs(twice)) +
-                                     (real)(4) * fabs(round->power));
+        from_eye = round_value_from_eye(round, x, z);
+        band = band + from_eye.error;
     }
     if (round->curves) {
-        point.value = round->has_power ? from_eye : real_fma(point.rho, point.rho, -lift);
-        point.band = real_fma(place, point.rho + point.rho + place + round->k, power_band);
+        point.value = round->has_power ? from_eye.value : real_fma(point.rho, point.rho, -(round->k * z));
+        point.band = real_fma(place, point.rho + point.rho + place + round->k, band);
         return point;
     }
     real sum = point.rho + fabs(point.radius);
-    real value = (point.rho - point.radius) * sum;
-    if (round->has_power) value = lanes_select(point.radius < (real)(0), value, from_eye);
-    point.value = value;
-    point.band = real_fma(place * BOUND_SLACK, real_fma(fabs(round->slope), sum, sum), power_band);
+    point.value = (point.rho - point.radius) * sum;
+    if (round->has_power) point.value = lanes_select(point.radius < (real)(0), point.value, from_eye.value);
+    point.band = real_fma(place * BOUND_SLACK, real_fma(fabs(round->slope), sum, sum), band);
     return point;
 }
 

@@ -4,6 +4,7 @@
 #define CERTAIN_SOLID_H
 
 #include "shapes/certain_round.h"
+#include "shapes/certain_sphere.h"
 
 // Returns the first hit, with bounds, on a shape between side and ends. A capped solid is the intersection
 // of both; any other one is hit on its side between the ends. In the lanes `leaves` the ray starts on the

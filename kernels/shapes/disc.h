@@ -2,6 +2,7 @@
 #ifndef DISC_H
 #define DISC_H
 
+#include "shapes/certain_sphere.h"
 #include "shapes/eye_power.h"
 #include "shapes/plane.h"
 

@@ -8,7 +8,7 @@
 #ifndef TORUS_H
 #define TORUS_H
 
-#include "shapes/certain.h"
+#include "shapes/certain_sphere.h"
 #include "shapes/eye_power.h"
 #include "shapes/surface_point.h"
 #include "shapes/torus_line.h"
