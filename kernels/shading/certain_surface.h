@@ -12,8 +12,9 @@ static inline real least_cosine(Vector normal, const Ray *ray)
     return real_max(fabs(vector_dot(normal, ray->direction)) * ray_inverse_length(ray) - error, (real)(0));
 }
 
-// Exceeds 1 + 3/2 g for the largest error g of a ray's direction, BOUNCE_ERROR_MAX. By g the exact ray is off
-// the right angle between the errors along and across, and the latter grows over the former.
+// Exceeds 1 + 3/2 g for the largest error g of a ray's direction, BOUNCE_ERROR_MAX. The exact ray may be
+// turned by g, so that the errors along and across it are not quite at right angles, and the error across
+// grows by g times the one along.
 #define PLACE_SLACK ((real)(1.04f))
 // Exceeds the roundings of a position that is narrowed, whose cosine of incidence is at least
 // NARROWED_COSINE_MIN.
@@ -33,7 +34,7 @@ static inline void surface_narrow_place(Surface *surface, mask lanes, real heigh
     real_replace(&surface->place_error, lanes, real_min(surface->place_error, NARROWED_SLACK * both));
 }
 
-// Sets the bounds that the ray and its t alone decide. The position may be off across the ray by the ray's
+// Sets the bounds that follow from the ray and its t. The position may be off across the ray by the ray's
 // error, along it by that of t, and by the roundings of ray_point and those of the shape.
 static inline void surface_start_errors(Surface *surface, const Ray *ray, const Hit *hit)
 {

@@ -24,7 +24,7 @@ static inline void surface_set_point(Surface *surface, const SurfacePoint *point
     if (HAS_TRANSMISSION) surface->refracted_offset = surface->error + surface->error;
 }
 
-// Returns what the ray and its t alone decide of the surface, with the material of the background.
+// Returns a surface with what follows from the ray and its t, and with the material of the background.
 static inline Surface surface_start(const Ray *ray, const Hit *hit)
 {
     Surface surface;

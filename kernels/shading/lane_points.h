@@ -55,6 +55,15 @@ static inline mask floor_is_uncertain(real a, real error)
 // between cubes has one color.
 #define CHECKER_DEPTH 0x1p-10f
 
+// Bounds the error of a point's coordinates in cubes of a checker.
+static inline real cubes_error(const SurfacePoint *point, scalar4 grid, real place_error)
+{
+    const real per_unit = (real)(fabs(grid.w));
+    return per_unit * place_error + (real)(2 * CHECKER_DEPTH) * point_normal_error(point, place_error) +
+           (real)(8 * UNIT_ROUNDOFF) *
+               (per_unit * vector_norm1(point->position) + vector_norm1(vector_of(grid)) + (real)(1));
+}
+
 // Returns the lanes where the checker has its second color. Adds to the hit those where that is uncertain. On
 // planes and discs squares lie in the surface. Elsewhere they are cubes in space.
 static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const Ray *ray, scalar4 grid,
@@ -62,33 +71,23 @@ static inline mask checker_odd(const Scene *scene, LaneSurfacePoints *hit, const
 {
     const SurfacePoint *point = &hit->point;
     const uint type = hit->entry.x, index = hit->entry.y;
-    mask uncertain = mask_none();
-    real cells;
+    Vector cell;
+    real error = (real)(0);
     if (type_has_grid(type)) {
-        GridCoordinates square = grid_coordinates(scene, type, index, point->position);
-        cells = real_floor(square.u) + real_floor(square.v);
-        if (IS_CERTIFIED) {
-            real error = grid_error(scene, type, index, point->position, place_error);
-            uncertain = floor_is_uncertain(square.u, error) | floor_is_uncertain(square.v, error);
-        }
+        const GridCoordinates square = grid_coordinates(scene, type, index, point->position);
+        cell = (Vector){square.u, square.v, (real)(0.5f)};
+        if (IS_CERTIFIED) error = grid_error(scene, type, index, point->position, place_error);
     } else {
         mask along = vector_dot(point->normal, ray->direction) > (real)(0);
         Vector inward = vector_select(along, point->normal, vector_negate(point->normal));
-        Vector cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
+        cell = vector_fma(point->position, (real)(grid.w), vector_of(grid));
         cell = vector_fma(inward, (real)(CHECKER_DEPTH), cell);
-        cells = real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z);
-        if (IS_CERTIFIED) {
-            const scalar cells_per_unit = fabs(grid.w);
-            real error = (real)(cells_per_unit)*place_error +
-                         (real)(2 * CHECKER_DEPTH) * point_normal_error(point, place_error) +
-                         (real)(8 * UNIT_ROUNDOFF) * ((real)(cells_per_unit)*vector_norm1(point->position) +
-                                                      vector_norm1(vector_of(grid)) + (real)(1));
-            uncertain = floor_is_uncertain(cell.x, error) | floor_is_uncertain(cell.y, error) |
-                        floor_is_uncertain(cell.z, error);
-        }
+        if (IS_CERTIFIED) error = cubes_error(point, grid, place_error);
     }
-    if (IS_CERTIFIED) hit->uncertain = hit->uncertain | uncertain;
-    real halved = cells * (real)(0.5f);
+    if (IS_CERTIFIED)
+        hit->uncertain = hit->uncertain | floor_is_uncertain(cell.x, error) |
+                         floor_is_uncertain(cell.y, error) | floor_is_uncertain(cell.z, error);
+    const real halved = (real_floor(cell.x) + real_floor(cell.y) + real_floor(cell.z)) * (real)(0.5f);
     return real_floor(halved) != halved;
 }
 

@@ -121,7 +121,7 @@ static inline Vector sky_sample(const Scene *scene, const Light *light, uint ind
     return vector_fma(vector_of(header->sky_up), sine.all, vector_scale(level, across));
 }
 
-// Returns the ray along a unit direction, of full strength. Its shadow ray remains to be set.
+// Returns a ray of full strength along a unit direction. Its shadow ray remains to be set.
 static inline LightRay light_ray_along(const Surface *surface, Vector direction)
 {
     LightRay to_light;

@@ -25,6 +25,10 @@ enum { BOX_SLOPE_SLACK = 32, RAY_SLOPE_SLACK = 64, TILE_POSITION_SLACK = 64 };
 // Error bounds in u of a triangle's vertex across a ray: in the full test, relative to its distance from the
 // ray's start, and in a block, relative to its distance from the common origin.
 enum { VERTEX_TEST_ERROR = 24, VERTEX_BLOCK_ERROR = 16 };
+// At `certified` a vertex counts as off by this many errors of the full test (triangle_block.h), which are in
+// proportion to 1-norms, up to 2.4 times the distance.
+enum { CERTIFIED_VERTEX_ERROR = 6 };
+#define NORM1_PER_DISTANCE 2.4f
 
 // The frame of a common origin. Rays count as leaving it along positive w, whichever way they run.
 typedef struct {
@@ -122,6 +126,12 @@ static inline real tile_reach(const MacroTile *tile, uint packet)
     return lanes_select(traversal->active, t * tile->w_per_t[packet], (real)(-LARGEST));
 }
 
+// Bounds the error across a ray of a point at this distance from the common origin.
+static inline real tile_point_error(const MacroTile *tile, real distance)
+{
+    return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
+}
+
 // Bounds of the packets. The least lane of each counts, so maxima are stored as negatives.
 typedef struct {
     real u_min[LANES], u_max[LANES], v_min[LANES], v_max[LANES], reach_max[LANES];
@@ -208,10 +218,10 @@ static inline void tile_bound(MacroTile *tile, const PacketBounds *bounds, const
     if (IS_CERTIFIED) {
         tile->slack += lanes_largest(mask_all(), bounds->place_error);
         const scalar origin = fabs(tile->frame.u) + fabs(tile->frame.v) + fabs(tile->frame.w);
-        // six times the test's error, of 1-norms that may be 2.4 times the distance (triangle_block.h)
-        const scalar error1 = (scalar)(6 * 2.4f) * lanes_largest(mask_all(), bounds->vertex_error1);
+        const scalar error1 = (scalar)(CERTIFIED_VERTEX_ERROR * NORM1_PER_DISTANCE) *
+                              lanes_largest(mask_all(), bounds->vertex_error1);
         const scalar origin_error = lanes_largest(mask_all(), bounds->origin_error);
-        tile->vertex_error0 = 6 * (origin_error + (scalar)(2 * UNIT_ROUNDOFF) * origin);
+        tile->vertex_error0 = CERTIFIED_VERTEX_ERROR * (origin_error + (scalar)(2 * UNIT_ROUNDOFF) * origin);
         tile->vertex_error1 = error1 + VERTEX_BLOCK_ERROR * UNIT_ROUNDOFF;
     }
     // at an eighth of the distance (triangle_block.h) a vertex' error moves its slopes by as much

@@ -49,7 +49,7 @@ static inline uint spheres_see(SphereView *view, const MacroTile *tile, global c
         lanes_select(anywhere, (real)(0), reciprocal_estimate(lanes_select(anywhere, (real)(1), from.z)));
     const real distance = size + (real)(frame->leaving ? 0 : tile->tile_reach_max * tile->ray_per_w);
     real error = distance * (real)(SPHERE_BLOCK_ERROR * UNIT_ROUNDOFF);
-    if (IS_CERTIFIED) error = real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
+    if (IS_CERTIFIED) error = tile_point_error(tile, distance);
     const real enlarged = (radius + error) * inverse, u = from.x * inverse, v = from.y * inverse;
     const real reach = lanes_select(anywhere, (real)(LARGEST), enlarged * (real)(tile->ray_per_w));
     view->u.all = u;

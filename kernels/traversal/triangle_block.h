@@ -109,8 +109,7 @@ static inline BlockVertices block_load(const MacroTile *tile, global const Trian
     if (!frame->leaving)
         at.distance = real_max(at.distance, real_fma(per_w, (real)(tile->tile_reach_max), at.longest));
     const real near_error = (real)(8 * tile->vertex_error1) * at.low;
-    at.is_near =
-        !(near_error >= real_fma(at.distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0)));
+    at.is_near = !(near_error >= tile_point_error(tile, at.distance));
     return at;
 }
 
@@ -135,7 +134,7 @@ static inline uint block_see(BlockView *view, const MacroTile *tile, const Block
 static inline real block_vertex_error(const MacroTile *tile, const BlockVertices *at)
 {
     real distance = at->distance;
-    if (IS_CERTIFIED) return real_fma(distance, (real)(tile->vertex_error1), (real)(tile->vertex_error0));
+    if (IS_CERTIFIED) return tile_point_error(tile, distance);
     // the full test's error counts from the ray's start
     real from_start = tile->frame.leaving ? distance : real_fma(at->low, (real)(-tile->ray_per_w), distance);
     return real_fma(from_start, (real)(VERTEX_TEST_ERROR * UNIT_ROUNDOFF),
