@@ -125,27 +125,22 @@ static inline void light_add_distance_errors(const Light *light, const Surface *
     }
 }
 
-// The cosine between the geometric normal and the way to a light.
-typedef struct {
-    real cosine, error;
-} LightElevation;
-
-// Returns the light's elevation, and sets to which side of the surface the shadow ray leaves.
-static inline LightElevation light_set_side(const Surface *surface, LightRay *to_light, real angle_error)
+// Returns the cosine between the geometric normal and the way to the light, and sets to which side of the
+// surface the shadow ray leaves.
+static inline Bounded light_set_side(const Surface *surface, LightRay *to_light, real angle_error)
 {
     Ray *shadow_ray = &to_light->shadow_ray;
-    LightElevation light;
-    light.cosine = vector_dot(surface_normal(surface), to_light->direction);
-    light.error = (HAS_TRIANGLES ? surface->geometric_error : surface->normal_error) + angle_error;
+    Bounded cosine = {vector_dot(surface_normal(surface), to_light->direction),
+                      (HAS_TRIANGLES ? surface->geometric_error : surface->normal_error) + angle_error};
     if (HAS_SMOOTH_NORMALS) { // the shadow ray, not parallel to the light's direction, must leave the surface
-        light.cosine =
+        cosine.value =
             vector_dot(surface_normal(surface), shadow_ray->direction) * ray_inverse_length(shadow_ray);
-        light.error = light.error + (real)(96 * UNIT_ROUNDOFF);
+        cosine.error = cosine.error + (real)(96 * UNIT_ROUNDOFF);
         shadow_ray->is_lifted = surface->lift_error > (real)(0);
-        shadow_ray->sinks = shadow_ray->is_lifted & (light.cosine < -light.error);
+        shadow_ray->sinks = shadow_ray->is_lifted & (cosine.value < -cosine.error);
     }
-    shadow_ray->leaves_outward = surface->entering & (light.cosine > light.error);
-    return light;
+    shadow_ray->leaves_outward = surface->entering & (cosine.value > cosine.error);
+    return cosine;
 }
 
 // Returns the largest channel of the diffuse light that the surface reflects, or 1 if that is more.
@@ -159,22 +154,21 @@ static inline real light_brightness(const Surface *surface, real brightest)
 static inline mask light_set_facing(const Surface *surface, LightRay *to_light, const LightErrors *errors,
                                     LightVisibility *visibility)
 {
-    const LightElevation light = light_set_side(surface, to_light, errors->angle);
+    const Bounded cosine = light_set_side(surface, to_light, errors->angle);
     mask turned = (to_light->facing < -errors->facing) | !surface_found(surface);
     mask open = !turned & !(to_light->facing > errors->facing);
     mask faint = errors->facing * light_brightness(surface, errors->brightest) <= FACING_ERROR_MAX;
     visibility->facing_uncertain = open & faint;
     // a light in front of the shading normal but behind the surface is occluded by the surface itself
-    mask behind = HAS_TRIANGLES ? !turned & (light.cosine < -light.error) : mask_none();
+    mask behind = HAS_TRIANGLES ? !turned & (cosine.value < -cosine.error) : mask_none();
     // unless the ray is lifted beyond its rim
     if (HAS_SMOOTH_NORMALS) behind = behind & !to_light->shadow_ray.sinks;
     visibility->lit = visibility->lit & !behind;
     visibility->uncertain = open & !faint;
     if (HAS_TRIANGLES)
         visibility->uncertain =
-            visibility->uncertain | (!turned & !open & (fabs(light.cosine) <= light.error));
-    if (HAS_TRANSMISSION)
-        visibility->uncertain = visibility->uncertain | (behind & surface_is_transparent(surface));
+            visibility->uncertain | (!turned & !open & (fabs(cosine.value) <= cosine.error));
+    visibility->uncertain = visibility->uncertain | (behind & surface_is_transparent(surface));
     return turned;
 }
 
