@@ -28,8 +28,8 @@ static inline Ray camera_ray(global const SceneHeader *header, Pixels pixels, sc
 {
     Sample sample;
     if (HAS_LENS || HAS_AREA_LIGHTS) sample = sample_of_pixels(pixels.x, pixels.y, index);
-    real x = real_from_integer(pixels.x * 2 + 1 - (integer)((scalar_integer)header->image.x)) + dx;
-    real y = real_from_integer((integer)((scalar_integer)header->image.y) - 1 - pixels.y * 2) + dy;
+    real x = real_from_integer(pixels.x * 2 + 1 - integer_of(header->image.x)) + dx;
+    real y = real_from_integer(integer_of(header->image.y) - 1 - pixels.y * 2) + dy;
     Vector origin = vector_of(header->eye), direction = vector_of(header->forward);
     bool has_lens = HAS_LENS && header->lens_right.w > 0;
     bool is_orthographic = HAS_ORTHOGRAPHIC && header->lens_up.w == CAMERA_ORTHOGRAPHIC;

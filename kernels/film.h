@@ -69,18 +69,17 @@ static inline Tile band_tile(const Band *band, uint which)
     Tile tile;
     uint left = ((uint)get_global_id(0) * MACRO_TILE_COLUMNS + which % MACRO_TILE_COLUMNS) * TILE_WIDTH;
     uint top = ((uint)get_global_id(1) * MACRO_TILE_ROWS + (which >> MACRO_TILE_COLUMNS_LOG2)) * TILE_HEIGHT;
-    integer x = (integer)((scalar_integer)left) + LANE_X, y = (integer)((scalar_integer)top) + LANE_Y;
-    tile.inside =
-        (x < (integer)((scalar_integer)band->width)) & (y < (integer)((scalar_integer)band->height));
+    integer x = integer_of(left) + LANE_X, y = integer_of(top) + LANE_Y;
+    tile.inside = (x < integer_of(band->width)) & (y < integer_of(band->height));
     tile.whole = left + TILE_WIDTH <= band->width && top + TILE_HEIGHT <= band->height;
     tile.first = top * band->width + left;
     tile.width = band->width;
     const uint item_width = MACRO_TILE_COLUMNS * TILE_WIDTH;
     const uint of_row = (band->width + item_width - 1) / item_width;
     tile.number = ((uint)get_global_id(1) * of_row + (uint)get_global_id(0)) * TILES + which;
-    integer cell = (integer)((scalar_integer)band->cell);
-    tile.pixels.x = x * cell + (integer)((scalar_integer)band->first_x);
-    tile.pixels.y = y * cell + (integer)((scalar_integer)band->first_y);
+    integer cell = integer_of(band->cell);
+    tile.pixels.x = x * cell + integer_of(band->first_x);
+    tile.pixels.y = y * cell + integer_of(band->first_y);
     if (band->cell > 1) tile.pixels = pixels_scatter(tile.pixels, band->cell);
     return tile;
 }
@@ -89,7 +88,7 @@ static inline Tile band_tile(const Band *band, uint which)
 static inline integer tile_index(const Tile *tile)
 {
     if (IS_PIXEL_LIST) return tile->index;
-    return (integer)((scalar_integer)tile->first) + LANE_Y * (integer)((scalar_integer)tile->width) + LANE_X;
+    return integer_of(tile->first) + LANE_Y * integer_of(tile->width) + LANE_X;
 }
 
 // Stores one of `stride` values per pixel.

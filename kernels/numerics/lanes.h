@@ -120,6 +120,12 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 
 #define lanes_select(condition, yes, no) ((condition) ? (yes) : (no))
 
+// Returns the number in all lanes.
+static inline integer integer_of(uint value)
+{
+    return (integer)((scalar_integer)value);
+}
+
 static inline mask mask_all(void)
 {
     return (real)(0) == (real)(0);
@@ -274,7 +280,7 @@ static inline mask mask_of_bits(uint bits)
 #if LANES == 1
     return bits != 0;
 #else
-    return ((integer)((scalar_integer)bits) & LANE_BIT) != (integer)(0);
+    return (integer_of(bits) & LANE_BIT) != (integer)(0);
 #endif
 }
 

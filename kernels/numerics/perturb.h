@@ -36,8 +36,7 @@ static inline unsigned_integer perturb_hash(uint operation, integer a, integer b
 // Returns a hashed number from -largest to largest.
 static inline integer perturb_steps(unsigned_integer hash, uint largest)
 {
-    return integer_from_unsigned(mul_hi(hash, (unsigned_integer)(2 * largest + 1))) -
-           (integer)((scalar_integer)largest);
+    return integer_from_unsigned(mul_hi(hash, (unsigned_integer)(2 * largest + 1))) - integer_of(largest);
 }
 
 // Moves the value by a hashed number of ulp, up to `largest`. Does not change 0 and values near underflow or

@@ -49,7 +49,7 @@ static inline real ray_place_error(const Ray *ray, real distance)
 // Returns the lanes whose ray starts on the object with this id.
 static inline mask ray_starts_on(const Ray *ray, uint id)
 {
-    return ray->origin_object == (integer)((scalar_integer)id);
+    return ray->origin_object == integer_of(id);
 }
 
 // Returns the lanes whose ray starts on this shape and does not hit it again, because it is flat, or convex

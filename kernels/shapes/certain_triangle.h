@@ -185,10 +185,9 @@ static inline mask triangle_left_behind(const Triangle *triangle, const Triangle
          over_c = lanes & ray_starts_on(ray, ids_sides.z);
     if (!lanes_any(over_a | over_b | over_c)) return mask_none();
     const integer none = (integer)(0);
-    integer sides = lanes_select(over_a, (integer)((scalar_integer)(ids_sides.w & 15)), none);
-    sides = lanes_select(over_b, (integer)((scalar_integer)(ids_sides.w >> NEIGHBOR_SIDES_BITS & 15)), sides);
-    sides = lanes_select(over_c, (integer)((scalar_integer)(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 15)),
-                         sides);
+    integer sides = lanes_select(over_a, integer_of(ids_sides.w & 15), none);
+    sides = lanes_select(over_b, integer_of(ids_sides.w >> NEIGHBOR_SIDES_BITS & 15), sides);
+    sides = lanes_select(over_c, integer_of(ids_sides.w >> (2 * NEIGHBOR_SIDES_BITS) & 15), sides);
     mask is_behind = (sides & (integer)(NEIGHBOR_HAS_THIS_BEHIND)) != none;
     if (HAS_SMOOTH_NORMALS) {
         mask lifts_away = ray->leaves_outward & ((sides & (integer)(NEIGHBOR_LIFTS_AWAY)) != none);

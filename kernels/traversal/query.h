@@ -59,7 +59,7 @@ static inline integer optical_depth_steps(uint4 steps)
 #if IS_DOUBLE
     return (integer)(steps.x == OPAQUE ? OPTICAL_DEPTH_MAX : upsample(as_int(steps.z), steps.y));
 #else
-    return (integer)((scalar_integer)steps.x);
+    return integer_of(steps.x);
 #endif
 }
 
@@ -113,7 +113,7 @@ static inline void traversal_record(Traversal *traversal, const Scene *scene, ma
     if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(traversal, scene, id))
         return;
     if (HAS_INSTANCES) id += traversal->within.first;
-    integer object = (integer)((scalar_integer)id);
+    integer object = integer_of(id);
     mask tie = (t == hit->t) & (object < hit->object);
     mask closer = found & ((t < hit->t) | tie);
     real_replace(&hit->t, closer, t);
@@ -133,7 +133,7 @@ static inline void traversal_record_certain(Traversal *traversal, const Scene *s
     }
     if (HAS_TRANSMISSION && traversal->query == CLOSEST_OPAQUE_HIT && !object_is_opaque(traversal, scene, id))
         return;
-    integer object = (integer)((scalar_integer)id);
+    integer object = integer_of(id);
     mask is_new =
         (found->found | found->uncertain) & (hit->object != object); // it may have been tested before
     mask closer = found->found & is_new & (found->t < hit->t);
