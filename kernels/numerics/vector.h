@@ -86,6 +86,10 @@ static inline Vector vector_normalize(Vector a)
     return vector_scale(a, real_divide((real)(1), lanes_select(zero, (real)(1), norm)));
 }
 
+// Bounds the error at `certified` of a unit vector, or of its dot product with another one. It is off by
+// 14.5 u, as quotients may be off by 5 u and roots by 7 u.
+#define DIRECTION_ROUNDING ((real)(16 * UNIT_ROUNDOFF))
+
 // Normalizes a vector that is a unit vector except for a rounding e, by a Newton step, whose error is e^2.
 static inline Vector vector_renormalize(Vector a)
 {

@@ -22,16 +22,13 @@ enum { SHADOW_ERROR_MAX = 1 << 9 };
 // The steepest slope of x^2 (3 - 2 x), at x = 1/2.
 #define SMOOTH_STEP_SLOPE 1.5f
 
-// The error of a unit vector's direction and of a dot product with it. A unit vector is off by 14.5 u, as
-// quotients may be off by 5 u and roots by 7 u.
-#define DIRECTION_ROUNDING ((real)(16 * UNIT_ROUNDOFF))
 // The relative roundings of a light's color and of its contribution, up to those of the power.
 #define COLOR_ROUNDING ((real)(128 * UNIT_ROUNDOFF))
 
 // A highlight's error bound is tightened if it exceeds this.
 #define HIGHLIGHT_ERROR_FAINT ((real)(CERTIFIED_COLOR_ERROR * 0x1p-4f))
 // The slope of the highlight (1 - d^2 / 2)^n is steepest at d^2 = 2 / (2 n - 1). There it is 1.41 for n = 1
-// and approaches e^-1/2 sqrt(n) from below HIGHLIGHT_SLOPE sqrt(n) + HIGHLIGHT_SLOPE_MORE.
+// and near e^-1/2 sqrt(n) for large n, never above HIGHLIGHT_SLOPE sqrt(n) + HIGHLIGHT_SLOPE_MORE.
 #define HIGHLIGHT_SLOPE      ((real)(0.61f))
 #define HIGHLIGHT_SLOPE_MORE ((real)(0.81f))
 // Exceeds the relative roundings of a highlight and of its vectors' distance.

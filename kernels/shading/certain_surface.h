@@ -38,7 +38,7 @@ static inline void surface_narrow_place(Surface *surface, mask lanes, real heigh
 // error, along it by that of t, and by the roundings of ray_point and those of the shape.
 static inline void surface_start_errors(Surface *surface, const Ray *ray, const Hit *hit)
 {
-    surface->eye_error = ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+    surface->eye_error = ray->direction_error + DIRECTION_ROUNDING;
     surface->uncertain = hit->uncertain;
     if (HAS_CHORDS) surface->chord_end = chord_end_none();
     real length = ray->length * BOUND_SLACK, t = fabs(hit->t);
@@ -98,13 +98,12 @@ static inline void surface_set_errors(Surface *surface, const SurfacePoint *poin
     if (HAS_TRIANGLES) { // triangles with smooth normals
         real shading_cosine = vector_dot(point->shading_normal, point->normal);
         mask flat = shading_cosine == vector_dot(point->normal, point->normal);
-        geometric_error =
-            lanes_select(flat, surface->normal_error, point->normal_error + (real)(16 * UNIT_ROUNDOFF));
+        geometric_error = lanes_select(flat, surface->normal_error, point->normal_error + DIRECTION_ROUNDING);
         is_open = fabs(shading_cosine) <= geometric_error + surface->normal_error;
         surface->geometric_error = geometric_error;
     }
     real cosine = fabs(vector_dot(point->normal, ray->direction)); // times the ray's length
-    real cosine_error = geometric_error + ray->direction_error + (real)(16 * UNIT_ROUNDOFF);
+    real cosine_error = geometric_error + ray->direction_error + DIRECTION_ROUNDING;
     is_open = is_open | !(cosine > cosine_error * ray->length);
     surface->uncertain = surface->uncertain | (surface_found(surface) & is_open);
     surface_set_line_error(surface, point);

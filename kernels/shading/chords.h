@@ -56,7 +56,7 @@ static inline ChordEnd chord_end(const Sphere *sphere, const Ray *ray, const Hit
     real cosine = fabs(vector_dot(f, ray->direction)) * inverse * ray_inverse_length(ray);
     real moved = divide_or(end.off, cosine, NEVER);
     end.normal = inverse * (moved + (real)(UNIT_ROUNDOFF) * ((real)(4) * center1 + (real)(2) * rounding)) +
-                 (real)(16 * UNIT_ROUNDOFF);
+                 DIRECTION_ROUNDING;
     mask usable = lanes & (moved <= CHORD_MOVE_MAX * cosine * radius);
     end.radius = lanes_select(usable, radius, (real)(0));
     mask continues = usable & (hit->object == ray->origin_object) & (ray->chord_turn < NEVER);

@@ -42,8 +42,7 @@ static inline void shape_set_errors(const Scene *scene, LaneSurfacePoints *hit, 
 static inline real point_normal_error(const SurfacePoint *point, real place_error)
 {
     real turned = point->curvature * place_error; // to first order
-    return real_fma(turned, real_fma((real)(4), turned, (real)(1)), point->normal_error) +
-           (real)(16 * UNIT_ROUNDOFF);
+    return real_fma(turned, real_fma((real)(4), turned, (real)(1)), point->normal_error) + DIRECTION_ROUNDING;
 }
 
 static inline mask floor_is_uncertain(real a, real error)

@@ -64,7 +64,7 @@ static inline Vector background_color(const Scene *scene, Vector direction, mask
 // Bounds the error of the sky's color in every channel, at `certified`.
 static inline real sky_color_error(const Scene *scene, const Ray *ray)
 {
-    return (real)(scene->header->sky_up.w) * (ray->direction_error + (real)(16 * UNIT_ROUNDOFF));
+    return (real)(scene->header->sky_up.w) * (ray->direction_error + DIRECTION_ROUNDING);
 }
 
 #endif

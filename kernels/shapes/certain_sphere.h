@@ -5,8 +5,8 @@
 
 #include "shapes/certain.h"
 
-// A sphere crossed by a line. With l the line's closest point to the center, r^2 - l^2 is half the chord
-// squared.
+// A sphere crossed by a line. With l the line's closest point to the center, r^2 - l^2 is the square of half
+// the chord.
 typedef struct {
     Vector start; // the ray's start, seen from the center
     real radius;
@@ -55,7 +55,7 @@ typedef struct {
     real distance; // bounds the start's distance from the center, where that counts
     real place;    // of points of the line: of the ray, and of rounding
     real along;    // of the closest point, along the line
-    real band;     // of half the chord squared
+    real band;     // of the square of half the chord
 } SphereErrors;
 
 static inline SphereErrors sphere_errors(real radius, real middle_t, const Ray *ray)
@@ -74,7 +74,7 @@ static inline SphereErrors sphere_errors(real radius, real middle_t, const Ray *
     return errors;
 }
 
-// Sets the crossings and their bound, for half the chord squared.
+// Sets the crossings and their bound. `squared` is the square of half the chord.
 static inline void sphere_set_crossings(CertainSphere *sphere, const Ray *ray, real squared,
                                         const SphereErrors *errors)
 {
@@ -96,6 +96,7 @@ static inline void sphere_set_crossings(CertainSphere *sphere, const Ray *ray, r
     sphere->middle_error = inverse_length * (place + errors->along);
 }
 
+// Returns how the lines of the rays in `lanes` cross a sphere.
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
 {
     CertainSphere crossed;
@@ -124,6 +125,7 @@ typedef struct {
     real middle_t; // the closest point to the center
 } BoundedLine;
 
+// Returns the part of each active ray's line within a bounding sphere.
 static inline BoundedLine line_within_bounds(Vector center, real radius, const Ray *ray)
 {
     const CertainSphere bounding =
