@@ -313,6 +313,21 @@ static inline real real_max(real a, real b)
     return lanes_select(a > b, a, b);
 }
 
+static inline real real_min_of_3(real a, real b, real c)
+{
+    return real_min(real_min(a, b), c);
+}
+
+static inline real real_max_of_3(real a, real b, real c)
+{
+    return real_max(real_max(a, b), c);
+}
+
+static inline real real_clamp(real a, real low, real high)
+{
+    return real_min(real_max(a, low), high);
+}
+
 // Replaces a value in some lanes.
 static inline void real_replace(real *value, mask where, real other)
 {

@@ -67,7 +67,7 @@ static inline Bounces bounces_none(const Ray *ray, uint depth)
 static inline Color3 conductor_reflectance(const Surface *surface, Vector direction)
 {
     const real one = (real)(1), zero = (real)(0);
-    real cosine = real_min(real_max(-vector_dot(direction, surface->shading_normal), zero), one);
+    real cosine = real_clamp(-vector_dot(direction, surface->shading_normal), zero, one);
     real cosine_squared = cosine * cosine, sine_squared = one - cosine_squared;
     Color3 index_real = surface->conductor_real, squared = surface->conductor_imaginary_squared;
     return (Color3){conductor_channel(cosine, cosine_squared, sine_squared, index_real.x, squared.x),

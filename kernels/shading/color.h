@@ -31,7 +31,7 @@ static inline Color3 color_add_weighted(Color3 sum, Color3 weight, Color3 color)
 // Returns the largest channel.
 static inline real color_largest(Color3 color)
 {
-    return real_max(real_max(color.x, color.y), color.z);
+    return real_max_of_3(color.x, color.y, color.z);
 }
 
 #endif

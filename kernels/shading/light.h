@@ -48,7 +48,7 @@ static inline real spot_strength(const Light *light, Vector from_light)
 {
     real s = cosine_complement(from_light, vector_of(light->direction));
     real x = ((real)(light->cone.x) - s) * (real)(light->cone.z);
-    x = real_min(real_max(x, (real)(0)), (real)(1));
+    x = real_clamp(x, (real)(0), (real)(1));
     real soft = x * x * real_fma((real)(-2), x, (real)(3));
     real hard = lanes_select(s <= (real)(light->cone.x), (real)(1), (real)(0));
     return light->cone.z == 0 ? hard : soft;

@@ -70,11 +70,6 @@ static inline real slab_distance(Interval slab, real direction, real t, mask *lo
     return real_min(to_near, to_far);
 }
 
-static inline real slab_clamp(real value, real low, real high)
-{
-    return real_min(real_max(value, low), high);
-}
-
 // Returns the point on the face whose crossing is nearest to t, or the first of x, y and z if several are.
 // The position lies exactly on that face.
 static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, real t)
@@ -92,11 +87,11 @@ static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, rea
     Vector position = ray_point(ray, t);
     const real zero = (real)(0), one = (real)(1);
     position.x =
-        lanes_select(on_x, lanes_select(low_x, low.x, high.x), slab_clamp(position.x, low.x, high.x));
+        lanes_select(on_x, lanes_select(low_x, low.x, high.x), real_clamp(position.x, low.x, high.x));
     position.y =
-        lanes_select(on_y, lanes_select(low_y, low.y, high.y), slab_clamp(position.y, low.y, high.y));
+        lanes_select(on_y, lanes_select(low_y, low.y, high.y), real_clamp(position.y, low.y, high.y));
     position.z =
-        lanes_select(on_z, lanes_select(low_z, low.z, high.z), slab_clamp(position.z, low.z, high.z));
+        lanes_select(on_z, lanes_select(low_z, low.z, high.z), real_clamp(position.z, low.z, high.z));
     Vector normal = {lanes_select(on_x, lanes_select(low_x, -one, one), zero),
                      lanes_select(on_y, lanes_select(low_y, -one, one), zero),
                      lanes_select(on_z, lanes_select(low_z, -one, one), zero)};

@@ -55,8 +55,8 @@ static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real erro
          w_error = error * (a_sum + b_sum);
     real u_low = edges->u - u_error, v_low = edges->v - v_error, w_low = edges->w - w_error;
     real u_high = edges->u + u_error, v_high = edges->v + v_error, w_high = edges->w + w_error;
-    mask misses = (real_max(real_max(u_low, v_low), w_low) > zero) &
-                  (real_min(real_min(u_high, v_high), w_high) < zero);
+    mask misses =
+        (real_max_of_3(u_low, v_low, w_low) > zero) & (real_min_of_3(u_high, v_high, w_high) < zero);
     TriangleSigns signs;
     signs.error = error;
     signs.perhaps = !misses;
@@ -113,7 +113,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     const Vector along = ray_along(ray);
     real a_t = vector_dot(edges->a, along), b_t = vector_dot(edges->b, along),
          c_t = vector_dot(edges->c, along);
-    real low = real_min(real_min(a_t, b_t), c_t), high = real_max(real_max(a_t, b_t), c_t);
+    real low = real_min_of_3(a_t, b_t, c_t), high = real_max_of_3(a_t, b_t, c_t);
     real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
     real place = triangle_place_error(ray, distance, (real)(sizes.size));
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
@@ -147,8 +147,8 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
 static inline mask triangle_is_passed(const TriangleEdges *edges, real error)
 {
     real ax = edges->ax, ay = edges->ay, bx = edges->bx, by = edges->by, cx = edges->cx, cy = edges->cy;
-    return (real_min(real_min(ax, bx), cx) > error) | (real_max(real_max(ax, bx), cx) < -error) |
-           (real_min(real_min(ay, by), cy) > error) | (real_max(real_max(ay, by), cy) < -error);
+    return (real_min_of_3(ax, bx, cx) > error) | (real_max_of_3(ax, bx, cx) < -error) |
+           (real_min_of_3(ay, by, cy) > error) | (real_max_of_3(ay, by, cy) < -error);
 }
 
 // Returns the hit with bounds. First rejects by one error for all edge functions (docs/numerics.md).
@@ -159,8 +159,8 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     real error = triangle_frame_error(&edges, ray, (real)(sizes.size));
     real edge_error = error * real_fma(error, (real)(EDGE_SECOND_ORDER),
                                        ray->across_length * (real)(EDGE_FIRST_ORDER * sizes.longest));
-    real highest = real_max(real_max(edges.u, edges.v), edges.w),
-         lowest = real_min(real_min(edges.u, edges.v), edges.w);
+    real highest = real_max_of_3(edges.u, edges.v, edges.w),
+         lowest = real_min_of_3(edges.u, edges.v, edges.w);
     mask lanes = RAY_ACTIVE(ray) & !((highest > edge_error) & (lowest < -edge_error));
     if (!lanes_any(lanes)) return certain_miss();
     TriangleSigns signs = triangle_signs(&edges, error);

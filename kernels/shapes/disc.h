@@ -77,7 +77,7 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     // rim
     real nearest = -vector_dot(vector_subtract(ray->origin, center), ray->direction) * ray->inverse_squared;
     real half_chord = radius * real_sqrt(ray->inverse_squared);
-    *t = real_min(real_max(*t, nearest - half_chord), nearest + half_chord);
+    *t = real_clamp(*t, nearest - half_chord, nearest + half_chord);
     real scaled_radius = radius * crossing.along;
     return hit & (vector_dot(crossing.across, crossing.across) <= scaled_radius * scaled_radius) &
            (*t > ray->tmin);

@@ -26,7 +26,7 @@ static inline real interval_middle(Interval interval)
 
 static inline real interval_clamp(Interval interval, real t)
 {
-    return real_min(real_max(t, interval.near), interval.far);
+    return real_clamp(t, interval.near, interval.far);
 }
 
 #endif

@@ -144,8 +144,8 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
 // slack.
 static inline Interval triangle_slab(real a, real b, real c, real slack, real inverse)
 {
-    real low = (real_min(real_min(a, b), c) - slack) * inverse;
-    real high = (real_max(real_max(a, b), c) + slack) * inverse;
+    real low = (real_min_of_3(a, b, c) - slack) * inverse;
+    real high = (real_max_of_3(a, b, c) + slack) * inverse;
     return (Interval){real_min(low, high), real_max(low, high)};
 }
 
@@ -153,9 +153,9 @@ static inline Interval triangle_slab(real a, real b, real c, real slack, real in
 static inline Vector corners_max_abs(Corners corners)
 {
     Vector a = corners.a, b = corners.b, c = corners.c;
-    return (Vector){real_max(real_max(fabs(a.x), fabs(b.x)), fabs(c.x)),
-                    real_max(real_max(fabs(a.y), fabs(b.y)), fabs(c.y)),
-                    real_max(real_max(fabs(a.z), fabs(b.z)), fabs(c.z))};
+    return (Vector){real_max_of_3(fabs(a.x), fabs(b.x), fabs(c.x)),
+                    real_max_of_3(fabs(a.y), fabs(b.y), fabs(c.y)),
+                    real_max_of_3(fabs(a.z), fabs(b.z), fabs(c.z))};
 }
 
 // Returns t by the clamped step. Edge-on the error of t is unbounded, while the edge functions, which do not
@@ -177,8 +177,7 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
                    (max_abs.x * fabs(along.x) + max_abs.y * fabs(along.y) + max_abs.z * fabs(along.z));
     real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
     return interval_clamp(
-        (Interval){real_min(real_min(a_t, b_t), c_t) - t_error, real_max(real_max(a_t, b_t), c_t) + t_error},
-        t);
+        (Interval){real_min_of_3(a_t, b_t, c_t) - t_error, real_max_of_3(a_t, b_t, c_t) + t_error}, t);
 }
 
 // Returns t by the accurate step and, at low angles or in double, the clamped one.
@@ -254,7 +253,7 @@ static inline SurfacePoint corners_surface_point(Corners corners, Vector normal,
         surface_point_make(triangle_blend(weights, corners), unit, vector_norm1_along(unit, max_abs));
     if (IS_COMPENSATED | HAS_EYE_POWERS) {
         real magnitude =
-            real_max(real_max(vector_norm1(corners.a), vector_norm1(corners.b)), vector_norm1(corners.c));
+            real_max_of_3(vector_norm1(corners.a), vector_norm1(corners.b), vector_norm1(corners.c));
         if (!IS_COMPENSATED) magnitude = lanes_select(next_to_eye, magnitude, (real)(0));
         surface_point_move_to_ray(&point, ray, t, magnitude);
     }

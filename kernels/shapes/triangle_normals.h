@@ -36,7 +36,7 @@ static inline TriangleHeights triangle_lift(Corners corners, Corners normals, Tr
                                real_max(side * (weights.a * ca_c - weights.b * bc_c), zero), zero};
     if (IS_CERTIFIED)
         heights.steepest =
-            real_max(real_max(fabs(ab_a) + fabs(ca_a), fabs(bc_b) + fabs(ab_b)), fabs(ca_c) + fabs(bc_c));
+            real_max_of_3(fabs(ab_a) + fabs(ca_a), fabs(bc_b) + fabs(ab_b), fabs(ca_c) + fabs(bc_c));
     point->lift = triangle_blend((TriangleWeights){side * weights.a * heights.a, side * weights.b * heights.b,
                                                    side * weights.c * heights.c},
                                  normals);
@@ -57,7 +57,7 @@ static inline real triangle_slimness(Corners corners)
     Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
            bc = vector_subtract(corners.c, corners.b);
     Vector across = vector_cross(ab, ac);
-    real longest_squared = real_max(real_max(vector_dot(ab, ab), vector_dot(ac, ac)), vector_dot(bc, bc)),
+    real longest_squared = real_max_of_3(vector_dot(ab, ab), vector_dot(ac, ac), vector_dot(bc, bc)),
          area_squared = vector_dot(across, across);
     return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
 }

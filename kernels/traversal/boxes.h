@@ -80,9 +80,9 @@ static inline BoxRays box_rays(const Ray *ray, scalar4 bounds, scalar hit_slack)
     const real huge = (real)(1 / SMALLEST_RATIO);
     real largest = real_min(huge * real_inverse_power_of_two(max_norm1), huge);
     Vector inverse = HAS_BOXES ? ray->inverse : ray_inverse(ray);
-    inverse.x = real_min(real_max(inverse.x, -largest), largest);
-    inverse.y = real_min(real_max(inverse.y, -largest), largest);
-    inverse.z = real_min(real_max(inverse.z, -largest), largest);
+    inverse.x = real_clamp(inverse.x, -largest, largest);
+    inverse.y = real_clamp(inverse.y, -largest, largest);
+    inverse.z = real_clamp(inverse.z, -largest, largest);
     Vector to_plane = {-ray->origin.x * inverse.x, -ray->origin.y * inverse.y, -ray->origin.z * inverse.z};
     Vector slack_t = {slack * fabs(inverse.x), slack * fabs(inverse.y), slack * fabs(inverse.z)};
     Vector d = ray->direction;

@@ -158,11 +158,11 @@ static inline void ray_prepare(Ray *ray)
     Vector d = ray->direction;
     if (HAS_BOXES) ray->inverse = ray_inverse(ray);
     if (!HAS_TRIANGLES) return;
-    real largest = real_max(real_max(fabs(d.x), fabs(d.y)), fabs(d.z));
+    real largest = real_max_of_3(fabs(d.x), fabs(d.y), fabs(d.z));
     real scale = real_inverse_power_of_two(largest);
     if (IS_CERTIFIED) {
         shear_across(vector_scale(d, scale), &ray->across_u, &ray->across_v);
-        real least = real_min(real_min(fabs(d.x), fabs(d.y)), fabs(d.z)),
+        real least = real_min_of_3(fabs(d.x), fabs(d.y), fabs(d.z)),
              second = vector_norm1(d) - largest - least;
         ray->across_length = BOUND_SLACK * scale * hypotenuse_above(second, largest);
     } else {

@@ -102,7 +102,7 @@ static inline real traversal_transmittance(const Traversal *traversal)
     if (!HAS_TRANSMISSION) return lanes_select(traversal->active, all, none);
     if (HAS_FILTERS) {
         Vector passed = traversal_filter(traversal);
-        return real_max(real_max(passed.x, passed.y), passed.z);
+        return real_max_of_3(passed.x, passed.y, passed.z);
     }
     return lanes_select(traversal->active, depth_transmittance(traversal->optical_depth), none);
 }

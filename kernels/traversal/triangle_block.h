@@ -64,16 +64,6 @@ static inline Vector vector_flip(Vector a, integer sign)
     return (Vector){real_flip(a.x, sign), real_flip(a.y, sign), real_flip(a.z, sign)};
 }
 
-static inline real real_min_of_3(real a, real b, real c)
-{
-    return real_min(real_min(a, b), c);
-}
-
-static inline real real_max_of_3(real a, real b, real c)
-{
-    return real_max(real_max(a, b), c);
-}
-
 // A block's vertices and edges in the frame, and bounds of each triangle.
 typedef struct {
     Vector vertex; // a, on the frame's axes but not from its origin
