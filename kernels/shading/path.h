@@ -43,7 +43,7 @@ static inline void hit_add_light(const Scene *scene, uint index, LightVisibility
     const real strength = light->fraction;
     light_occlude(light, occlusion);
     if (IS_CERTIFIED) {
-        // at an uncertain facing only highlights count
+        // where the facing is uncertain, only highlights count
         const mask glossy = hit->surface.specular > (real)(0), faint = light->facing_uncertain & !glossy;
         hit->uncertain = hit->uncertain | (light->uncertain & !faint) | (light->facing_uncertain & glossy);
         hit->color_error = hit->color_error +
@@ -117,8 +117,8 @@ static inline mask color_is_uncertain(Color3 color, real error)
     return !(error <= (real)(COLOR_ERROR_PART * CERTIFIED_COLOR_ERROR) * largest);
 }
 
-// Sets the bounces of a ray at its hit. `traced` is the bounce that the ray is. Adds the lanes where they are
-// uncertain to *uncertain.
+// Sets the bounces of a ray at its hit. `traced` is the bounce that the ray was made from. Adds the lanes
+// where they are uncertain to *uncertain.
 static inline void hit_bounce(const Scene *scene, const Ray *ray, const Surface *surface,
                               const Bounce *traced, Bounces *bounces, mask *uncertain)
 {
@@ -163,7 +163,7 @@ static inline Color3 ray_tree_color(const Scene *scene, Ray ray, bool is_shaded,
         if (!(HAS_REFLECTION || HAS_TRANSMISSION)) {
             if (COMPUTE_SIGNATURE) *path = path_signature_add(*path, rays, shaded->surface.object, &bounces);
             color = shaded->color;
-            color_error = shaded->color_error;
+            if (IS_CERTIFIED) color_error = shaded->color_error;
             break;
         }
         if (HAS_ABSORPTION) {
