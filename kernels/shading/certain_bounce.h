@@ -4,10 +4,12 @@
 
 #include "shading/bounce.h"
 
-// The largest error of a bounced ray's direction with which it is still traced.
-#define BOUNCE_ERROR_MAX ((real)(0x1p-6f))
+// The largest error of a bounced ray's direction with which the ray is still traced. With a larger one its
+// hit is seldom certain. With a BVH the few rays of a packet that get this far take as long as a full packet,
+// which costs more than re-rendering pixels without need.
+#define BOUNCE_ERROR_MAX ((real)(HAS_BVH && !IS_DOUBLE ? 0x1p-9f : 0x1p-6f))
 // A vector that is off by e of its length is off by at most e / (1 - e) as a unit vector, which for e up to
-// BOUNCE_ERROR_MAX is below this times e.
+// 2^-6 is below this times e.
 #define UNIT_VECTOR_ERROR ((real)(1.02f))
 // The relative rounding error of a bounced ray's direction and of its terms.
 #define BOUNCE_ROUNDING ((real)(32 * UNIT_ROUNDOFF))
