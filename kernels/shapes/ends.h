@@ -5,6 +5,19 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
+// Returns the lanes whose line from + t d stays at least 2% farther than `reach` from the axis w through 0.
+// With q = d x w it is |from . q| > reach |q|. Roundings change the two sides by less than 15 u (|from| +
+// reach) |d| |w|, and (a + b)^2 <= (1 + 2^-6) a^2 + (1 + 2^6) b^2.
+static inline mask line_is_off_axis(Vector from, real reach, Vector axis, real squared_axis, const Ray *ray)
+{
+    const Vector q = vector_cross(ray->direction, axis);
+    const real moment = vector_dot(from, q), squared_reach = reach * reach;
+    const real slack = (real)(0x1p15f * UNIT_ROUNDOFF * UNIT_ROUNDOFF) *
+                       ((vector_dot(from, from) + squared_reach) * (ray->squared * squared_axis));
+    return moment * moment >
+           real_fma((real)(1 + 0x1p-4f) * squared_reach, vector_dot(q, q), slack + (real)(SMALLEST_RATIO));
+}
+
 // The intervals of t that decide where a ray hits the side and the caps.
 typedef struct {
     Interval side;   // inside the side; between the nappes of an unbounded cone, outside it

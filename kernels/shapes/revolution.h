@@ -84,25 +84,41 @@ static inline EndedCrossings revolution_crossings(const Revolution *shape, bool 
     return crossings;
 }
 
+// Returns the largest radius of a finite shape times |axis|.
+static inline scalar revolution_widest(const Revolution *shape)
+{
+    scalar base = shape->base_radius.w, slope = shape->axis_slope.w;
+    return fmax(fma(slope, shape->range.w, base), fma(slope, shape->range.x, base));
+}
+
+// Returns the lanes whose line stays clearly off the axis of a finite shape, without pairs.
+static inline mask revolution_is_off_line(const Revolution *shape, const Ray *ray)
+{
+    if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return mask_none();
+    const Vector from = vector_subtract(ray->origin, vector_of(shape->base_radius));
+    const real reach = real_divide((real)(revolution_widest(shape)), (real)(shape->range.y));
+    return line_is_off_axis(from, reach, vector_of(shape->axis_slope), (real)(shape->range.z), ray);
+}
+
 // Returns the lanes whose point at t is not farther from the axis than the shape's largest radius, within 8 u
 // of the distance. A ray along a cone's side has a root near infinity with a random sign, and the wrong sign
 // swaps inside and outside.
 static inline mask revolution_reaches(const Revolution *shape, const RevolutionQuadric *quadric,
                                       const Ray *ray, real t)
 {
-    scalar base = shape->base_radius.w, slope = shape->axis_slope.w;
-    scalar widest = fmax(fma(slope, shape->range.w, base), fma(slope, shape->range.x, base));
     Vector offset = vector_scale(ray->direction, t);
     real size =
         vector_norm1(vector_subtract(ray->origin, vector_of(shape->base_radius))) + vector_norm1(offset);
     real error = (real)(8 * UNIT_ROUNDOFF * shape->range.y) * size;
-    return vector_norm(vector_fma(quadric->q, t, quadric->m)) <= (real)(widest) + error;
+    return vector_norm(vector_fma(quadric->q, t, quadric->m)) <= (real)(revolution_widest(shape)) + error;
 }
 
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
+    mask hit = RAY_ACTIVE(ray);
+    if (IS_COMPENSATED && !lanes_any(hit & !revolution_is_off_line(shape, ray))) return mask_none();
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
-    mask hit = RAY_ACTIVE(ray) & revolution_line_crosses(&quadric);
+    hit = hit & revolution_line_crosses(&quadric);
     if (!lanes_any(hit)) return hit;
     const EndedCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     hit = hit & ends_first_hit(shape->id.y, ray, &crossings, t);
