@@ -51,6 +51,7 @@ typedef struct {
     real low, high;   // the ends' heights
     real half_height; // half the distance between them
     real widest;      // the largest radius
+    real axis_error;  // bounds how far the axis' direction, and the slope by its length, are off
     Vector middle;
 } RoundSolid;
 
@@ -158,10 +159,11 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
 }
 
 // Sets the errors of a point's normal, at t. Returns the lanes where the point may be at the rim, where the
-// normals of side and cap differ. The normal turns by 1 / rho, or for a paraboloid by 1 over the gradient's
-// length, which is at least rho and k / 2, to which half as much is added, since the point is moved onto the
-// surface: 1.5 / max(rho, k / 2) <= 3 / max(rho, k). The ray's error only moves the point, so it counts in
-// place_error alone. A vector that is off by e is, once normalized, off by up to 2 e over its length.
+// normals of side and cap differ. A vector that is off by e is, once normalized, off by up to 2 e over its
+// length, which is rho, or for a paraboloid the gradient's, at least rho and k / 2. To 1 over that half as
+// much is added, since the point is moved onto the surface: 1.5 / max(rho, k / 2) <= 3 / max(rho, k). The
+// normal turns with the axis and, as the slope changes, by half as much again. The ray's error only moves the
+// point, so it counts in place_error alone.
 static inline mask round_set_errors(const RoundSolid *solid, uint flags, const Ray *ray, real t,
                                     real place_error, SurfacePoint *point)
 {
@@ -173,9 +175,8 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
                   (real)(1 / SMALLEST_RATIO));
     real rounding = at.rounding; // with a power, also of the foot
     if (round->has_power) rounding = real_fma((real)(2 * UNIT_ROUNDOFF), round->foot_norm1, rounding);
-    real turned = solid->is_finite ? divide_or(rounding, solid->half_height, (real)(1)) : (real)(0);
     point->curvature = curvature;
-    point->normal_error = (real)(4) * real_fma(rounding, curvature, turned);
+    point->normal_error = (real)(2) * real_fma(rounding, curvature, solid->axis_error);
     if (!(flags & REVOLUTION_CAPPED)) return mask_none();
     real z = vector_dot(round->axis, vector_fma(ray->direction, t, round->start));
     real from_end = real_min(fabs(z - solid->low), fabs(z - solid->high));
@@ -184,7 +185,7 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
     mask near_end = from_end <= error, near_side = fabs(at.value) <= at.band + side_band;
     mask on_cap = near_end & !near_side;
     real_replace(&point->curvature, on_cap, (real)(0));
-    real_replace(&point->normal_error, on_cap, (real)(4) * turned);
+    real_replace(&point->normal_error, on_cap, (real)(2) * solid->axis_error);
     return near_end & near_side;
 }
 

@@ -144,8 +144,9 @@ static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ra
     solid.low = solid.high - (real)(4) * solid.half_height; // well below the apex
     solid.widest = solid.is_finite ? real_sqrt((real)(2) * solid.half_height * round->k) : round->k;
     solid.middle = vector_fma(round->axis, solid.high - solid.half_height, round->foot);
+    solid.axis_error = (real)(16 * UNIT_ROUNDOFF);
     const real size = round->has_power ? (real)(0) : solid.widest + solid.half_height;
-    round_set_place_errors(round, ray, (real)(16 * UNIT_ROUNDOFF) * size, SLOPED_ROUND_ERROR);
+    round_set_place_errors(round, ray, solid.axis_error * size, SLOPED_ROUND_ERROR);
     return solid;
 }
 

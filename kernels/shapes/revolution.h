@@ -196,18 +196,20 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
     return point;
 }
 
-// Bounds how far roundings of a shape's numbers move it, which the eye's power excludes.
-static inline real revolution_shape_error(const RoundSolid *solid, Vector base)
+// Bounds the roundings of a shape's numbers. Sets the axis' error and returns how far they move the shape,
+// which the eye's power excludes. Both ends of a finite shape are rounded as points. A point of the axis
+// moves as far as one of them at most, the axis turns by the difference, and points of the side turn with it.
+static inline real revolution_set_errors(RoundSolid *solid, Vector base)
 {
     const Round *round = &solid->round;
+    const real rounded = (real)(16 * UNIT_ROUNDOFF);
+    solid->axis_error = rounded;
     if (round->has_power) return (real)(0);
-    const real rounded = (real)(16 * UNIT_ROUNDOFF), of_radius = rounded * solid->widest;
-    if (!solid->is_finite) return of_radius;
-    // both ends are rounded as points, which turns the axis
+    if (!solid->is_finite) return rounded * solid->widest;
     const Vector end = vector_fma(round->axis, solid->high, base);
-    const real moved = (real)(2 * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end)),
-               turned = (real)(2) + divide_or(solid->widest, solid->half_height, (real)(0));
-    return of_radius + real_fma(moved, turned, rounded * solid->half_height);
+    const real moved = (real)((1 + 0x1p-6f) * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
+    solid->axis_error = rounded + divide_or(moved, solid->half_height + solid->half_height, (real)(1));
+    return real_fma(solid->widest, solid->axis_error, real_fma(rounded, solid->half_height, moved));
 }
 
 static inline RoundSolid round_of_revolution(const Revolution *shape, bool sloped, const Ray *ray)
@@ -235,7 +237,7 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     if (solid.is_finite)
         solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
                                 real_fma(round->slope, solid.high, round->radius));
-    round_set_place_errors(round, ray, revolution_shape_error(&solid, base),
+    round_set_place_errors(round, ray, revolution_set_errors(&solid, base),
                            sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
     return solid;
 }
