@@ -59,6 +59,10 @@ typedef struct {
     uint4 id;
 } Box;
 
+// Roundings of the ends of a cylinder or cone turn its axis, and change its length, by less than this part of
+// the length. Otherwise only the base is rounded.
+#define AXIS_TURN_MAX 0x1p-6f
+
 // A cylinder or cone: the points p, measured from the base, with |p x axis| = radius |axis| +
 // slope (p . axis), for an axis of any length.
 //

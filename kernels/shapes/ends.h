@@ -13,7 +13,7 @@ static inline mask line_is_off_axis(Vector from, real reach, Vector axis, real s
     const Vector q = vector_cross(ray->direction, axis);
     const real moment = vector_dot(from, q), squared_reach = reach * reach;
     const real slack = (real)(0x1p15f * UNIT_ROUNDOFF * UNIT_ROUNDOFF) *
-                       ((vector_dot(from, from) + squared_reach) * (ray->squared * squared_axis));
+                       ((vector_dot(from, from) + squared_reach) * ray->squared * squared_axis);
     return moment * moment >
            real_fma((real)(1 + 0x1p-4f) * squared_reach, vector_dot(q, q), slack + (real)(SMALLEST_RATIO));
 }

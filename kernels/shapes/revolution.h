@@ -2,7 +2,6 @@
 #ifndef REVOLUTION_H
 #define REVOLUTION_H
 
-#include "shapes/box.h"
 #include "shapes/certain_solid.h"
 #include "shapes/ends.h"
 #include "shapes/quadratic.h"
@@ -96,7 +95,7 @@ static inline mask revolution_is_off_line(const Revolution *shape, const Ray *ra
 {
     if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return mask_none();
     const Vector from = vector_subtract(ray->origin, vector_of(shape->base_radius));
-    const real reach = real_divide((real)(revolution_widest(shape)), (real)(shape->range.y));
+    const real reach = (real)(uniform_divide(revolution_widest(shape), shape->range.y));
     return line_is_off_axis(from, reach, vector_of(shape->axis_slope), (real)(shape->range.z), ray);
 }
 
@@ -116,7 +115,8 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionQ
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
     mask hit = RAY_ACTIVE(ray);
-    if (IS_COMPENSATED && !lanes_any(hit & !revolution_is_off_line(shape, ray))) return mask_none();
+    if (IS_COMPENSATED) hit = hit & !revolution_is_off_line(shape, ray);
+    if (IS_COMPENSATED && !lanes_any(hit)) return hit;
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     hit = hit & revolution_line_crosses(&quadric);
     if (!lanes_any(hit)) return hit;
@@ -197,9 +197,10 @@ static inline SurfacePoint revolution_surface_point(const Revolution *shape, boo
 }
 
 // Bounds the roundings of a shape's numbers. Sets the axis' error and returns how far they move the shape,
-// which the eye's power excludes. Both ends of a finite shape are rounded as points. A point of the axis
-// moves as far as one of them at most, the axis turns by the difference, and points of the side turn with it.
-static inline real revolution_set_errors(RoundSolid *solid, Vector base)
+// which the eye's power excludes. Both ends of a finite shape are rounded as points, which changes its length
+// by less than AXIS_TURN_MAX. A point of the axis moves as far as one of them at most, the axis turns by the
+// difference, and points of the side turn with it. A cone's slope is made of two rounded radii.
+static inline real revolution_set_errors(RoundSolid *solid, bool sloped, Vector base)
 {
     const Round *round = &solid->round;
     const real rounded = (real)(16 * UNIT_ROUNDOFF);
@@ -207,9 +208,13 @@ static inline real revolution_set_errors(RoundSolid *solid, Vector base)
     if (round->has_power) return (real)(0);
     if (!solid->is_finite) return rounded * solid->widest;
     const Vector end = vector_fma(round->axis, solid->high, base);
-    const real moved = (real)((1 + 0x1p-6f) * UNIT_ROUNDOFF) * (vector_norm1(base) + vector_norm1(end));
-    solid->axis_error = rounded + divide_or(moved, solid->half_height + solid->half_height, (real)(1));
-    return real_fma(solid->widest, solid->axis_error, real_fma(rounded, solid->half_height, moved));
+    const real few = (real)((1 + AXIS_TURN_MAX) * UNIT_ROUNDOFF),
+               length = solid->half_height + solid->half_height,
+               moved = few * (vector_norm1(base) + vector_norm1(end)),
+               sloping = sloped ? few * (solid->widest + solid->widest) : (real)(0);
+    solid->axis_error = rounded + divide_or(moved + sloping, length, (real)(1));
+    const real turned = rounded + divide_or(moved, length, (real)(1));
+    return real_fma(solid->widest, turned, real_fma(rounded, solid->half_height, moved));
 }
 
 static inline RoundSolid round_of_revolution(const Revolution *shape, bool sloped, const Ray *ray)
@@ -237,7 +242,7 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     if (solid.is_finite)
         solid.widest = real_max(real_fma(round->slope, solid.low, round->radius),
                                 real_fma(round->slope, solid.high, round->radius));
-    round_set_place_errors(round, ray, revolution_set_errors(&solid, base),
+    round_set_place_errors(round, ray, revolution_set_errors(&solid, sloped, base),
                            sloped ? SLOPED_ROUND_ERROR : ROUND_ERROR);
     return solid;
 }

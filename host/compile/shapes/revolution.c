@@ -18,7 +18,8 @@ static Vector3 axis_between_rounded_ends(const Rounding *rounding, const Revolut
         vector_subtract(point_from_eye(rounding, vector_add(given->from, given->axis)), base);
     const double length = vector_length(given->axis),
                  turned = vector_length(vector_subtract(axis, given->axis)) / length;
-    const bool keeps_form = turned * fmax(1, fmax(given->base_radius, given->end_radius) / length) < 0x1p-6;
+    const bool keeps_form =
+        turned * fmax(1, fmax(given->base_radius, given->end_radius) / length) < AXIS_TURN_MAX;
     return keeps_form ? axis : given->axis;
 }
 
