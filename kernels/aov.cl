@@ -51,7 +51,7 @@ kernel void aov(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOffs
                 uint light_count)
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, flags};
+    Band band = band_of(band_pixels, 1, flags);
     const HitLayers hit_layers = {HIT_AOV_LIST(LAYER_POINTER)};
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);

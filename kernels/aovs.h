@@ -23,7 +23,7 @@
 
 // path.cl
 #define PATH_AOV_LIST(LAYER) \
-    LAYER(PATH, path, INTEGER, 1, "signature of all objects met, also in mirrors and through glass")
+    LAYER(PATH, path, INTEGER, 1, "signature of all objects hit, also in mirrors and through glass")
 
 // coverage.cl
 #define SAMPLED_AOV_LIST(LAYER) \

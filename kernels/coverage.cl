@@ -32,7 +32,7 @@ kernel void coverage(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, Laye
     Scene scene = SCENE_FROM_ARGUMENTS;
     global scalar *covered = (global scalar *)(film + (size_t)layers.coverage * ARENA_UNIT);
     global scalar *backdrop = (global scalar *)(film + (size_t)layers.backdrop * ARENA_UNIT);
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, flags};
+    Band band = band_of(band_pixels, 1, flags);
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
         if (lanes_any(tile.inside)) tile_coverage(&scene, &tile, sample_offsets, covered, backdrop, flags);

@@ -10,6 +10,11 @@ typedef struct {
     global const int *list; // for a list, each pixel's x and y in the whole image and its index in the band
 } Band;
 
+static inline Band band_of(uint4 pixels, uint cell, global const int *list)
+{
+    return (Band){pixels.x, pixels.y, pixels.z, pixels.w, cell, list};
+}
+
 typedef struct {
     Pixels pixels;
     mask inside;   // pixels inside the band

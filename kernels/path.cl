@@ -21,7 +21,7 @@ kernel void path(SCENE_ARGUMENTS, uint4 band_pixels, global char *film, LayerOff
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     global int *paths = (global int *)(film + (size_t)layers.path * ARENA_UNIT);
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, 1, flags};
+    Band band = band_of(band_pixels, 1, flags);
     for (uint i = 0; i < TILES; i++) {
         Tile tile = band_tile(&band, i);
         if (lanes_any(tile.inside)) tile_path_signature(&scene, &tile, paths, flags);

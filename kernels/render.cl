@@ -62,7 +62,7 @@ kernel void render(SCENE_ARGUMENTS, global const scalar *sample_offsets, global 
 {
     Scene scene = SCENE_FROM_ARGUMENTS;
     scene.ray_counts = ray_counts;
-    Band band = {band_pixels.x, band_pixels.y, band_pixels.z, band_pixels.w, cell, flags};
+    Band band = band_of(band_pixels, cell, flags);
     global scalar *compensation = film + (size_t)band.width * band.height * 3;
     for (uint first_tile = 0; first_tile < TILES; first_tile += PACKETS)
         tiles_render(&scene, &band, first_tile, sample_offsets, film, compensation, first_sample, last_sample,

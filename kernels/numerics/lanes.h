@@ -346,9 +346,7 @@ static inline real real_min_of_pairs(real a, real b)
 {
     return real_min((real)(a.even, b.even), (real)(a.odd, b.odd));
 }
-#endif
 
-#if LANES > 1
 // Returns the smallest lane of each of LANES vectors, one lane per vector.
 static inline real lanes_smallest_of_each(const real *vectors)
 {

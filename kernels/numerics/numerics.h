@@ -214,6 +214,17 @@ static inline Pair pair_difference_of_products(Pair a, Pair b, Pair c, Pair d)
     return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
 }
 
+// LN_2 + LN_2_REST is ln(2), and LOG2_E its reciprocal.
+#if IS_DOUBLE
+#define LN_2      0x1.62e42fefa39efp-1
+#define LN_2_REST 0x1.abc9e3b39803fp-56
+#define LOG2_E    0x1.71547652b82fep0
+#else
+#define LN_2      0x1.62e43p-1f
+#define LN_2_REST (-0x1.05c61p-29f)
+#define LOG2_E    0x1.715476p0f
+#endif
+
 // Returns ln(1 - s) for 0 <= s < 1 as -2 artanh(s / (2 - s)) after extracting the power of two, by its Taylor
 // series (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). Small s keep all bits, which 1 - s
 // would lose.
@@ -235,17 +246,15 @@ static inline real real_log_complement(real s)
 #if IS_DOUBLE
     for (scalar n = 23; n >= 3; n -= 2)
         series = real_fma(series, zz, (real)(1.0 / n));
-    const real ln2_high = (real)(0x1.62e42fefa39efp-1), ln2_low = (real)(0x1.abc9e3b39803fp-56);
 #else
     series = real_fma(zz, (real)(1.0f / 9), (real)(1.0f / 7));
     series = real_fma(series, zz, (real)(1.0f / 5));
     series = real_fma(series, zz, (real)(1.0f / 3));
-    const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
 #endif
     real two_z = z + z;
     real log_m = real_fma(two_z * zz, series, two_z);
     real k = real_from_integer(exponent);
-    return real_fma(k, ln2_high, real_fma(k, ln2_low, log_m));
+    return real_fma(k, (real)(LN_2), real_fma(k, (real)(LN_2_REST), log_m));
 }
 
 // Below this argument real_exp_negative returns 0.
@@ -259,16 +268,10 @@ static inline real real_log_complement(real s)
 // 4.2.1). Returns 0 if the result would be subnormal.
 static inline real real_exp_negative(real x)
 {
-#if IS_DOUBLE
-    const real lowest = (real)(EXP_LOWEST), log2_e = (real)(0x1.71547652b82fep0);
-    const real ln2_high = (real)(0x1.62e42fefa39efp-1), ln2_low = (real)(0x1.abc9e3b39803fp-56);
-#else
-    const real lowest = (real)(EXP_LOWEST), log2_e = (real)(0x1.715476p0f);
-    const real ln2_high = (real)(0x1.62e43p-1f), ln2_low = (real)(-0x1.05c61p-29f);
-#endif
+    const real lowest = (real)(EXP_LOWEST);
     real within = real_max(x, lowest);
-    real k = real_floor(real_fma(within, log2_e, (real)(0.5f)));
-    real r = real_fma(-k, ln2_low, real_fma(-k, ln2_high, within));
+    real k = real_floor(real_fma(within, (real)(LOG2_E), (real)(0.5f)));
+    real r = real_fma(-k, (real)(LN_2_REST), real_fma(-k, (real)(LN_2), within));
     real series;
 #if IS_DOUBLE
     series = (real)(1);

@@ -22,7 +22,8 @@
 
 enum { PERTURBED_DIVIDE, PERTURBED_SQRT, PERTURBED_POWER, PERTURBED_COUNT };
 
-// The largest errors in ulp, in addition to the device's rounding.
+// The largest errors in ulp, in addition to the device's rounding, by which roots exceed what the
+// specification permits.
 enum { DIVIDE_ERROR = 2, SQRT_ERROR = 3, POWER_ERROR = 16 };
 
 static inline unsigned_integer perturb_hash(uint operation, integer a, integer b)
@@ -72,13 +73,6 @@ static inline scalar uniform_divide(scalar a, scalar b)
     if (!PERTURB) return a / b;
     RealLanes quotient = {device_divide((real)(a), (real)(b))};
     return quotient.each[0];
-}
-
-static inline scalar uniform_sqrt(scalar a)
-{
-    if (!PERTURB) return sqrt(a);
-    RealLanes root = {device_sqrt((real)(a))};
-    return root.each[0];
 }
 
 // Adds to (1 - complement)^exponent, which kernels compute themselves, the error of a device's power

@@ -40,7 +40,7 @@ static inline bool hit_shade(const Scene *scene, const Ray *ray, Traversal *trav
 static inline void hit_add_light(const Scene *scene, uint index, LightVisibility *light,
                                  const Traversal *occlusion, ShadedHit *hit)
 {
-    const real strength = light->fraction;
+    const real strength = light->fraction; // before light_occlude changes it
     light_occlude(light, occlusion);
     if (IS_CERTIFIED) {
         // where the facing is uncertain, only highlights count

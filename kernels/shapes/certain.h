@@ -109,7 +109,8 @@ static inline CertainHit certain_miss(void)
 }
 
 // The interval of t in which the exact ray is inside a convex set. If `certain`, it contains `inner`. If
-// `perhaps`, it lies within `outer`. Its ends are close to those of `roots`, unless these are NEVER.
+// `perhaps`, it lies within `outer`. Its ends are close to those of `roots`, unless these are NEVER or
+// beyond.
 typedef struct {
     Interval outer, inner, roots;
     mask certain, perhaps;

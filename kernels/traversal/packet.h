@@ -203,26 +203,26 @@ typedef struct {
 // per child that passes the bounds.
 static inline HitChildren group_hits_children(const RayGroup *group, uint lanes, global const scalar *boxes)
 {
-    HitChildren met;
-    met.children = 0;
-    met.by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
-    if (!met.by_ray) {
-        met.children = lanes_bits(bounds_intersect_children(&group->bounds, boxes, &met.entry.all));
-        met.by_ray = popcount(met.children) > popcount(lanes);
+    HitChildren hits;
+    hits.children = 0;
+    hits.by_ray = !group->coherent || popcount(lanes) <= FEW_LANES;
+    if (!hits.by_ray) {
+        hits.children = lanes_bits(bounds_intersect_children(&group->bounds, boxes, &hits.entry.all));
+        hits.by_ray = popcount(hits.children) > popcount(lanes);
     }
-    if (met.by_ray) {
-        met.hit_by.all = rays_intersect_children(group, lanes, boxes, &met.entry.all);
-        met.children = lanes_bits(met.hit_by.all != (integer)(0));
+    if (hits.by_ray) {
+        hits.hit_by.all = rays_intersect_children(group, lanes, boxes, &hits.entry.all);
+        hits.children = lanes_bits(hits.hit_by.all != (integer)(0));
     }
-    return met;
+    return hits;
 }
 
 // Returns the lanes, as bits, that intersect one child's box before their tmax.
-static inline uint child_lanes(const RayGroup *group, const HitChildren *met, uint child,
+static inline uint child_lanes(const RayGroup *group, const HitChildren *hits, uint child,
                                global const scalar *boxes)
 {
-    real entry = (real)(met->entry.each[child]);
-    if (met->by_ray) return (uint)met->hit_by.each[child] & lanes_bits(entry <= group->tmax);
+    real entry = (real)(hits->entry.each[child]);
+    if (hits->by_ray) return (uint)hits->hit_by.each[child] & lanes_bits(entry <= group->tmax);
     return lanes_bits(
         box_rays_intersect_child(group->rays, group->bounds.octant, boxes + child, group->tmax, &entry));
 }
@@ -241,26 +241,26 @@ static inline void visit_node(Traversal *traversal, TraversalStack *stack, const
 {
     global const BvhNode *node = &scene->nodes[next.child_index];
     global const scalar *boxes = (global const scalar *)node->planes;
-    HitChildren met = group_hits_children(group, next.lanes, boxes);
-    const uint leaves = met.children & node_leaves(node), bottom = stack->count;
+    HitChildren hits = group_hits_children(group, next.lanes, boxes);
+    const uint leaves = hits.children & node_leaves(node), bottom = stack->count;
     for (uint left = leaves; left != 0; left &= left - 1) {
         uint leaf = lowest_bit(left);
-        uint hit_by = child_lanes(group, &met, leaf, boxes);
+        uint hit_by = child_lanes(group, &hits, leaf, boxes);
         uint first = ((global const uint *)node->child_index)[leaf];
         uint type = ((global const uint *)node->child_type)[leaf];
         if (hit_by == 0 || type == BVH_EMPTY) continue;
         if (HAS_INSTANCES && leaf_type(type) == TYPE_INSTANCES) {
-            stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, met.entry.each[leaf]});
+            stack_push(stack, bottom, (StackEntry){INSTANCE_LEAF | first, hit_by, hits.entry.each[leaf]});
             continue;
         }
         if (intersect_leaf_or_block(traversal, scene, ray, type, first, hit_by))
             group_shrink(group, traversal);
         if (group->active == 0) return;
     }
-    for (uint left = met.children & ~leaves; left != 0; left &= left - 1) {
-        uint child = lowest_bit(left), hit_by = child_lanes(group, &met, child, boxes);
+    for (uint left = hits.children & ~leaves; left != 0; left &= left - 1) {
+        uint child = lowest_bit(left), hit_by = child_lanes(group, &hits, child, boxes);
         uint index = ((global const uint *)node->child_index)[child];
-        StackEntry entry = {index, hit_by, met.entry.each[child]};
+        StackEntry entry = {index, hit_by, hits.entry.each[child]};
         if (hit_by != 0) stack_push_node(stack, bottom, scene, entry);
     }
 }

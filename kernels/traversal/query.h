@@ -28,12 +28,10 @@ typedef struct {
 // transparent ones add up to no more than OPTICAL_DEPTH_PASSING, which still lets light pass.
 #if IS_DOUBLE
 #define OPTICAL_DEPTH_STEPS   0x1p48
-#define LN_2                  0x1.62e42fefa39efp-1
 #define OPTICAL_DEPTH_MAX     0x7f000000000000L
 #define OPTICAL_DEPTH_PASSING ((long)PASSING_DEPTH_MAX << 48)
 #else
 #define OPTICAL_DEPTH_STEPS   0x1p24f
-#define LN_2                  0x1.62e43p-1f
 #define OPTICAL_DEPTH_MAX     OPAQUE
 #define OPTICAL_DEPTH_PASSING (PASSING_DEPTH_MAX << 24)
 #endif
