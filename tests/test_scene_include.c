@@ -9,6 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #define CAMERA "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\n"
 #define LIGHTS "lights: [point: {position: [0, 9, 0]}]\n"
@@ -274,6 +275,17 @@ TEST(test_number_of_files)
     snprintf(expected, sizeof expected, "scene.yaml:1:%zu: error: more than 100 included files\n",
              strlen("include: [") + list.count + 2);
     check_messages("scene.yaml", NULL, 0, expected);
+    text_free(&scene);
+    // a file that cannot be read counts
+    assert_int_equal(symlink("/proc/self/mem", "unreadable.yaml"), 0);
+    text_appendf(&scene, "include: [unreadable.yaml, %slost.yaml]\n" CAMERA, text_c(&list));
+    file_write("scene.yaml", text_c(&scene));
+    char both[160];
+    snprintf(both, sizeof both,
+             "scene.yaml:1:11: error: cannot read 'unreadable.yaml': Input/output error\n"
+             "scene.yaml:1:%zu: error: more than 100 included files\n",
+             strlen("include: [unreadable.yaml, ") + list.count + 1 - strlen("99.yaml, "));
+    check_messages("scene.yaml", NULL, 0, both);
     text_free(&scene);
     text_free(&list);
 }

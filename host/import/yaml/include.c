@@ -22,6 +22,7 @@ typedef struct {
     YamlReader *reader;
     Source *last; // source of the latest file
     size_t base;  // base of the next file's offsets
+    // The first is the scene's, which is zeroed if it has none.
     KnownFile files[1 + FILES_MAX];
     size_t file_count;
     bool is_full; // more than FILES_MAX were named
@@ -227,7 +228,7 @@ static bool file_include(Includes *includes, Joined *joined, const YamlNode *nod
     } else if (known < includes->file_count) {
         if (includes->files[known].is_open)
             is_read = report_error(&reader->report, node->offset, "recursive include of '%s'", path);
-    } else if (reader->included.count == FILES_MAX) {
+    } else if (includes->file_count == COUNT_OF(includes->files)) {
         includes->is_full = true;
         is_read = report_error(&reader->report, node->offset, "more than %d included files", FILES_MAX);
     } else {
@@ -280,10 +281,9 @@ static bool includes_read(Includes *includes, uint32_t root)
 bool yaml_include(YamlReader *reader, Source *source)
 {
     struct stat status;
-    Includes includes = {.reader = reader, .last = source, .base = source->length + 1};
+    Includes includes = {.reader = reader, .last = source, .base = source->length + 1, .file_count = 1};
     if (reader->tree.nodes.items->type != YAML_MAPPING) return true; // is reported with its keys
-    if (stat(source->file, &status) == 0)
-        includes.files[includes.file_count++] = (KnownFile){status.st_dev, status.st_ino, true};
+    if (stat(source->file, &status) == 0) includes.files[0] = (KnownFile){status.st_dev, status.st_ino, true};
     return includes_read(&includes, 0) && reader->report.error_count == 0;
 }
 
