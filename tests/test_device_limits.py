@@ -167,6 +167,7 @@ class DeviceLimits(TestCase):
         self.refuses(f"{accuracy} {basic}", "neither the device .* nor another one has 64-bit floating point", env=alone)
         self.refuses(f"render {mirrors} {certified} -o none.npy", "certified needs 64-bit .* no other device works in double", env=alone)
         self.refuses(f"certify {mirrors} --precision certified", "certified needs 64-bit", env=alone)
+        self.refuses(TRACE.replace("strict", "certified"), "certified needs 64-bit", env=alone)
 
     def test_reference_for_rusticl(self):
         """rusticl hides 64-bit floating point unless told otherwise."""

@@ -207,9 +207,10 @@ int command_trace(int argument_count, char **arguments)
     if (scene_open(&scene, options.scene, &options.common) &&
         !output_overwrites_scene(options.output, &scene, options.scene) && rays_load(&rays, &options) &&
         device_open(&open, &options.common)) {
-        if (options.common.precision != PRECISION_CERTIFIED ||
-            reference_open(&open.compute, &open.devices, NULL))
-            status = rays_answer(&options, &scene, &rays, &open.compute);
+        // renderer_open reports that no device works in double
+        if (options.common.precision == PRECISION_CERTIFIED)
+            reference_open(&open.compute, &open.devices, NULL);
+        status = rays_answer(&options, &scene, &rays, &open.compute);
         status = device_close(&open, status);
     }
     free(rays.items);

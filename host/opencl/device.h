@@ -70,8 +70,8 @@ size_t devices_choose(const DeviceList *list, const char *selector, const Device
                       MessageList *messages);
 
 // Returns the device that computes in double for a device that cannot. It is the one that `selector` names,
-// or for NULL the default among those with 64-bit floating point. Returns NULL with an error message about
-// the selector if none qualifies.
+// or for NULL the default among those with 64-bit floating point. Returns NULL if none qualifies, with an
+// error message unless `selector` is NULL.
 const Device *device_choose_reference(const DeviceList *list, const char *selector, MessageList *messages);
 
 // Returns the selector that the user gave: `option`, else the environment variable GLINT_DEVICE if it is not
