@@ -16,7 +16,7 @@
 
 static const char key[] = "device x\ntext y";
 static const char machine_code[] = "machine\0code\xff\n";
-enum { CODE_LENGTH = sizeof machine_code, FORMAT_OFFSET = 8 };
+enum { CODE_LENGTH = sizeof machine_code, FORMAT_OFFSET = 8, FORMAT_END = 16 };
 
 static void store(const char *entry_key)
 {
@@ -253,13 +253,17 @@ TEST(test_list)
     Text content = {0};
     assert_true(text_read_file(&content, path, &messages));
     content.items[FORMAT_OFFSET]++;
-    file_write_bytes(path, content.items, content.count);
+    memset(content.items + FORMAT_END, 0xff, content.count - FORMAT_END); // whatever follows the format
+    const size_t lengths[] = {FORMAT_END, content.count};
+    for (size_t i = 0; i < COUNT_OF(lengths); i++) {
+        file_write_bytes(path, content.items, lengths[i]);
+        assert_true(cache_list(&entries, &messages));
+        assert_int_equal(entries.count, 2);
+        assert_null(entries.items[1].fault);
+        assert_null(entries.items[1].device);
+        cache_entries_free(&entries);
+    }
     text_free(&content);
-    assert_true(cache_list(&entries, &messages));
-    assert_int_equal(entries.count, 2);
-    assert_null(entries.items[1].fault);
-    assert_null(entries.items[1].device);
-    cache_entries_free(&entries);
     file_write_bytes(path, machine_code, CODE_LENGTH);
     assert_true(cache_list(&entries, &messages));
     assert_int_equal(entries.count, 2);

@@ -215,12 +215,15 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
     if (why) return why;
     static const char damaged[] = "it is damaged";
     CacheHeader header, expected;
+    enum { VERSION_BYTES = offsetof(CacheHeader, key_length) }; // of every version's header
+    if (content->count < VERSION_BYTES) return damaged;
+    memcpy(&header, content->items, VERSION_BYTES);
+    if (memcmp(header.magic, cache_magic, sizeof header.magic) != 0) return damaged;
+    if (header.format != cache_format) return absent;
     if (content->count < sizeof header) return damaged;
     memcpy(&header, content->items, sizeof header);
-    size_t rest = content->count - sizeof header;
-    if (memcmp(header.magic, cache_magic, sizeof header.magic) != 0 || header.key_length > rest)
-        return damaged;
-    if (header.format != cache_format) return absent;
+    const size_t rest = content->count - sizeof header;
+    if (header.key_length > rest) return damaged;
     entry->key = content->items + sizeof header;
     entry->key_length = (size_t)header.key_length;
     entry->binary = entry->key + entry->key_length;
