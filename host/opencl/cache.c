@@ -353,8 +353,8 @@ static bool file_remove(int folder, const char *name, MessageList *messages)
     return message_error(messages, "cannot remove '%s' of the kernel cache: %s", name, strerror(errno));
 }
 
-// Removes the least recently used entries beyond `bytes_max`, including those too large to load. Returns
-// false with messages if a removal fails.
+// Removes the least recently used entries beyond `bytes_max`, including those too large to load, or all
+// entries if it is 0. Returns false with messages if a removal fails.
 static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
 {
     CacheEntries entries;
@@ -365,7 +365,7 @@ static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
         if (entries.items[i].size > CACHE_ENTRY_BYTES_MAX) left -= entries.items[i].size;
     for (size_t i = 0; i < entries.count; i++) {
         bool is_too_large = entries.items[i].size > CACHE_ENTRY_BYTES_MAX;
-        if (left <= bytes_max && !is_too_large) continue;
+        if (bytes_max > 0 && left <= bytes_max && !is_too_large) continue; // an entry may be empty
         is_trimmed &= file_remove(folder, entries.items[i].name, messages);
         if (!is_too_large) left -= entries.items[i].size;
     }
