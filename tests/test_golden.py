@@ -118,6 +118,8 @@ class Golden(TestCase):
         self.assertEqual((scene["scene"], scene["same"], scene["verdict"], scene["tiles"]), ("s.yaml", True, "same", 0))
         write("new.yaml", SPHERE)
         self.assertEqual(self.glint("golden check new.yaml", status=3).stdout, "new.yaml: no line; glint golden write adds it\n")
+        (scene,) = self.json("golden check new.yaml --json", status=3)["scenes"]
+        self.assertEqual((scene["same"], scene["verdict"], scene["first"]), (False, "no line", None))
         write("s.yaml", SPHERE.replace("radius: 1", "radius: 0.5"))
         out = self.glint("golden check --format csv", status=3).stdout.splitlines()
         self.assertRegex(out[1], r"^s\.yaml,another scene,object,\d+,\d+,\d+,\d+,\d+,s\.yaml-golden\.png$")

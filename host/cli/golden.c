@@ -241,7 +241,7 @@ static Json *checks_json(const Device *device, const GoldenCheck *checks, size_t
                   : same                 ? "same"
                   : check->scene_differs ? "another scene"
                                          : "different");
-        json_text(json, "first", same ? NULL : layer_names[hashed_layers[check->first]]);
+        json_text(json, "first", same || check->is_new ? NULL : layer_names[hashed_layers[check->first]]);
         json_count(json, "tiles", check->tile_count);
         if (check->tile_count > 0) {
             json_int64(json, "left", check->box.left);
