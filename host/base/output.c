@@ -24,7 +24,9 @@ typedef struct {
 
 static ARRAY_OF(Pending) pending;
 
-static pthread_mutex_t pending_mutex = PTHREAD_MUTEX_INITIALIZER; // of `pending`, which threads share
+// Guards `pending`, which threads share. It is recursive, because lack of memory in array_reserve or
+// array_push runs the exit handler in the thread that holds it.
+static pthread_mutex_t pending_mutex = PTHREAD_RECURSIVE_MUTEX_INITIALIZER_NP;
 
 static void pending_remove_all(void)
 {
@@ -37,7 +39,8 @@ static void pending_remove_all(void)
     pthread_mutex_unlock(&pending_mutex);
 }
 
-// Reserves an entry before a temporary gets its name, so that registering it cannot fail.
+// Reserves an entry before a temporary gets its name, so that registering it fails only if memory runs out
+// after another thread used the entry. The temporary is then stale.
 static void pending_prepare(void)
 {
     static bool is_registered;
