@@ -29,10 +29,12 @@ bool output_write(OutputFile *output, const void *bytes, size_t size, MessageLis
 // On failure adds a message and removes the temporary.
 bool output_finish(OutputFile *output, MessageList *messages);
 // Finishes the file if it is not finished, renames it and syncs its folder. On failure adds a message and
-// removes the temporary.
+// removes the temporary. An earlier file is untouched unless syncing the folder or closing fails, which
+// follow the rename.
 bool output_commit(OutputFile *output, MessageList *messages);
 void output_abandon(OutputFile *output);
-// Writes a whole file. On failure adds a message, leaves an earlier file untouched and returns false.
+// Writes a whole file. On failure adds a message and returns false, with an earlier file as after
+// output_commit.
 bool output_write_file(const char *target, const void *bytes, size_t size, MessageList *messages);
 
 // Returns whether `file_name` is a temporary for the target `name`.
