@@ -67,7 +67,8 @@ bool image_writer_note(ImageWriter *writer, const ImageNote *note, MessageList *
 // renamed. Returns false with an error message on failure. The writer must still be committed or abandoned.
 bool image_writer_finish(ImageWriter *writer, MessageList *messages);
 // Completes the file unless finished and renames it to its target. On failure returns false with an error
-// message and leaves the target unchanged. Frees the writer in either case. Missing rows are a bug.
+// message and leaves the target unchanged, unless syncing its folder or closing fails after the rename. Frees
+// the writer in either case. Missing rows are a bug.
 bool image_writer_commit(ImageWriter *writer, MessageList *messages);
 // Writes a whole image, of the header's height. On failure adds a message and returns false.
 bool image_write(const char *path, const ImageHeader *header, const void *pixels, MessageList *messages);
@@ -86,8 +87,8 @@ typedef struct {
     Transfer transfer;
     bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
     bool data;       // no light: NPY of other than 3 channels, EXR without colors or luminance
-    bool integers;   // NPY of <u4 or |u1, such as numbers of objects
-    double *doubles; // the values of NPY whose type floats cannot hold (<f8, <u4), or NULL
+    bool integers;   // NPY of <u4 or |u1 and EXR of uint, such as numbers of objects
+    double *doubles; // the values whose type floats cannot hold (NPY of <f8 or <u4, EXR of uint), or NULL
 } Image;
 // Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message
 // and an empty image that need not be freed. An image whose header declares more pixels than
