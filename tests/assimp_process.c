@@ -35,6 +35,10 @@ static void misbehave(const char *name)
     if (!strcmp(name, "garbage.fbx")) reply_with("a mesh", 6);
     while (!strcmp(name, "hang.fbx")) {
     }
+    if (!strcmp(name, "wait.fbx")) {
+        alarm(1);
+        pause();
+    }
     while (!strcmp(name, "bloat.fbx"))
         memset(memory_allocate(1 << 20, 1), 1, 1 << 20);
 }

@@ -417,8 +417,11 @@ static int child_start(const MeshDraft *draft, pid_t *process, int *reply)
 static bool child_fails(MeshDraft *draft, int status)
 {
     const int by = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-    if (by == SIGXCPU || by == SIGALRM)
-        return draft_refuse(draft, "assimp needs more than %d s to read it", ASSIMP_PROCESSOR_SECONDS_MAX);
+    if (by == SIGXCPU)
+        return draft_refuse(draft, "assimp needs more than %d s of processor time to read it",
+                            ASSIMP_PROCESSOR_SECONDS_MAX);
+    if (by == SIGALRM)
+        return draft_refuse(draft, "assimp needs more than %d s to read it", ASSIMP_SECONDS_MAX);
     if (WIFEXITED(status) && WEXITSTATUS(status) == EXIT_MACHINE)
         return draft_refuse(draft, "assimp needs more than %d MiB to read it", ASSIMP_MEBIBYTES_MAX);
     return draft_refuse(draft, "assimp %s on it", by != 0 ? "crashes" : "fails");
