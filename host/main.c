@@ -112,6 +112,7 @@ int main(int argument_count, char **arguments)
     // a failed write is reported like a full disk, and no partial output is left
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
+    signal(SIGCHLD, SIG_DFL); // if it is ignored, the system keeps no exit status
     progress_catch_signals();
     fault_catch_crashes();
     int status = command_run(argument_count, arguments);

@@ -271,7 +271,7 @@ static StepResult step_run(const Step *step, const ReportChoice *choice, const c
     const double start = clock_seconds();
     StepResult result = {0};
     pid_t process;
-    int status;
+    int status = 0;
     const int error = step_start(step, choice, folder, &process);
     if (error)
         result.failure = text_format("not started: %s", strerror(error));
