@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 
 #include <assert.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdarg.h>
 #include <stdbool.h>
@@ -57,19 +58,24 @@ void fault_output_is_complete(int status)
     is_complete = 1;
 }
 
-const char *fault_limits(void)
+static void limits_write(void)
 {
     enum { FEW_THREADS = 256 };
     struct rlimit space, threads;
     bool has_space = getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur != RLIM_INFINITY;
     bool has_threads = getrlimit(RLIMIT_NPROC, &threads) == 0 && threads.rlim_cur < FEW_THREADS;
-    limits[0] = '\0';
     if (has_space)
         snprintf(limits, sizeof limits, " (limited to %ju MiB of address space, see ulimit -v)",
                  (uintmax_t)space.rlim_cur >> 20);
     if (has_threads)
         snprintf(limits + strlen(limits), sizeof limits - strlen(limits),
                  " (limited to %ju processes of the user, see ulimit -u)", (uintmax_t)threads.rlim_cur);
+}
+
+const char *fault_limits(void)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT; // other threads may be reading it
+    pthread_once(&once, limits_write);
     return limits;
 }
 
