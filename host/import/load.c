@@ -94,6 +94,8 @@ static bool file_load(Scene *scene, const char *path, const SceneOptions *option
     if (read) {
         Source source = {.file = path, .bytes = text_c(&text), .length = text.count};
         read = scene_read(scene, &source, options, messages);
+    }
+    if (read) {
         scene->text_hash = hash_bytes(HASH_START, text.items, text.count); // a pipe is not read again
         for (size_t i = 0; i < scene->included.count; i++)
             scene->text_hash = hash_bytes(scene->text_hash, &scene->included.items[i].hash, sizeof(uint64_t));
