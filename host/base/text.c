@@ -127,11 +127,12 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
         text->count += got;
         text->items[text->count] = '\0';
     } while (got == chunk && text->count - start <= largest);
+    const int error = errno; // of a failed read
     // with the exact size, sanitizers find reads beyond the end
     text->capacity = text->count + 1;
     text->items = memory_resize(text->items, text->capacity, 1);
 
-    if (ferror(file)) return message_error(messages, "cannot read '%s': %s", path, strerror(errno));
+    if (ferror(file)) return message_error(messages, "cannot read '%s': %s", path, strerror(error));
     if (text->count - start > largest)
         return message_error(messages, "cannot read '%s': larger than 2 GiB", path);
     return true;
@@ -186,7 +187,7 @@ const char *text_nearest(const char *word, const char *const *known, size_t know
         size_t known_length = strlen(known[i]);
         if (known_length > length + bound || length > known_length + bound) continue;
         size_t distance = edit_distance(word, length, known[i], known_length);
-        if (distance <= bound && (!nearest || distance < bound + 1)) {
+        if (distance <= bound) {
             nearest = known[i];
             if (distance == 0) break;
             bound = distance - 1;
