@@ -77,6 +77,7 @@ static char *text_save(const char *text)
     FILE *file = descriptor < 0 ? NULL : fdopen(descriptor, "w");
     bool written = file && fputs(text, file) >= 0;
     if (file && fclose(file) != 0) written = false;
+    if (!file && descriptor >= 0) close(descriptor);
     return memory_copy_text(written ? path : "could not be saved");
 }
 
