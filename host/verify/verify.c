@@ -312,7 +312,7 @@ Scene verify_scene(const char *objects)
     MessageList messages = {0};
     Scene scene = {0};
     if (!scene_read_yaml(&scene, &source, &(SceneOptions){0}, &messages))
-        fault("a scene of verify cannot be read:\n%s", source.bytes);
+        fault("a scene of verify cannot be read: %s\n%s", message_list_text(&messages), source.bytes);
     message_list_free(&messages);
     text_free(&text);
     return scene;
