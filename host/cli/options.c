@@ -244,13 +244,13 @@ bool work_group_is_allowed(const Device *device)
     const size_t items = group[0] * group[1], allowed = device->largest_work_group;
     const bool is_allowed = (allowed == 0 || items <= allowed) && (longest[0] == 0 || items <= longest[0]) &&
                             (longest[1] == 0 || group[1] <= longest[1]);
-    if (!is_allowed)
-        fprintf(
-            stderr,
-            "glint: --work-group: %zux%zu has %zu work-items; \"%s\" allows %zu in a group, at most %zu by "
-            "%zu\n",
-            group[0], group[1], items, device->name, allowed, longest[0], longest[1]);
-    return is_allowed;
+    if (is_allowed) return true;
+    fprintf(stderr, "glint: --work-group: %zux%zu has %zu work-items; \"%s\" allows ", group[0], group[1],
+            items, device->name);
+    if (allowed > 0) fprintf(stderr, "%zu in a group%s", allowed, longest[0] > 0 ? ", " : "");
+    if (longest[0] > 0) fprintf(stderr, "at most %zu by %zu", longest[0], longest[1]);
+    fputc('\n', stderr);
+    return false;
 }
 
 bool device_open(OpenDevice *open, const CommonOptions *common)
