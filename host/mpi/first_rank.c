@@ -77,16 +77,19 @@ typedef struct {
     bool wants_rows, end_sent, is_rejected, is_done;
 } RankState;
 
-// Receives the message of a status if it has that size. Otherwise discards it and returns false.
+// Receives `size` bytes, beginning with the message of a status. Discards the message and returns false if it
+// has another size than the first of these or if `bytes` is NULL.
 static bool receive_checked(void *bytes, size_t size, const MPI_Status *status)
 {
     int count;
     MPI_Get_count(status, MPI_BYTE, &count);
-    const bool fits = (size_t)count == size;
+    const bool fits = bytes && count == message_size(size);
     void *discarded = fits ? NULL : memory_allocate((size_t)count + 1, 1);
     MPI_Recv(fits ? bytes : discarded, count, MPI_BYTE, status->MPI_SOURCE, status->MPI_TAG, MPI_COMM_WORLD,
              MPI_STATUS_IGNORE);
     free(discarded);
+    if (fits && (size_t)count < size)
+        receive_bytes((char *)bytes + count, size - (size_t)count, status->MPI_SOURCE, status->MPI_TAG);
     return fits;
 }
 
@@ -124,11 +127,11 @@ static bool header_receive(const Ranks *ranks, RankState *state, const MPI_Statu
     return true;
 }
 
-// Receives one layer. Each is a separate message, so a rank that sends none does not block the others.
+// Receives one layer. A rank that sends none does not block the others.
 static bool layer_receive(RankState *state, const MPI_Status *status)
 {
     void *layer = state->band.height > 0 ? state->band.layers[state->next_layer] : NULL;
-    const size_t size = layer ? film_layer_size(&state->band, state->next_layer) : SIZE_MAX;
+    const size_t size = layer ? film_layer_size(&state->band, state->next_layer) : 0;
     const bool is_right = receive_checked(layer, size, status);
     state->next_layer += is_right;
     return is_right;

@@ -27,21 +27,36 @@ void rest(void)
     nanosleep(&(struct timespec){.tv_nsec = 200000}, NULL);
 }
 
+int message_size(size_t bytes_left)
+{
+    const size_t most = 1 << 30;
+    return (int)(bytes_left < most ? bytes_left : most);
+}
+
 void broadcast(void *bytes, size_t size, MPI_Comm ranks)
 {
-    const size_t most = 1 << 30; // a count is an int
-    for (size_t done = 0; done < size; done += most)
-        MPI_Bcast((char *)bytes + done, (int)(size - done < most ? size - done : most), MPI_BYTE, 0, ranks);
+    for (size_t done = 0; done < size; done += (size_t)message_size(size - done))
+        MPI_Bcast((char *)bytes + done, message_size(size - done), MPI_BYTE, 0, ranks);
 }
 
 void send_bytes(const void *bytes, size_t size, int rank, int tag)
 {
-    MPI_Send(bytes, (int)size, MPI_BYTE, rank, tag, MPI_COMM_WORLD);
+    size_t done = 0;
+    do {
+        const int count = message_size(size - done);
+        MPI_Send((const char *)bytes + done, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD);
+        done += (size_t)count;
+    } while (done < size);
 }
 
 void receive_bytes(void *bytes, size_t size, int rank, int tag)
 {
-    MPI_Recv(bytes, (int)size, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+    size_t done = 0;
+    do {
+        const int count = message_size(size - done);
+        MPI_Recv((char *)bytes + done, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        done += (size_t)count;
+    } while (done < size);
 }
 
 bool has_message(int rank, int tag, MPI_Status *status)

@@ -10,10 +10,10 @@
 #include <mpi.h>
 
 enum {
-    TAG_REQUEST, // a Request
-    TAG_ROWS,    // BandRows, the answer; no rows: the end
-    TAG_BAND,    // a FilmHeader, followed by the layers with the next tag
-    TAG_LAYERS,
+    TAG_REQUEST,    // a Request
+    TAG_ROWS,       // BandRows, the answer; no rows: the end
+    TAG_BAND,       // a FilmHeader, followed by the layers with the next tag
+    TAG_LAYERS,     // a layer, in several messages if it is large
     TAG_END,        // to a rank that renders: the render has ended
     TAG_DONE,       // a rank's last message: why its device failed, or an empty text
     TAG_FRAME_DONE, // the exit status of a rank's frame; EXIT_DONE before the first
@@ -73,8 +73,12 @@ typedef struct {
 // Sleeps briefly. MPI waits by polling, and this leaves the processor to the device.
 void rest(void);
 
+// Returns the size of the next message of a sequence that sends `bytes_left` more bytes. MPI counts the bytes
+// of a message by an int.
+int message_size(size_t bytes_left);
 // Broadcasts from the first of `ranks`.
 void broadcast(void *bytes, size_t size, MPI_Comm ranks);
+// Send and receive bytes in one message, even if there are none, or in several of the same tag.
 void send_bytes(const void *bytes, size_t size, int rank, int tag);
 void receive_bytes(void *bytes, size_t size, int rank, int tag);
 bool has_message(int rank, int tag, MPI_Status *status);
