@@ -56,11 +56,6 @@ static Object oval_of(const Object *shape, const Affine *affine)
     return object;
 }
 
-static Vector3 vector_from(const double parts[3])
-{
-    return (Vector3){parts[0], parts[1], parts[2]};
-}
-
 // Prepares rays that are special to a shape, mapped as it is.
 static void rays_prepare(const RandomShape *shape, const Affine *affine, TraceRay *rays, Random *random)
 {

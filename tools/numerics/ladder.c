@@ -70,11 +70,6 @@ static const Tier tiers[ARITHMETIC_COUNT] = {
     [PRECISION_DOUBLE] = {4, 4, 16, true},
 };
 
-static Vector3 vector_from(const double parts[3])
-{
-    return (Vector3){parts[0], parts[1], parts[2]};
-}
-
 // Returns a ray from `rung` radii away to a random point of the bounding sphere enlarged by a fiftieth.
 static RandomRay ladder_ray(const RandomShape *shape, double rung, Random *random)
 {
