@@ -137,7 +137,7 @@ def need_clang(tool):
 
 
 def find_python(*modules):
-    """Returns a Python that has the modules, MODULE=REQUIREMENT of pip, or, having said why, None."""
+    """Returns a Python that has the modules, MODULE=REQUIREMENT of pip, or, after printing the reason, None."""
     script = '. tests/support.bash; python_with "$@" && echo "$python"'
     process = subprocess.run(["bash", "-c", script, "bash", *modules], cwd=ROOT, stdout=subprocess.PIPE, text=True)
     if process.returncode == 0:

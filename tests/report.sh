@@ -10,7 +10,7 @@ cp -r --parents docs/measurements "${documents[@]}" "$scratch"
 for document in "${documents[@]}"; do
     tools/report "$scratch/$document" 2>"$scratch/messages"
     check "$document: exit status" [ $? = 0 ]
-    check "$document says what was measured" diff "$document" "$scratch/$document"
+    check "$document has the measured values" diff "$document" "$scratch/$document"
     for measured in $(sed -n 's/^<!-- measured: [a-z]* \(.*\) -->$/\1/p' "$document"); do
         [ -f "$(dirname "$document")/$measured" ] || check "$measured is missing, which is reported" grep -q "no .*$measured" "$scratch/messages"
     done

@@ -345,7 +345,7 @@ static void check_family(Family family)
     const double samples = (double)(compared * (tests_are_long() ? 3 : 2)),
                  rerendered_share = (double)rerendered / samples,
                  uncertified_share = (double)uncertified / samples;
-    print_message("%s: %zu pixels, of which single has %zu wrong; of the samples %.4f repeated, %.5f "
+    print_message("%s: %zu pixels, of which single has %zu wrong; of the samples %.4f re-rendered, %.5f "
                   "uncertified\n",
                   family_names[family], compared, single_wrong, rerendered_share, uncertified_share);
     assert_true(single_wrong >= scene_count);
@@ -483,7 +483,7 @@ TEST(terminators_of_ovals_are_decided)
         certify_sample_close(&reference);
         scene_free(&scene);
     }
-    print_message("single has %zu wrong, %.4f of the samples repeated\n", single_wrong,
+    print_message("single has %zu wrong, %.4f of the samples re-rendered\n", single_wrong,
                   (double)rerendered / (double)(scene_count * WIDTH * HEIGHT));
     assert_true(single_wrong >= scene_count);
     assert_true(rerendered < scene_count * WIDTH * HEIGHT / 4);

@@ -237,7 +237,7 @@ TEST(slim_triangles_are_seldom_rerendered)
         RenderSettings settings = film_settings(SIDE, SIDE, PRECISION_CERTIFIED);
         settings.bounce_count = 2;
         const Answer found = answer(&scene, &reference, &settings);
-        print_message("%zu of %u samples repeated\n", (size_t)found.rerendered, 3 * SIDE * SIDE);
+        print_message("%zu of %u samples re-rendered\n", (size_t)found.rerendered, 3 * SIDE * SIDE);
         assert_int_equal(found.wrong_decided, 0);
         assert_true(found.rerendered < 64);
         certify_sample_close(&reference);
@@ -273,7 +273,7 @@ TEST(fine_meshes_are_seldom_rerendered)
     RenderSettings settings = small_settings(0);
     settings.width = settings.height = settings.region_width = settings.region_height = 100;
     Film film = image_render(&scene, &settings);
-    print_message("%zu of %u pixels repeated\n", (size_t)film.rerenders.rerendered, 100 * 100);
+    print_message("%zu of %u pixels re-rendered\n", (size_t)film.rerenders.rerendered, 100 * 100);
     size_t seen = 0;
     for (size_t i = 0; i < 100 * 100; i++)
         seen += film.color[3 * i] != 0.25; // not the background

@@ -153,7 +153,7 @@ static long double dot(const long double *a, const long double *b)
 #define CLEAR_MISS_BY_BOUNDS 0x1p-10L
 
 // Checks one answer by the line's distance from the center, in long double.
-static void line_judge(Trial *trial, size_t index, bool from_eye)
+static void line_check(Trial *trial, size_t index, bool from_eye)
 {
     const double *line = trial->lines + 6 * index;
     const Sphere *sphere = flat_array_at(&trial->flat.arrays[FLAT_FIRST_SHAPE + TYPE_SPHERES], index);
@@ -218,7 +218,7 @@ static void culling_check(void **state)
         trial_make(&trial, from_eye);
         trial_run(&trial, program, from_eye ? COMMON_ORIGIN_EYE : COMMON_ORIGIN_FIRST_LIGHT);
         for (size_t k = 0; k < SPHERES_PER_ORIGIN; k++)
-            line_judge(&trial, k, from_eye);
+            line_check(&trial, k, from_eye);
         compiled_scene_free(&trial.flat);
     }
     // few answers are too near to call

@@ -50,8 +50,9 @@ typedef struct {
 
 typedef struct {
     Errors steep, grazing; // at a cosine of 0.1 or more, and at a smaller one
-    size_t compared, wrong,
-        undecided; // hits and misses; wrong ones outside the band in which both are right; those in it
+    // `compared` counts all hits and misses, `wrong` those that differ from the reference outside the band in
+    // which both are right, and `uncertain` those that differ within it.
+    size_t compared, wrong, uncertain;
     double bound_fraction; // the largest error as a fraction of the tier's bound
 } Tally;
 
@@ -134,11 +135,11 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     double scale = u * (tier->of_size ? shape->radius : distance);
     // flat shapes have no compensated edges
     double flat = shape->object.type == SHAPE_TRIANGLE ? TRIANGLE_BAND : 4;
-    bool undecided = expected->margin <= fmax(tier->band * scale, flat * u * distance);
+    bool uncertain = expected->margin <= fmax(tier->band * scale, flat * u * distance);
 
     tally->compared++;
     if ((hit->object != UINT32_MAX) != expected->found) {
-        (*(undecided ? &tally->undecided : &tally->wrong))++;
+        (*(uncertain ? &tally->uncertain : &tally->wrong))++;
         return;
     }
     if (!expected->found) return;
@@ -147,7 +148,7 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     Errors *errors = cosine >= 0.1 ? &tally->steep : &tally->grazing;
     // NaN and infinity exceed every bound
     errors->ulps[errors->count++] = isfinite(off) ? off / ulp : HUGE_VAL;
-    if (undecided) return;
+    if (uncertain) return;
     double bound = tier->ulps * ulp + tier->slack * scale / (cosine * vector_length(direction));
     tally->bound_fraction = fmax(tally->bound_fraction, isfinite(off) ? off / bound : HUGE_VAL);
 }
@@ -299,7 +300,7 @@ static void tally_write(Tally *tally, const char *shape, Precision precision, do
     errors_write(json, "steep", &tally->steep);
     errors_write(json, "grazing", &tally->grazing);
     json_int64(json, "wrong", (int64_t)tally->wrong);
-    json_int64(json, "undecided", (int64_t)tally->undecided);
+    json_int64(json, "undecided", (int64_t)tally->uncertain);
     json_number(json, "bound_fraction", tally->bound_fraction);
     json_end(json);
 }
