@@ -24,14 +24,15 @@ END
 found page.md '1 3 4 5 11'
 cat >"$scratch/source.c" <<'END'
 // Of each ray, the hit.
-const char *anew = "beside // anew";
+const char *anew = "beside//anew";
 int mend; // the article
 /* A room that has no
    room for it. */
 // Returns the hit, and the next one, too.
 // This continues.
+fail("a ray meets %d shapes", "beside");
 END
-found source.c '1 3 4 6'
+found source.c '1 3 4 6 8'
 printf '#!/usr/bin/env python3\n"""Renders anew."""\nbeside = "anew"  # goes on\n' >"$scratch/tool.py"
 found tool.py '2 3'
 printf '#!/bin/sh\necho anew "$#" # beside\n' >"$scratch/tool"

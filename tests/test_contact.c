@@ -36,7 +36,7 @@ static Trial trials[] = {
      APART},
     {"nothing opaque", GLASS_SPHERE, APART},
     {"all opaque", "  - sphere: {center: [0, 0, -4], radius: 1, material: chalk}\n" FLOOR, APART},
-    {"beside a box",
+    {"next to a box",
      GLASS_SPHERE "  - box: {min: [1, 0, -8], max: [2, 3, -4.5], material: chalk}\n",
      true,
      {1, 0, -5},

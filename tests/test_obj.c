@@ -71,7 +71,7 @@ TEST(layouts_are_read)
         // faces may stand before what they name
         "f 1 2 3 4\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n",
         "v 0 0 \\\n0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 \\\n3 \\\n  4\n",
-        "# goes on \\\nv 7 7 7\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nfo +1 2 3 4\n",
+        "# continues \\\nv 7 7 7\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nfo +1 2 3 4\n",
         "v 0 0 0 1\nv 2 0 0 2\nv -1 -1 0 -1\nv 0 0.5 0 0.5\nf 1 2 3 4\n",
         "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2// 3/1 4//1\nf 1 2\n",
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 1 2\n",

@@ -248,7 +248,7 @@ TEST(memory_and_images_stay)
         end = child_run(render_alone, &alone, sizeof alone);
         if (end.status != 0) fail_msg("%s", end.errors);
         if (alone.image != all.images[alone.seed])
-            fail_msg("scene %u is another one in a process of its own", (unsigned)alone.seed);
+            fail_msg("scene %u is another one in a separate process", (unsigned)alone.seed);
     }
     assert_true(all.bytes_twice <= all.bytes_once + BYTES_KEPT_MAX);
 }
