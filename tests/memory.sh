@@ -70,13 +70,13 @@ bounded 200 256x65536 -o tall.ppm
 built --samples 4 --aov t,normal -o deep.exr
 # PoCL 6.0 takes 55 MiB more than PoCL 3.1; the whole image would take 235 MiB
 bounded 240 4096x2048 --samples 4 --aov t,normal -o deep.exr
-[ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 -o huge.png
+! is_long || bounded 1024 32768x32768 -o huge.png
 # PoCL as two devices: bands that wait for one above them are also bounded, or in the checkpoint
 export POCL_DEVICES='pthread pthread'
 bounded 300 8192x2048 --device portable,1 -o wide.png
 bounded 300 8192x2048 --device portable,1 --checkpoint saved -o wide.png
-[ "${GLINT_LONG_TESTS-}" != 1 ] || bounded 1024 32768x32768 --device portable,1 --checkpoint saved -o huge.png
-if [ "${GLINT_LONG_TESTS-}" = 1 ] && command -v mpirun >/dev/null && [ -x "${GLINT%/*}/glint-mpi" ]; then
+! is_long || bounded 1024 32768x32768 --device portable,1 --checkpoint saved -o huge.png
+if is_long && command -v mpirun >/dev/null && [ -x "${GLINT%/*}/glint-mpi" ]; then
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
     export PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
     program=(mpirun -n 4 "${GLINT%/*}/glint-mpi")

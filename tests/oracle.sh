@@ -8,7 +8,7 @@ build=${BUILD:-build}
 python_with flint=python-flint==0.9.0
 check 'the program that prints answers builds' ${MAKE:-make} -s BUILD="$build" "$build/tests/oracle/answers"
 long= samples=24
-[ "${GLINT_LONG_TESTS-}" != 1 ] || long=--long samples=240
+! is_long || long=--long samples=240
 "$build/tests/oracle/answers" $samples >"$scratch/answers" || fail 'answers are printed'
 certify() { "$python" -B tests/oracle/certify.py "$@" <"$scratch/answers"; }
 if certify $long; then

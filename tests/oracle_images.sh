@@ -6,7 +6,7 @@
 
 python_with flint=python-flint==0.9.0 yaml=PyYAML==6.0.3 numpy=numpy==2.4.6
 long=
-[ "${GLINT_LONG_TESTS-}" != 1 ] || long=--long
+! is_long || long=--long
 if "$python" -B tests/oracle/images.py "${BUILD:-build}/glint" "$scratch" $long; then
     pass
 else
