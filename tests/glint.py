@@ -231,6 +231,16 @@ def npy_read(path):
     return head["shape"], head["descr"], pixels if head["shape"][2:] else [value for (value,) in pixels]
 
 
+def png_bytes(rows, color=2, *extra):
+    """Returns an 8-bit image of rows of bytes, by default RGB, with extra chunks."""
+    width = len(rows[0]) // {0: 1, 2: 3, 3: 1, 6: 4}[color]
+    chunks = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, len(rows), 8, color, 0, 0, 0)), *extra,
+        (b"IDAT", zlib.compress(b"".join(b"\0" + row for row in rows))), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in chunks)
+
+
 def png_read(path):
     """Returns (width, height, bits, color type), raw rows, texts by keyword, and the types of chunks. Checks every checksum."""
     data = Path(path).read_bytes()

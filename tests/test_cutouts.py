@@ -5,9 +5,8 @@ were cut into the shape. Also tests what formats of meshes make of alpha.
 run_tests: sanitize-long-only"""
 import math
 import struct
-import zlib
 
-from glint import IS_LONG, TestCase, csv_rows, main, need_device, npy_read, write
+from glint import IS_LONG, TestCase, csv_rows, main, need_device, npy_read, png_bytes, write
 
 HAS_DOUBLE = need_device()["fp64"]
 PRECISIONS = ["single", "strict"] + ["double"] * HAS_DOUBLE if IS_LONG else ["strict"]
@@ -18,16 +17,7 @@ HOLE, TEXELS = 0.6, 64  # the hole's radius on the quad, whose side is 2
 def png(path, alphas, color=6):
     """Writes an 8-bit image of one color with an alpha for each pixel, or a gray image of these values. Returns its path."""
     pixel = (lambda a: bytes([200, 100, 50, round(255 * a)])) if color == 6 else (lambda a: bytes([round(255 * a)]))
-    raw = b"".join(b"\0" + b"".join(map(pixel, row)) for row in alphas)
-    chunks = (
-        (b"IHDR", struct.pack(">IIBBBBB", len(alphas[0]), len(alphas), 8, color, 0, 0, 0)),
-        (b"IDAT", zlib.compress(raw)),
-        (b"IEND", b""),
-    )
-    with open(path, "wb") as file:
-        file.write(b"\x89PNG\r\n\x1a\n")
-        for kind, body in chunks:
-            file.write(struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)))
+    write_bytes(path, png_bytes([b"".join(map(pixel, row)) for row in alphas], color))
     return path
 
 

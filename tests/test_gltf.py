@@ -5,11 +5,10 @@ import base64
 import json
 import math
 import struct
-import zlib
 from pathlib import Path
 from unittest import skipUnless
 
-from glint import TestCase, main, npy_read, write
+from glint import TestCase, main, npy_read, png_bytes, write
 
 BYTE, UNSIGNED_BYTE, SHORT, UNSIGNED_SHORT, UNSIGNED_INT, FLOAT = 5120, 5121, 5122, 5123, 5125, 5126
 LETTERS = {BYTE: "b", UNSIGNED_BYTE: "B", SHORT: "h", UNSIGNED_SHORT: "H", UNSIGNED_INT: "I", FLOAT: "f"}
@@ -68,8 +67,7 @@ class Gltf:
             text += b" " * (-len(text) % 4)
             data = struct.pack("<II", len(text), 0x4E4F534A) + text
             data += struct.pack("<II", len(self.bytes), 0x004E4942) + self.bytes
-            with open(path, "wb") as file:
-                file.write(struct.pack("<4sII", b"glTF", 2, 12 + len(data)) + data)
+            Path(path).write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(data)) + data)
             return path
         encoded = "data:application/octet-stream;base64," + base64.b64encode(self.bytes).decode()
         if self.bytes:
@@ -79,12 +77,7 @@ class Gltf:
 
 def png(rows, color=2, *extra):
     """Returns an 8-bit image of values from 0 to 1, by default RGB, with extra chunks."""
-    raw = b"".join(b"\0" + bytes(int(255 * value) for pixel in row for value in pixel) for row in rows)
-    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, color, 0, 0, 0)
-    chunks = ((b"IHDR", header), *extra, (b"IDAT", zlib.compress(raw)), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body)) for kind, body in chunks
-    )
+    return png_bytes([bytes(int(255 * value) for pixel in row for value in pixel) for row in rows], color, *extra)
 
 
 RED, GREEN, BLUE, WHITE = (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)
@@ -208,6 +201,12 @@ Connections:  {{
 """
 
 
+def formatted(text, separator, normals=((0, 0, 1),) * 4, uvs=tuple(WHOLE)):
+    """Returns a text with SQUARE's numbers."""
+    numbers = {"v": SQUARE, "n": normals, "t": uvs}
+    return text.format(**{name: separator.join(str(x) for row in rows for x in row) for name, rows in numbers.items()})
+
+
 class Test(TestCase):
     def checked(self, path, *warnings):
         """Returns what glint check reports. The warnings, and no others, must have these parts."""
@@ -231,11 +230,9 @@ class Test(TestCase):
         self.assert_square(gltf.write("binary.glb"))
         self.assert_square(gltf.write("text.gltf"))
         del gltf.json["buffers"]
-        with open("a b%.bin", "wb") as file:
-            file.write(gltf.bytes)
+        Path("a b%.bin").write_bytes(gltf.bytes)
         self.assert_square(gltf.write("file.gltf", uri="a%20b%25.bin"))
-        with open("Unicode\u2764\u267b.bin", "wb") as file:
-            file.write(gltf.bytes)
+        Path("Unicode\u2764\u267b.bin").write_bytes(gltf.bytes)
         for uri in ("Unicode\u2764\u267b.bin", "Unicode%E2%9D%A4%E2%99%BB.bin"):
             del gltf.json["buffers"]
             self.assert_square(gltf.write("Unicode\u2764\u267b.gltf", uri=uri))
@@ -359,8 +356,7 @@ class Test(TestCase):
         self.refuses("check a.gltf", r"^a.gltf:2:28: error: .*\n.*\n +\^")
         write("a.glb", "glTF\2")
         self.refuses("check a.glb", "too short for a GLB file")
-        with open("a.glb", "wb") as file:
-            file.write(struct.pack("<4sIIII", b"glTF", 2, 99, 1 << 31, 0x4E4F534A))
+        Path("a.glb").write_bytes(struct.pack("<4sIIII", b"glTF", 2, 99, 1 << 31, 0x4E4F534A))
         self.refuses("check a.glb", "byte 12: the file ends within a chunk of 2147483648 bytes")
 
     def test_bombs(self):
@@ -463,8 +459,7 @@ class Test(TestCase):
             gltf = Gltf(materials=[member])
             gltf.square(material=0)
             self.checked(gltf.write("a.gltf"), expected)
-        numbers = {"v": SQUARE, "n": [(0, 0, 1)] * 4, "t": WHOLE}
-        text = DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()})
+        text = formatted(DAE, " ")
         write("a.dae", text.replace("<texture texture='s2' texcoord='UV'/>", "<color>-1 0 0 1</color>"))
         self.checked("a.dae", "a color of material 'm' is out of range: the default is used")
 
@@ -501,8 +496,7 @@ class Test(TestCase):
         material = gltf.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}})
         gltf.square(uvs=WHOLE, material=material)
         self.checked(gltf.write("a.gltf"), "images[0]: cannot read 'a b.png': No such file or directory: the color is used")
-        with open("a b.png", "wb") as file:
-            file.write(QUADRANTS)
+        Path("a b.png").write_bytes(QUADRANTS)
         self.assertIn("IMAGES", self.checked("a.gltf")["features"])
         for uri in ("C:\\Users\\me\\a b.png", "/home/me/a%20b.png", "file:///C:/me/a%20b.png", "textures/a b.png"):
             gltf.json["images"] = [{"uri": uri}]
@@ -519,12 +513,10 @@ class Test(TestCase):
             "palette": (png([[(0,), (1 / 255,)]], 3, palette, (b"tRNS", b"\xff\x00")), True),
             "plain": (png([[(0,), (1 / 255,)]], 3, palette), False),
         }
-        with open("rgb.png", "wb") as file:
-            file.write(png([[RED, GREEN]]))
+        Path("rgb.png").write_bytes(png([[RED, GREEN]]))
         write("a.obj", "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
         for name, (data, is_named) in images.items():
-            with open(f"{name}.png", "wb") as file:
-                file.write(data)
+            Path(f"{name}.png").write_bytes(data)
             self.glint(f"diff {name}.png rgb.png")
             write("a.mtl", f"newmtl m\nmap_Kd {name}.png\n")
             self.checked("a.obj", *[f"the alpha of '{name}.png' is ignored"] * is_named)
@@ -564,16 +556,14 @@ class Test(TestCase):
             _, _, objects = npy_read("a.object.npy")
             hit = [i for i, number in enumerate(objects) if number != 0xFFFFFFFF]
             self.assertEqual(hit, [64 * row + column for row in range(8, 24) for column in range(24, 40)])
-        with open("a.obj", "w", encoding="utf-8") as file:
-            file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
         process = self.glint("render a.gltf --precision certified --size 8x8 -o a.npy", status=1)
         self.assertIn("the camera has parallel rays, which has no error bound", process.stderr)
 
     def test_formats_look_alike(self):
         """A smooth, textured square in four formats gives the same image with the same camera and lights."""
         normals = [(-0.6, 0, 0.8), (0.6, 0, 0.8), (0.6, 0, 0.8), (-0.6, 0, 0.8)]
-        with open("a.png", "wb") as file:
-            file.write(QUADRANTS)
+        Path("a.png").write_bytes(QUADRANTS)
         gltf = Gltf(images=[{"uri": "a.png"}], textures=[{"source": 0}])
         gltf.square(WHOLE, normals, material=gltf.add("materials", pbrMetallicRoughness={"baseColorTexture": {"index": 0}}))
         gltf.write("a.gltf")
@@ -585,9 +575,8 @@ class Test(TestCase):
         write("a.mtl", "newmtl m\nKd 1 1 1\nmap_Kd a.png\n")
         text = lines("v", SQUARE) + lines("vt", upward) + lines("vn", normals)
         write("a.obj", f"mtllib a.mtl\n{text}usemtl m\nf 1/1/1 2/2/2 3/3/3\nf 1/1/1 3/3/3 4/4/4\n")
-        numbers = {"v": SQUARE, "n": normals, "t": upward}
-        write("a.dae", DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()}))
-        write("a.fbx", FBX.format(**{name: ",".join(str(x) for row in rows for x in row) for name, rows in numbers.items()}))
+        write("a.dae", formatted(DAE, " ", normals, upward))
+        write("a.fbx", formatted(FBX, ",", normals, upward))
         images = []
         for ending in ("gltf", "obj", "dae", "fbx"):
             self.checked(f"a.{ending}")
@@ -624,10 +613,8 @@ class Test(TestCase):
 
     def test_scenes_of_other_formats(self):
         """Cameras, lights and textures are read by assimp. An image with another machine's path is found next to the file."""
-        with open("a.png", "wb") as file:
-            file.write(QUADRANTS)
-        numbers = {"v": SQUARE, "n": [(0, 0, 1)] * 4, "t": WHOLE}
-        text = DAE.format(**{name: " ".join(str(x) for row in rows for x in row) for name, rows in numbers.items()})
+        Path("a.png").write_bytes(QUADRANTS)
+        text = formatted(DAE, " ")
         text = text.replace("<library_geometries>", DAE_VIEW + "<library_geometries>").replace("<init_from>a.png", "<init_from>C:\\a\\a.png")
         node = "<node id='{0}' name='{0}'><translate>0.5 0.5 {1}</translate><instance_{2} url='#{3}'/></node>"
         nodes = node.format("C", 2, "camera", "c") + node.format("L", 2, "light", "l") + node.format("P", 3, "light", "p")

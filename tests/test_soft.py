@@ -2,11 +2,10 @@
 """Compares soft shadows, the lens, parallel rays and the sky with geometry, and tests how the error falls with the samples."""
 import itertools
 import math
-import struct
-import zlib
+from pathlib import Path
 
 import glint
-from glint import IS_LONG, TestCase, main, npy_read, need_device, skip_all, write
+from glint import IS_LONG, TestCase, main, npy_read, need_device, png_bytes, skip_all, write
 
 DARK = "sphere: {center: [0, 1000, 0], radius: 1", "spot: {position: [0, 1000, 0], look_at: [0, 0, 0], angle: 20", "directional: {direction: [0, -1, 0]"
 PRECISIONS = ("single", "strict", "double") if IS_LONG else ("strict",)
@@ -14,13 +13,7 @@ PRECISIONS = ("single", "strict", "double") if IS_LONG else ("strict",)
 
 def png_write(name, width, height, color):
     """Writes an image of 8 bits, where `color` returns the three values of a column and a row."""
-    def chunk(kind, data):
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    rows = b"".join(b"\0" + bytes(value for x in range(width) for value in color(x, y)) for y in range(height))
-    with open(name, "wb") as file:
-        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)) +
-                   chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+    Path(name).write_bytes(png_bytes([bytes(value for x in range(width) for value in color(x, y)) for y in range(height)]))
 
 
 def cap(x):
