@@ -29,6 +29,12 @@ bool file_is_same(const char *path, const struct stat *other)
            status.st_ino == other->st_ino;
 }
 
+const char *file_base_name(const char *path)
+{
+    const char *slash = strrchr(path, '/');
+    return slash ? slash + 1 : path;
+}
+
 int file_folder_open(const char *path)
 {
     const char *slash = strrchr(path, '/');

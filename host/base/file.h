@@ -15,6 +15,8 @@ FileLock file_lock(int descriptor);
 bool file_has_name(int descriptor, int folder, const char *name);
 // Returns whether a path, which may be NULL, leads to the file with this status.
 bool file_is_same(const char *path, const struct stat *other);
+// Returns the part of a path after its last slash.
+const char *file_base_name(const char *path);
 // Opens the folder of a file. A folder that may be written but not listed is opened, but cannot be synced.
 // Returns -1 and sets errno on failure.
 int file_folder_open(const char *path);

@@ -2,6 +2,7 @@
 
 #include "host/base/array.h"
 #include "host/base/clock.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include <pthread.h>
 #include <stdatomic.h>
@@ -65,13 +66,12 @@ static void span_end(Stage *stage, double now)
 void stage_begin(Stage *stage, const char *what, const char *path, size_t total)
 {
     if (is_ignored(stage)) return;
-    const char *slash = path ? strrchr(path, '/') : NULL, *name = slash ? slash + 1 : path;
     pthread_mutex_lock(&stage->mutex);
     const double now = clock_seconds();
     if (stage->name.count == 0) stage->start_seconds = now;
     span_end(stage, now);
     text_free(&stage->name);
-    text_appendf(&stage->name, name ? "%s %s" : "%s", what, name);
+    text_appendf(&stage->name, path ? "%s %s" : "%s", what, path ? file_base_name(path) : NULL);
     stage->total = total;
     atomic_store(&stage->done, 0);
     pthread_mutex_unlock(&stage->mutex);

@@ -1,6 +1,8 @@
 // The JSON of glint accuracy, and the rows that other formats are made of.
 #include "host/cli/accuracy_report.h"
 #include "host/cli/report_json.h"
+
+#include "host/base/file.h"
 #include <string.h>
 
 const ResultTable accuracy_table = {
@@ -38,8 +40,7 @@ static const char is_reference[] =
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
                            const AccuracyVariant *variant)
 {
-    const char *path = report->scenes[scene].path, *slash = strrchr(path, '/');
-    const char *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    const char *name = file_base_name(report->scenes[scene].path), *dot = strrchr(name, '.');
     size_t length = dot && dot > name ? (size_t)(dot - name) : strlen(name);
     text_appendf(text, "%s/%zu-%.*s", report->folder, scene, (int)length, name);
     if (variant)

@@ -1,6 +1,7 @@
 #include "host/cli/image_notes.h"
 
 #include "host/api/version.h"
+#include "host/base/file.h"
 #include <inttypes.h>
 #include <string.h>
 
@@ -46,8 +47,7 @@ void counts_describe(Text *text, const RerenderCounts *counts)
 static void scene_notes_add(ImageNotes *notes, const ImageOrigin *origin)
 {
     const Scene *scene = origin->scene;
-    const char *slash = strrchr(origin->scene_path, '/');
-    text_appendf(note_begin(notes, "Scene"), "%s", slash ? slash + 1 : origin->scene_path);
+    text_appendf(note_begin(notes, "Scene"), "%s", file_base_name(origin->scene_path));
     Text *text = scene->overrides ? note_begin(notes, "Set") : NULL;
     for (const Source *set = scene->overrides; set; set = set->next)
         text_appendf(text, "%s%s", set->bytes, set->next ? "\n" : "");

@@ -1,5 +1,6 @@
 #include "host/cli/image_paths.h"
 
+#include "host/base/file.h"
 #include "host/base/text.h"
 #include "host/cli/options.h"
 #include <stdlib.h>
@@ -8,8 +9,7 @@
 
 char *image_output_default_path(const char *scene_path)
 {
-    const char *slash = strrchr(scene_path, '/');
-    const char *name = strcmp(scene_path, "-") == 0 ? "image" : slash ? slash + 1 : scene_path;
+    const char *name = strcmp(scene_path, "-") == 0 ? "image" : file_base_name(scene_path);
     const char *dot = strrchr(name, '.');
     Text path = {0};
     text_append(&path, name, dot && dot > name ? (size_t)(dot - name) : strlen(name));

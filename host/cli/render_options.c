@@ -1,4 +1,6 @@
 #include "host/cli/render_options.h"
+
+#include "host/base/file.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
@@ -52,8 +54,7 @@ static bool frames_read(const Option *option, const char *value, void *render_op
 
 FramePlace frame_place_of(const char *pattern)
 {
-    const char *slash = strrchr(pattern, '/'), *name = slash ? slash + 1 : pattern;
-    for (const char *start = name; (start = strchr(start, '%')) != NULL; start++) {
+    for (const char *start = file_base_name(pattern); (start = strchr(start, '%')) != NULL; start++) {
         const bool has_digits = start[1] == '0' && start[2] >= '1' && start[2] <= '9';
         const char *end = start + (has_digits ? 3 : 1);
         if (*end == 'd') return (FramePlace){start, end + 1, has_digits ? start[2] - '0' : 0};

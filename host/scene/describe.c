@@ -1,5 +1,6 @@
 #include "host/scene/describe.h"
 
+#include "host/base/file.h"
 #include "host/scene/mesh.h"
 #include <string.h>
 
@@ -23,12 +24,6 @@ uint32_t object_material(const Scene *scene, const Object *object, size_t primit
     return of_triangles ? of_triangles[primitive] : object->material;
 }
 
-static const char *file_name(const char *path)
-{
-    const char *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
-}
-
 void object_describe(Text *text, const Scene *scene, const char *path, size_t id)
 {
     size_t primitive;
@@ -40,9 +35,9 @@ void object_describe(Text *text, const Scene *scene, const char *path, size_t id
     const Mesh *mesh = object->type == SHAPE_MESH ? &scene->meshes.items[object->as.mesh.index] : NULL;
     if (mesh) text_appendf(text, "triangle %zu of ", primitive);
     text_appendf(text, "%s %zu", shape_names[object_shape(object)], id - primitive);
-    if (mesh && mesh->path) text_appendf(text, ", %s", file_name(mesh->path));
+    if (mesh && mesh->path) text_appendf(text, ", %s", file_base_name(mesh->path));
     if (object->file > 0) path = scene->included.items[object->file - 1].path;
-    if (object->line > 0) text_appendf(text, ", %s:%u", file_name(path), object->line);
+    if (object->line > 0) text_appendf(text, ", %s:%u", file_base_name(path), object->line);
     const char *name = scene->material_names.items[object_material(scene, object, primitive)];
     if (name[0] != '\0') text_appendf(text, ", material %s", name);
 }

@@ -3,6 +3,7 @@
 #include "host/view/watch.h"
 
 #include "host/base/array.h"
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include <errno.h>
 #include <poll.h>
@@ -131,7 +132,7 @@ static void file_add(Watch *watch, const char *path)
         watch->has_failed |= error != ENOENT;
         return;
     }
-    WatchedFile file = {descriptor, memory_copy_text(slash ? slash + 1 : path)};
+    WatchedFile file = {descriptor, memory_copy_text(file_base_name(path))};
     array_push(watch->files, file);
 }
 

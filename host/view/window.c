@@ -1,5 +1,6 @@
 #include "host/view/window_state.h"
 
+#include "host/base/file.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,8 +15,7 @@ static void frame_notify(void *context)
 
 const char *scene_name(const Window *window)
 {
-    const char *path = window->options->frames.scene_path, *slash = strrchr(path, '/');
-    return slash ? slash + 1 : path;
+    return file_base_name(window->options->frames.scene_path);
 }
 
 void message_show(Window *window, char *message)

@@ -115,9 +115,8 @@ char *draft_find_file(const char *from, const char *name, size_t length, bool *i
     char *given = text_format("%.*s", (int)length, name);
     for (char *at = given; *at; at++)
         if (*at == '\\') *at = '/';
-    const char *last_slash = strrchr(given, '/');
     char *path = text_format("%.*s%s", is_absolute(given) ? 0 : folder_length, from, given),
-         *near = text_format("%.*s%s", folder_length, from, last_slash ? last_slash + 1 : given);
+         *near = text_format("%.*s%s", folder_length, from, file_base_name(given));
     *is_moved = file_obstacle(path) && !file_obstacle(near);
     free(given);
     free(*is_moved ? path : near);
