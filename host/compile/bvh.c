@@ -1,6 +1,5 @@
 #include "host/compile/bvh.h"
 
-#include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/parallel.h"
 #include "host/compile/bvh_split.h"
@@ -204,14 +203,13 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count
         .scale = largest > 0 ? 1 / largest : 1,
         .count = count,
         .leaves = leaves,
-        .references = aligned_alloc(64, (count * sizeof(PrimitiveReference) + 127) / 64 * 64),
+        .references = memory_allocate_large(count, sizeof *builder.references),
         .nodes = memory_allocate(count + 1, sizeof *builder.nodes),
         .idle_threads = (int)sysconf(_SC_NPROCESSORS_ONLN) - 1,
         .lock = PTHREAD_MUTEX_INITIALIZER,
         .bounds = range_bounds_empty(),
         .stage = stage,
     };
-    if (!builder.references) fault("out of memory for a BVH of %zu primitives", count);
     parallel_run(count, THREAD_RANGE_MIN, references_make, &builder);
     root_build(&builder);
     *bvh = (Bvh){

@@ -4,6 +4,9 @@
 #include "host/base/output.h"
 #include "host/image/image.h"
 
+// Deflate, in PNG and EXR, expands a byte to at most 1032 (zlib's technical details).
+enum { DEFLATE_RATIO_MAX = 1032 };
+
 // Encoders. `state` belongs to the encoder; image.c opens and renames the file.
 struct ImageWriter {
     ImageHeader header;

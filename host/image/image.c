@@ -55,9 +55,6 @@ uint64_t image_bytes(const ImageHeader *header)
     return values * (header->npy_type == 'd' ? sizeof(double) : sizeof(float));
 }
 
-// Deflate, in PNG and EXR, expands a byte to at most 1032 (zlib's technical details).
-enum { DEFLATE_RATIO_MAX = 1032 };
-
 static uint64_t bytes_min(const ImageHeader *header)
 {
     const bool is_compressed = header->format == IMAGE_PNG || header->format == IMAGE_EXR;

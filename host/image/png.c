@@ -180,11 +180,10 @@ static bool png_prepare(PngReader *reader, Image *image)
     if (png_get_valid(png, info, PNG_INFO_tRNS)) png_set_tRNS_to_alpha(png);
     png_set_interlace_handling(png);
 
-    // Deflate expands a byte to at most 1032 (zlib, technical details), and a byte holds at most 8 palette
-    // pixels. Checked before libpng allocates a row of the declared width.
+    // A byte holds at most 8 palette pixels. Checked before libpng allocates a row of the declared width.
     if (!image_allocate(image, reader->file, png_get_image_width(png, info), png_get_image_height(png, info),
                         png_get_color_type(png, info) & PNG_COLOR_MASK_COLOR ? 3 : 1,
-                        UINT64_C(1032) * 8 * 3 * sizeof *image->values))
+                        UINT64_C(8) * DEFLATE_RATIO_MAX * 3 * sizeof *image->values))
         return false;
     png_read_update_info(png, info);
     reader->state.bytes = calloc(image->height, png_get_rowbytes(png, info));

@@ -17,6 +17,13 @@ static inline bool bounds_is_empty(const Bounds *bounds)
     return bounds->min.x > bounds->max.x;
 }
 
+// Returns corner i of 8. Bits 0, 1 and 2 of i choose the sides of x, y and z.
+static inline Vector3 bounds_corner(Bounds bounds, unsigned i)
+{
+    return (Vector3){i & 1 ? bounds.max.x : bounds.min.x, i & 2 ? bounds.max.y : bounds.min.y,
+                     i & 4 ? bounds.max.z : bounds.min.z};
+}
+
 static inline Bounds bounds_around(Vector3 center, Vector3 half_extents)
 {
     return (Bounds){vector_subtract(center, half_extents), vector_add(center, half_extents)};

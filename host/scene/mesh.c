@@ -202,12 +202,9 @@ void mesh_bound(Mesh *mesh)
 
 Bounds instance_bounds(const Mesh *mesh, const Object *object)
 {
-    const Vector3 low = mesh->bounds.min, high = mesh->bounds.max;
     Bounds all = bounds_empty();
     for (unsigned i = 0; i < 8 && mesh->vertex_count > 0; i++) {
-        const Vector3 corner =
-            affine_point(&object->as.mesh.transform,
-                         (Vector3){i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z});
+        const Vector3 corner = affine_point(&object->as.mesh.transform, bounds_corner(mesh->bounds, i));
         all = bounds_join(all, (Bounds){corner, corner});
     }
     return all;

@@ -58,12 +58,6 @@ static bool keeps_axes(const Affine *affine)
     return true;
 }
 
-// Corner i of a box has its bits 0, 1 and 2 as the sides of x, y and z.
-static Vector3 box_corner(Vector3 min, Vector3 max, unsigned i)
-{
-    return (Vector3){i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z};
-}
-
 static void box_make_mesh(Scene *scene, Object *object)
 {
     static const uint32_t triangles[12][3] = {{0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5},
@@ -74,7 +68,7 @@ static void box_make_mesh(Scene *scene, Object *object)
                  .triangles = items_copy(triangles, 12, sizeof *triangles),
                  .triangle_count = 12};
     for (unsigned i = 0; i < 8; i++)
-        mesh.vertices[i] = box_corner(object->as.box.min, object->as.box.max, i);
+        mesh.vertices[i] = bounds_corner((Bounds){object->as.box.min, object->as.box.max}, i);
     object->type = SHAPE_MESH;
     object->as.mesh.index = (uint32_t)scene->meshes.count;
     array_push(scene->meshes, mesh);

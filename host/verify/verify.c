@@ -3,6 +3,7 @@
 #include "host/import/load.h"
 
 #include "host/base/fault.h"
+#include "host/base/hash.h"
 #include "host/base/text.h"
 #include "host/scene/portable.h"
 #include "host/verify/rays.h"
@@ -372,7 +373,7 @@ void verify_run(Compute *compute, const VerifySettings *settings, const VerifyCh
     Renderer *tracer = NULL, *painter = NULL;
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         if (!is_chosen(choice, cases[i].name)) continue;
-        VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = 0xcbf29ce484222325u};
+        VerifyResult result = {.name = cases[i].name, .title = cases[i].title, .hash = HASH_START};
         if (sink->start && !sink->start(sink->context, &result)) continue;
         VerifyRun run = {.compute = compute,
                          .settings = settings,
