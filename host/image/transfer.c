@@ -122,10 +122,8 @@ void transfer_quantize(uint8_t *bytes, const float *values, size_t count, Transf
         srgb_quantize_8(bytes, values, count);
         return;
     }
-    const Curve *curve = curve_of(bits);
     for (size_t i = 0; i < count; i++) {
-        uint32_t display = transfer == TRANSFER_SRGB ? curve_quantize(curve, values[i])
-                                                     : linear_quantize(values[i], curve->maximum);
+        const uint32_t display = image_quantize(values[i], transfer, bits);
         if (bits == 16) *bytes++ = (uint8_t)(display >> 8);
         *bytes++ = (uint8_t)display;
     }

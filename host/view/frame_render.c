@@ -103,7 +103,7 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
     settings->is_preview = is_preview;
     loop->scene.camera = loop->current.camera;
     MessageList messages = {0};
-    bool prepared = true;
+    bool prepared;
     if (loop->renderer && settings->precision != loop->current.precision) renderers_close(loop);
     settings->precision = loop->current.precision;
     if (loop->renderer) {
@@ -181,7 +181,7 @@ bool errors_render(FrameLoop *loop)
     settings.precision = PRECISION_DOUBLE;
     settings.lanes = 0;
     MessageList messages = {0};
-    bool prepared = true;
+    bool prepared;
     if (loop->reference)
         prepared = renderer_move(loop->reference, &loop->scene, &settings, &messages);
     else

@@ -201,10 +201,9 @@ static WindowEnd events_run(Window *window)
     return WINDOW_CLOSED;
 }
 
-static WindowEnd window_fault(const char *what)
+static void window_fault(const char *what)
 {
     fprintf(stderr, "glint: %s: %s\n", what, SDL_GetError());
-    return WINDOW_ABSENT;
 }
 
 static void window_close(Window *window)

@@ -248,7 +248,6 @@ static bool glb_read(Gltf *gltf, const Source *source)
         if (i == 0 && !json_read(gltf, bytes, length, at + CHUNK_BYTES)) return false;
         if (i == 1 && type == CHUNK_BINARY) gltf->binary = (GltfBuffer){.bytes = bytes, .length = length};
         at += CHUNK_BYTES + length;
-        if (at > source->length) break;
     }
     return true;
 }
