@@ -28,10 +28,10 @@ typedef struct {
 
 static Batch batch_open(size_t count)
 {
-    return (Batch){.rays = memory_allocate(count + 1, sizeof(TraceRay)),
-                   .indices = memory_allocate(count + 1, sizeof(uint32_t)),
-                   .exponents = memory_allocate(count + 1, sizeof(int)),
-                   .found = memory_allocate(count + 1, sizeof(TraceHit)),
+    return (Batch){.rays = memory_allocate(count, sizeof(TraceRay)),
+                   .indices = memory_allocate(count, sizeof(uint32_t)),
+                   .exponents = memory_allocate(count, sizeof(int)),
+                   .found = memory_allocate(count, sizeof(TraceHit)),
                    .ends = memory_allocate(count + 1, sizeof(size_t))};
 }
 

@@ -152,9 +152,9 @@ static bool batches_trace(GlintTracer *tracer, const GlintRays *rays, const Trac
                           MessageList *messages)
 {
     const size_t batch = batch_rays(tracer, rays->count);
-    TraceRay *scaled = memory_allocate(batch + 1, sizeof *scaled);
-    TraceHit *found = memory_allocate(batch + 1, sizeof *found);
-    int *exponents = memory_allocate(batch + 1, sizeof *exponents);
+    TraceRay *scaled = memory_allocate(batch, sizeof *scaled);
+    TraceHit *found = memory_allocate(batch, sizeof *found);
+    int *exponents = memory_allocate(batch, sizeof *exponents);
     bool is_sound = true;
     for (size_t first = 0, count; first < rays->count && is_sound; first += count) {
         count = rays->count - first < batch ? rays->count - first : batch;

@@ -183,7 +183,7 @@ static bool side_by_side_open(SideBySide *side, char *const *paths, size_t count
         rows_check(report, messages);
     }
     if (message_count(messages, MESSAGE_ERROR) > 0) return false;
-    side->cells = memory_allocate_zeroed((rows_max + 1) * count, sizeof *side->cells);
+    side->cells = memory_allocate_zeroed(rows_max * count, sizeof *side->cells);
     for (size_t i = 0; i < count; i++)
         for (size_t k = 0; k < side->reports[i].baseline->count; k++)
             row_place(side, i, &side->reports[i].baseline->items[k]);

@@ -215,8 +215,8 @@ void bvh_build(Bvh *bvh, const Bounds *boxes, const uint8_t *types, size_t count
     *bvh = (Bvh){
         .nodes = builder.nodes,
         .node_count = builder.node_count,
-        .order = memory_allocate(count + 1, sizeof *bvh->order),
-        .types = memory_allocate(count + 1, 1),
+        .order = memory_allocate(count, sizeof *bvh->order),
+        .types = memory_allocate(count, 1),
         .primitive_count = count,
         .depth = builder.depth,
         .leaves = leaves,

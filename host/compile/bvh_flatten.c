@@ -46,9 +46,9 @@ static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
     for (size_t type = 0; type < TYPE_COUNT; type++)
         capacity += compiled->arrays[FLAT_FIRST_SHAPE + type].count;
     *bounded = (Bounded){
-        .boxes = memory_allocate(capacity + 1, sizeof(Bounds)),
-        .types = memory_allocate(capacity + 1, 1),
-        .places = memory_allocate(capacity + 1, sizeof(uint32_t)),
+        .boxes = memory_allocate(capacity, sizeof(Bounds)),
+        .types = memory_allocate(capacity, 1),
+        .places = memory_allocate(capacity, sizeof(uint32_t)),
     };
     for (size_t type = 0; type < TYPE_COUNT; type++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];

@@ -10,7 +10,7 @@
 // Returns each primitive's index in its shape's new array, in the tree's order.
 static uint32_t *order_in_types(const Bvh *bvh)
 {
-    uint32_t *order = memory_allocate(bvh->primitive_count + 1, sizeof *order);
+    uint32_t *order = memory_allocate(bvh->primitive_count, sizeof *order);
     uint32_t counts[TYPE_COUNT] = {0};
     for (size_t i = 0; i < bvh->primitive_count; i++)
         order[i] = counts[bvh->types[i]]++;

@@ -116,7 +116,7 @@ static double regions_collect(ContactRegionList *list, const CompiledScene *comp
     const ObjectEntry *entries = compiled->arrays[FLAT_OBJECTS].items;
     const FlatMaterial *materials = compiled->arrays[FLAT_MATERIALS].items;
     *list = (ContactRegionList){
-        .items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count + 1, sizeof(ContactRegion))};
+        .items = memory_allocate(compiled->arrays[FLAT_OBJECTS].count, sizeof(ContactRegion))};
     double largest = 0;
     for (size_t type = 0; type < TYPE_COUNT; type++) {
         const FlatArray *array = &compiled->arrays[FLAT_FIRST_SHAPE + type];

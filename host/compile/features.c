@@ -48,7 +48,7 @@ static FeatureSet material_features(const Material *material)
 FeatureSet materials_union(const Scene *scene, FeatureSet (*of)(const Material *material))
 {
     FeatureSet set = 0;
-    bool *is_done = memory_allocate_zeroed(scene->meshes.count + 1, sizeof *is_done);
+    bool *is_done = memory_allocate_zeroed(scene->meshes.count, sizeof *is_done);
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];
         set |= of(&scene->materials.items[object->material]);

@@ -146,7 +146,7 @@ static void texels_flatten(CompiledScene *compiled, const Scene *scene)
 void textures_flatten(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings)
 {
     const size_t count = scene->textures.count;
-    compiled->textures = memory_allocate_zeroed(count + 1, sizeof *compiled->textures);
+    compiled->textures = memory_allocate_zeroed(count, sizeof *compiled->textures);
     if (settings->textures) {
         memcpy(compiled->textures, settings->textures, count * sizeof *compiled->textures);
         levels_flatten(compiled, count);

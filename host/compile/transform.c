@@ -69,7 +69,7 @@ void scene_scale(Scene *scene, double factor)
 
 static void *copy_of(const void *items, size_t count, size_t size)
 {
-    void *copy = memory_allocate(count + 1, size);
+    void *copy = memory_allocate(count, size);
     if (count > 0) memcpy(copy, items, count * size);
     return copy;
 }

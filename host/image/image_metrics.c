@@ -29,7 +29,7 @@ double value_error(double reference, double test)
 ErrorSummary error_summarize(const double *reference, const double *test, size_t count)
 {
     ErrorSummary summary = {.psnr = INFINITY};
-    float *magnitudes = memory_allocate(count + 1, sizeof *magnitudes);
+    float *magnitudes = memory_allocate(count, sizeof *magnitudes);
     double sum = 0, square_sum = 0, relative_sum = 0;
     for (size_t i = 0; i < count; i++) {
         if (!isfinite(reference[i]) || !isfinite(test[i])) continue;

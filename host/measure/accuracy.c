@@ -60,8 +60,8 @@ void accuracy_edges_find(AccuracyEdges *edges, const Film *reference)
     }
     if (reference->shadow) {
         const uint32_t lights = reference->light_count;
-        edges->shadow = memory_allocate_zeroed(pixels * lights + 1, sizeof(bool));
-        edges->shadow_edge_pixels = memory_allocate_zeroed(lights + 1, sizeof(size_t));
+        edges->shadow = memory_allocate_zeroed(pixels * lights, sizeof(bool));
+        edges->shadow_edge_pixels = memory_allocate_zeroed(lights, sizeof(size_t));
         map = (ValueMap){reference->shadow, reference->width, reference->height, lights, 0};
         for (; map.offset < lights; map.offset++)
             edges->shadow_edge_pixels[map.offset] = edges_mark(&map, edges->shadow);

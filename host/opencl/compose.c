@@ -79,7 +79,7 @@ char *kernel_compose(const EmbeddedFile *files, const char *root, const char *pr
     size_t file_count = 0;
     while (files[file_count].name)
         file_count++;
-    Composer composer = {.files = files, .included = memory_allocate_zeroed(file_count + 1, sizeof(bool))};
+    Composer composer = {.files = files, .included = memory_allocate_zeroed(file_count, sizeof(bool))};
     text_appendf(&composer.text, "#line 1 \"prelude\"\n%s\n%s", prelude, alignment_text);
     compose_file(&composer, root, strlen(root));
     free(composer.included);

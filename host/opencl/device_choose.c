@@ -166,7 +166,7 @@ static bool is_listed(const Device *const *chosen, size_t count, const Device *d
 size_t devices_choose(const DeviceList *list, const char *selector, const Device ***devices,
                       MessageList *messages)
 {
-    const Device **chosen = *devices = memory_allocate_zeroed(list->count + 1, sizeof *chosen);
+    const Device **chosen = *devices = memory_allocate_zeroed(list->count, sizeof *chosen);
     if (selector && strcasecmp(selector, "all") == 0) return devices_choose_all(list, chosen, messages);
     // a name may contain a comma, such as llvmpipe's
     bool is_single = !selector || !strchr(selector, ',') || any_matches(list, selector);

@@ -54,7 +54,7 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
                               .count = (size_t)columns * rows};
     sample->places = memory_allocate(sample->count, sizeof *sample->places);
     sample->pixels = memory_allocate(sample->count, sizeof *sample->pixels);
-    sample->shadows = memory_allocate_zeroed(sample->count * sample->light_count + 1, sizeof(bool));
+    sample->shadows = memory_allocate_zeroed(sample->count * sample->light_count, sizeof(bool));
     for (size_t i = 0; i < sample->count; i++)
         place_choose(sample, columns, rows, i, sample->places[i]);
     ReferenceScene reference = reference_scene_open(scene);
@@ -174,7 +174,7 @@ static void pixels_examine(void *context, size_t begin, size_t end)
     const Scene *scene = &examination->scene->scene;
     const Film *film = examination->film;
     const size_t lights = scene->lights.count;
-    bool *shadows = memory_allocate_zeroed(2 * lights + 1, sizeof *shadows);
+    bool *shadows = memory_allocate_zeroed(2 * lights, sizeof *shadows);
     for (size_t i = begin; i < end; i++) {
         if (examination->stop && examination->stop()) break;
         const size_t pixel = examination->pixels[i];
@@ -205,7 +205,7 @@ CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, siz
     size_t *pixels = memory_allocate(found.count / step + 1, sizeof *pixels), chosen = 0;
     for (size_t i = 0, seen = 0; i < film_pixel_count(film); i++)
         if (film->flag[i] == FLAG_UNCERTIFIED && seen++ % step == 0) pixels[chosen++] = i;
-    Uncertainty *uncertainties = memory_allocate(chosen + 1, sizeof *uncertainties);
+    Uncertainty *uncertainties = memory_allocate(chosen, sizeof *uncertainties);
     ReferenceScene reference = reference_scene_open(scene);
     Examination examination = {&reference, film, pixels, path, stop, uncertainties};
     parallel_run(chosen, 1, pixels_examine, &examination);

@@ -24,9 +24,8 @@ static Object mesh_triangle(const Mesh *mesh, const Object *whole, size_t part)
 ReferenceScene reference_scene_open(const Scene *scene)
 {
     const size_t count = scene_primitive_count(scene);
-    ReferenceScene made = {.scene = *scene,
-                           .spheres = memory_allocate_zeroed(count + 1, sizeof *made.spheres)};
-    Object *objects = memory_allocate_zeroed(count + 1, sizeof *objects);
+    ReferenceScene made = {.scene = *scene, .spheres = memory_allocate_zeroed(count, sizeof *made.spheres)};
+    Object *objects = memory_allocate_zeroed(count, sizeof *objects);
     size_t next = 0;
     for (size_t i = 0; i < scene->objects.count; i++) {
         const Object *object = &scene->objects.items[i];

@@ -359,7 +359,7 @@ static bool file_add(Importer *importer)
 {
     const size_t material_count = importer->file->mNumMaterials;
     if (importer->draft->import->own_materials) {
-        importer->materials = memory_allocate(material_count + 1, sizeof *importer->materials);
+        importer->materials = memory_allocate(material_count, sizeof *importer->materials);
         for (size_t i = 0; i < material_count; i++)
             importer->materials[i] = (ImportedMaterial){.scene_index = {DRAFT_NONE, DRAFT_NONE}};
     }

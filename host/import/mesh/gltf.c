@@ -256,12 +256,12 @@ static void gltf_open(Gltf *gltf)
 {
     const size_t material_count = gltf_count(gltf, "materials") + 1;
     gltf->buffer_count = gltf_count(gltf, "buffers");
-    gltf->buffers = memory_allocate_zeroed(gltf->buffer_count + 1, sizeof *gltf->buffers);
+    gltf->buffers = memory_allocate_zeroed(gltf->buffer_count, sizeof *gltf->buffers);
     gltf->materials = memory_allocate_zeroed(material_count, sizeof *gltf->materials);
     const size_t image_count = gltf_count(gltf, "images");
-    gltf->images = memory_allocate(2 * image_count + 1, sizeof *gltf->images);
+    gltf->images = memory_allocate(2 * image_count, sizeof *gltf->images);
     memset(gltf->images, 0xff, 2 * image_count * sizeof *gltf->images);
-    gltf->is_visited = memory_allocate_zeroed(gltf_count(gltf, "nodes") + 1, sizeof *gltf->is_visited);
+    gltf->is_visited = memory_allocate_zeroed(gltf_count(gltf, "nodes"), sizeof *gltf->is_visited);
 }
 
 static void gltf_close(Gltf *gltf)

@@ -298,7 +298,7 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
 static bool roots_add(Gltf *gltf, const Affine *affine)
 {
     const size_t count = gltf_count(gltf, "nodes");
-    bool *is_child = memory_allocate_zeroed(count + 1, sizeof *is_child), read = true;
+    bool *is_child = memory_allocate_zeroed(count, sizeof *is_child), read = true;
     for (size_t i = 0; i < count && read; i++) {
         const GltfItem node = gltf_entry(gltf, "nodes", i), children = gltf_member(&node, "children");
         for (size_t k = 0; k < json_array_size(children.json) && read; k++) {

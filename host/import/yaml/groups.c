@@ -148,7 +148,7 @@ void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 // Frees the meshes that no object of the scene uses and leaves them empty.
 static void unused_meshes_free(Scene *scene)
 {
-    bool *is_used = memory_allocate_zeroed(scene->meshes.count + 1, sizeof *is_used);
+    bool *is_used = memory_allocate_zeroed(scene->meshes.count, sizeof *is_used);
     for (size_t i = 0; i < scene->objects.count; i++)
         if (scene->objects.items[i].type == SHAPE_MESH) is_used[scene->objects.items[i].as.mesh.index] = true;
     for (size_t i = 0; i < scene->meshes.count; i++)
