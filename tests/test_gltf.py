@@ -609,7 +609,7 @@ class Test(TestCase):
             ("draco/2CylinderEngine.gltf", "KHR_draco_mesh_compression"),
             ("BoxTextured-glTF-techniqueWebGL/BoxTextured.gltf", "KHR_technique_webgl"),
         ]:
-            self.refuses(f"check {SAMPLE_MODELS / name}", f"the file needs {extension}, which glint does not read; export it without")
+            self.refuses(f"check {SAMPLE_MODELS / name}", f"the file needs {extension}, which glint does not read; export the file without it")
 
     def test_scenes_of_other_formats(self):
         """Cameras, lights and textures are read by assimp. An image with another machine's path is found next to the file."""

@@ -553,7 +553,7 @@ TEST(test_bad_files)
     CHECK_REFUSED("P6\n0 1\n255\n", "the image is empty");
     CHECK_REFUSED("P6\n2 2\n255\n12345678901", "PPM: the file ends too early");
     CHECK_REFUSED("P6\n2000000000 2000000000\n255\n123", "the file is too short for its image");
-    CHECK_REFUSED("P3 1 1 9 1 2 x", "PPM: value 3 of 3 is missing or no number");
+    CHECK_REFUSED("P3 1 1 9 1 2 x", "PPM: value 3 of 3 is missing or not a number");
     CHECK_REFUSED("P3 1 1 9 1 12 3", "PPM: value 2, 12, is above the maximum, 9");
     CHECK_REFUSED("\x93NUMPY\x04\0\0\0", "NPY: the header is damaged");
     CHECK_REFUSED("\x93NUMPY\x01\0\xFF\0{}", "NPY: the header is damaged");

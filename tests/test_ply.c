@@ -197,8 +197,8 @@ TEST(faults_name_line_and_row)
          "7:9: error: strips of triangles (tristrips) are not read, only faces"},
         {"ply\nformat binary 1.0\n" END, "2:8: error: 'binary' is not a format of PLY"},
         {"ply\nelement vertex 0\n" END, "3:1: error: the header lacks its format"},
-        {"solid\n", "1:1: error: no PLY file, which starts with a line 'ply'"},
-        {"", "1:1: error: no PLY file, which starts with a line 'ply'"},
+        {"solid\n", "1:1: error: not a PLY file, which starts with a line 'ply'"},
+        {"", "1:1: error: not a PLY file, which starts with a line 'ply'"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         Text text = {0};

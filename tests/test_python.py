@@ -448,7 +448,7 @@ class Errors(unittest.TestCase):
                 (lambda: glint.Scene(SPHERE).render(8, 6, lanes=3), "lanes"),
                 (lambda: glint.Scene(SPHERE).render(1 << 21, 6), "pixels per side"),
                 (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 0]]), "ray 0"),
-                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], precision="certified", tmin=1), "tmin 0")):
+                (lambda: glint.Scene(SPHERE).trace([[0, 0, 0]], [[0, 0, 1]], precision="certified", tmin=1), "tmin must be 0")):
             with self.assertRaisesRegex(glint.SceneError, words):
                 make()
         for make in (lambda: glint.Scene(SPHERE).trace([0, 0, 0], [0, 0, 1]), lambda: glint.load_mesh(CUBE_VERTICES, [[0.5] * 3]),

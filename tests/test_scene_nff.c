@@ -135,7 +135,8 @@ TEST(test_tolerated)
                     "v from 0 0 -5 \r\n at\t0 0 0\r\nangle 45\r\nup 0 1 0 # no hither\r\nl 0 9 0\r\n" MATERIAL
                     "s 0 0\r\n0 1\r\n",
                     "");
-    assert_messages("s.nff", LIT SPHERE SPHERE, "7:1: warning: no material stands before this: white\n");
+    assert_messages("s.nff", LIT SPHERE SPHERE,
+                    "7:1: warning: no material precedes this object; it is white\n");
     assert_messages("s.nff", LIT MATERIAL "p 3\n0 0 0\n1 1 1\n2 2 2\n" SPHERE,
                     "8:1: warning: a polygon without area is never hit\n");
     assert_messages("s.nff", LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",

@@ -101,8 +101,9 @@ TEST(faults_have_their_place)
         {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1 0\n",
          "7:1: error: the file ends within a facet\n"},
         {"solid\nendsolid\n", "4:18: error: a.stl: no triangles\n"},
-        {"facet", "4:18: error: a.stl: byte 5: no STL file, which starts with 'solid' or has 84 bytes before "
-                  "its facets\n"},
+        {"facet",
+         "4:18: error: a.stl: byte 5: not an STL file, which starts with 'solid' or has 84 bytes before "
+         "its facets\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write("a.stl", cases[i].text);

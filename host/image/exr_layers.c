@@ -161,7 +161,7 @@ static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool
         const char *name = shown_name(&list->items[i], &length);
         names_add(&names, name, (size_t)length);
     }
-    image_refuse(file, "EXR: which of its layers is meant? They are %s", text_c(&names));
+    image_refuse(file, "EXR: several layers, %s; name one", text_c(&names));
     text_free(&names);
     return false;
 }

@@ -73,7 +73,7 @@ bool ppm_decode(Image *image, const ImageFile *file)
         uint32_t value;
         if (is_text) {
             if (!number_read(file, &at, &value))
-                return image_refuse(file, "PPM: value %zu of %zu is missing or no number", i + 1, count);
+                return image_refuse(file, "PPM: value %zu of %zu is missing or not a number", i + 1, count);
         } else {
             value = file->bytes[at++];
             if (value_size == 2) value = value << 8 | file->bytes[at++];

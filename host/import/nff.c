@@ -64,7 +64,7 @@ static bool read_view(NffReader *reader)
     const size_t offset = reader->line.start;
     if (!line_is_first(&reader->line, &reader->has_view, "view")) return false;
     if (reader->scene->objects.count)
-        return report_error(&reader->report, offset, "the view must stand before the objects");
+        return report_error(&reader->report, offset, "the view must precede the objects");
     View view = {0};
     bool seen[VIEW_KEYS] = {false};
     while (line_reach_word(&reader->line)) {
@@ -135,7 +135,7 @@ static bool read_material(NffReader *reader)
 static void object_add(NffReader *reader, Object object)
 {
     if (!reader->has_material) {
-        report_warning(&reader->report, reader->line.start, "no material stands before this: white");
+        report_warning(&reader->report, reader->line.start, "no material precedes this object; it is white");
         Material white = material_default();
         reader->material = scene_add_material(reader->scene, &white, "");
         reader->has_material = true;
@@ -306,7 +306,7 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
         if (!line_elements(&reader.line, scene, line_reach_word, element_read, &reader))
             report_error(&reader.report, 0, "the scene is empty");
         else if (!reader.has_view && !report_is_full(&reader.report))
-            report_error(&reader.report, source->length, "no view: an element v");
+            report_error(&reader.report, source->length, "the scene has no view (element 'v')");
     }
     lights_finish(&reader);
     free(reader.white_lights.items);

@@ -46,7 +46,7 @@ bool device_scene_has_room(const DeviceScene *scene, const CompiledScene *compil
     const ShortText sum_text = text_size((double)sum), largest_text = text_size((double)largest),
                     most_text = text_size((double)most);
     if (!is_known)
-        return message_error(messages, "the scene needs a buffer of %s; at most %s are addressed",
+        return message_error(messages, "the scene needs a buffer of %s, but at most %s can be addressed",
                              largest_text.text, most_text.text);
     return message_error(messages,
                          "the scene needs %s on the device, %s of it in one buffer; the device \"%s\" has "

@@ -230,9 +230,7 @@ const char *trace_ray_fault(const TraceRay *ray, Precision precision)
     if (!is_within)
         return "a number is not finite or beyond the precision's range; only tmax may be infinite";
     if (!has_direction) return "a ray's direction cannot be 0 0 0";
-    return precision == PRECISION_CERTIFIED && ray->tmin != 0
-               ? "at certified a ray starts at its origin, tmin 0"
-               : NULL;
+    return precision == PRECISION_CERTIFIED && ray->tmin != 0 ? "at certified, tmin must be 0" : NULL;
 }
 
 TraceRay trace_ray_scaled(TraceRay ray, Precision precision, int *exponent)

@@ -51,7 +51,8 @@ static void camera_print(Window *window)
 static void key_ask(Window *window)
 {
     if (!window->options->writes_camera)
-        message_show(window, memory_copy_text("K writes into the scene's file: start with --write-camera"));
+        message_show(window,
+                     memory_copy_text("K writes to the scene's file; start glint view with --write-camera"));
     else if (!has_time_line(window))
         message_show(window, memory_copy_text("K needs an animation: a scene with 'frames' above 1"));
     else

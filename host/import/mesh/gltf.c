@@ -187,7 +187,8 @@ static bool extensions_check(Gltf *gltf)
     Text names = extensions_unread(required.json);
     const bool all_read = names.count == 0;
     if (!all_read)
-        gltf_fails(gltf, &required, "the file needs %s, which glint does not read; export it without",
+        gltf_fails(gltf, &required,
+                   "the file needs %s, which glint does not read; export the file without it",
                    text_c(&names));
     text_free(&names);
     names = extensions_unread(used.json);

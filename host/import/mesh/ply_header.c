@@ -126,7 +126,7 @@ bool ply_header_read(PlyHeader *header, PlyReading *reading)
 {
     Scan line;
     if (!ply_line(reading, &line) || line.end - line.at < 3 || strncasecmp(line.at, "ply", 3) != 0)
-        return draft_fails(reading->draft, 0, "no PLY file, which starts with a line 'ply'");
+        return draft_fails(reading->draft, 0, "not a PLY file, which starts with a line 'ply'");
     while (ply_line(reading, &line)) {
         if (is_end_of_header(line))
             return header->format != PLY_NO_FORMAT ||

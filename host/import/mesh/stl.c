@@ -82,7 +82,7 @@ static bool binary_read(MeshDraft *draft)
     draft->places = DRAFT_BYTES;
     if (source->length < HEADER_SIZE)
         return draft_fails(draft, source->length,
-                           "no STL file, which starts with 'solid' or has %d bytes before its facets",
+                           "not an STL file, which starts with 'solid' or has %d bytes before its facets",
                            HEADER_SIZE);
     const size_t count = facet_count(source);
     const size_t held = (source->length - HEADER_SIZE) / FACET_SIZE;

@@ -115,7 +115,7 @@ static bool alias_append(TreeBuilder *builder, const char *name, size_t length, 
                             (int)(length < 40 ? length : 40), name);
     for (size_t i = 0; i < builder->depth; i++) {
         if (builder->open[i].node == anchor->node)
-            return report_error(builder->report, offset, "an alias inside of what it names");
+            return report_error(builder->report, offset, "recursive alias");
     }
     YamlNode copy = builder->tree->nodes.items[anchor->node];
     copy.next = 0;
