@@ -55,7 +55,7 @@ typedef struct {
     const char *path;
 } SceneFile;
 
-static bool file_spares_scene(const char *path, void *context)
+static bool file_keeps_scene(const char *path, void *context)
 {
     const SceneFile *file = context;
     return !output_overwrites_scene(path, file->scene, file->path);
@@ -65,7 +65,7 @@ bool image_output_overwrites_scene(const ImageOutputOptions *options, const Scen
                                    const char *scene_path)
 {
     return !image_output_is_stdout(options->path) &&
-           !files_all(options, file_spares_scene, &(SceneFile){scene, scene_path});
+           !files_all(options, file_keeps_scene, &(SceneFile){scene, scene_path});
 }
 
 static bool file_exists(const char *path, void *unused)

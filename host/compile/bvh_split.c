@@ -23,9 +23,9 @@ static inline Float4 float4_of(Vector3 v)
     return (Float4){(float)v.x, (float)v.y, (float)v.z, 0};
 }
 
-static inline Float4 float4_select(Int4 take_a, Float4 a, Float4 b)
+static inline Float4 float4_select(Int4 mask, Float4 a, Float4 b)
 {
-    return (Float4)((take_a & (Int4)a) | (~take_a & (Int4)b));
+    return (Float4)((mask & (Int4)a) | (~mask & (Int4)b));
 }
 
 // gcc does not make minps of a comparison and a selection.

@@ -29,7 +29,7 @@ typedef struct {
     char problem[256];
 } ExrReader;
 
-static void exr_note_problem(exr_const_context_t context, exr_result_t code, const char *message)
+static void exr_record_problem(exr_const_context_t context, exr_result_t code, const char *message)
 {
     (void)code;
     void *user_data = NULL;
@@ -322,7 +322,7 @@ bool exr_decode(Image *image, const ImageFile *file)
 {
     ExrReader reader = {.file = file};
     exr_context_initializer_t settings = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    settings.error_handler_fn = exr_note_problem;
+    settings.error_handler_fn = exr_record_problem;
     settings.user_data = &reader;
     settings.read_fn = exr_read_bytes;
     settings.size_fn = exr_size;

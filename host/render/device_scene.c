@@ -56,7 +56,7 @@ bool device_scene_has_room(const DeviceScene *scene, const CompiledScene *compil
 }
 
 // Returns whether scene_move neither reads nor changes an array.
-static bool is_without_eye(size_t type)
+static bool array_ignores_eye(size_t type)
 {
     return type == FLAT_TRIANGLE_NORMALS || type == FLAT_TRIANGLE_UVS || type == FLAT_TRIANGLE_NEIGHBORS ||
            type == FLAT_SKY_CELLS || type == FLAT_TEXTURE_LEVELS || type == FLAT_TEXELS;
@@ -114,7 +114,7 @@ void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScen
             scenes[i]->upload_seconds += clock_seconds() - start;
         }
         compiled->changed[type] = false;
-        if (count > 0 && scenes[0]->moves && !is_without_eye(type)) continue;
+        if (count > 0 && scenes[0]->moves && !array_ignores_eye(type)) continue;
         free(compiled->arrays[type].items);
         compiled->arrays[type].items = NULL;
     }

@@ -11,7 +11,7 @@ typedef struct {
 } ExactSum;
 
 // Knuth's TwoSum (The art of computer programming 2, 4.2.2).
-static ExactSum exact_sum(double a, double b)
+static ExactSum two_sum(double a, double b)
 {
     double sum = a + b, part = sum - a;
     return (ExactSum){sum, (a - (sum - part)) + (b - part)};
@@ -32,7 +32,7 @@ static int orientation_exact(const double a[2], const double b[2], const double 
             size_t length = 2 * i + term;
             double carried = terms[term];
             for (size_t k = 0; k < length; k++) {
-                ExactSum added = exact_sum(carried, expansion[k]);
+                ExactSum added = two_sum(carried, expansion[k]);
                 expansion[k] = added.error;
                 carried = added.sum;
             }
