@@ -39,7 +39,8 @@ bool message_error(MessageList *list, const char *format, ...) __attribute__((fo
 // past the end counts as the end. Control characters are replaced by `?`.
 void message_add_at(MessageList *list, MessageSeverity severity, const Source *source, size_t offset,
                     const char *format, ...) __attribute__((format(printf, 5, 6)));
-// Returns the place of a byte offset as FILE:LINE:COLUMN. The caller frees it.
+// Returns the place of a byte offset, which must not be MESSAGE_WHOLE_FILE and whose source must have a file
+// name, as FILE:LINE:COLUMN. The caller frees it.
 char *message_place_text(const Source *source, size_t offset);
 
 // Returns the source that contains an offset, among `source` and those after it, and makes the offset

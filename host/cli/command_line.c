@@ -113,7 +113,7 @@ bool option_work_group(const Option *option, const char *value, void *options)
     return sides_read(option, value, options, "16x4");
 }
 
-// Prints the names and, if one is near the value, the guess that it was meant. Returns false.
+// Prints the choices and suggests the nearest one. Returns false.
 static bool names_fault(const Option *option, const char *value, const char *expected)
 {
     fprintf(stderr, "glint: --%s: expected %s", option->name, expected);

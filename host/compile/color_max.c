@@ -38,8 +38,8 @@ double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32
         if (nearest > DBL_MAX) return INFINITY;
         light_sum = vector_add(light_sum, vector_scale(light->color, nearest));
     }
-    // by rays with ever more bounces before them: the background, or a material's color and, reflected and
-    // refracted, what rays with one bounce less see
+    // `seen` bounds what a ray sees that may bounce `left` more times: the background, or a material's color
+    // plus what its reflected and refracted rays see.
     for (uint32_t left = 0; left <= bounces; left++) {
         const Color before = seen;
         seen = vector_max(seen, background_max(compiled, scene));

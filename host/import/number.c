@@ -63,7 +63,7 @@ static const char *exponent_read(const char *at, const char *end, Decimal *decim
     return at;
 }
 
-// Returns whether one rounded operation yields the nearest double. An integer below 2^53 and a power of ten
+// Returns whether one rounded operation yields the nearest double. An integer up to 2^53 and a power of ten
 // up to 10^22 are doubles, so their product or quotient is rounded once (Clinger, How to read floating point
 // numbers accurately, PLDI 1990).
 static bool decimal_is_short(const Decimal *decimal)

@@ -170,7 +170,7 @@ static void ends_apply(const TraceRay *rays, size_t ray_count, TraceHit *hits)
     }
 }
 
-// Traces the rays in this pass, and in those behind it the rays whose hits remain uncertain.
+// Traces the rays in this pass and re-traces those whose hits remain uncertain in the passes after it.
 static bool passes_trace(Pass *pass, KernelType type, const TraceRay *rays, size_t ray_count, TraceHit *hits)
 {
     if (!pass_trace(pass, type, rays, ray_count, hits)) return false;

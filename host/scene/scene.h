@@ -129,7 +129,7 @@ typedef struct {
     // The surface is absent where the alpha of the texture is below the threshold.
     struct {
         uint32_t texture;
-        double threshold; // 0: it is everywhere
+        double threshold; // 0: the surface is present everywhere
         bool blends;      // its format blends by this alpha
     } cutout;
 } Material;

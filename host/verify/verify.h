@@ -1,5 +1,6 @@
 // The hard cases are scenes and rays on which ray tracers fail. They run through the renderer that ships,
-// and each has a bound. Expected hits are exact (tests/oracle). docs/verify.md describes each case.
+// and each has a bound. Expected hits are exact (tests/oracle.sh checks them). docs/verify.md describes each
+// case.
 #pragma once
 
 #include "host/render/renderer.h"

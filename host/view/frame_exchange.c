@@ -12,7 +12,7 @@
 //  5. `has_news` is set, with the mutex, by each request and each change of a file, and is cleared when both
 //     have been read. Renderers poll it between launches without the mutex.
 //  6. `first_is_due` is set only by a request for a moving camera, until its first frame is published or its
-//     work ends. News do not end the render meanwhile, so that each drag of the mouse shows frames.
+//     work ends. News does not end the render until then, so that each drag of the mouse shows frames.
 //  7. `ends` and `quits` are set once, in this order, and never cleared.
 //  8. Each change for which the loop may wait signals `changed`. Each one for which the window may wait calls
 //     `notify`.

@@ -57,7 +57,7 @@ struct FrameLoop {
     // used by both threads without the mutex
     Stage *stage;
     atomic_bool has_news;     // a request or a changed file that was not yet read
-    atomic_bool first_is_due; // a moving camera's first frame, for which news do not end the render
+    atomic_bool first_is_due; // a moving camera's first frame, for which news does not end the render
     atomic_bool ends;         // the current render and all later ones
 
     // owned by the loop's thread

@@ -44,7 +44,7 @@ static bool is_watched(Watch *watch, const struct inotify_event *event)
     return found;
 }
 
-// Reads all pending events. Returns whether one is of a watched file.
+// Reads pending events, up to 4096 bytes. Returns whether one is of a watched file.
 static bool events_read(Watch *watch)
 {
     _Alignas(struct inotify_event) char events[4096];

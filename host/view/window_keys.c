@@ -83,7 +83,7 @@ static void save_ask(Window *window, const char *ending)
         text_appendf(&path, "%.*s-%d.%s", dot ? (int)(dot - name) : INT_MAX, name, ++number, ending);
     } while (access(text_c(&path), F_OK) == 0);
     window->play.is_running = false;
-    request_send(window); // saves what was asked for before
+    request_send(window); // so that the newest request's image is saved
     frame_loop_save(window->frames, text_c(&path));
     text_free(&path);
 }
