@@ -34,8 +34,7 @@ const ResultTable accuracy_table = {
     .times = "frame_ms.median",
 };
 
-static const char is_reference[] =
-    "it is the reference that the others are compared with, and has no errors of its own";
+static const char is_reference[] = "it is the reference that the others are compared with, and has no errors";
 
 void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
                            const AccuracyVariant *variant)

@@ -104,7 +104,7 @@ static bool scene_is_overwritten(RenderOptions options, const char *path, char *
     return is_overwritten;
 }
 
-bool render_command_spares_scenes(RenderCommand *command)
+bool render_command_check_overwrites(RenderCommand *command)
 {
     const RenderOptions *options = &command->options;
     bool image_exists = false;
@@ -232,6 +232,6 @@ int command_render(int argument_count, char **arguments)
     int status;
     RenderCommand *command = render_command_open(argument_count, arguments, &status);
     if (!command) return status;
-    if (render_command_spares_scenes(command)) render_command_run_from(command, 0, NULL);
+    if (render_command_check_overwrites(command)) render_command_run_from(command, 0, NULL);
     return render_command_close(command);
 }

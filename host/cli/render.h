@@ -13,7 +13,7 @@ void render_command_choose_device(RenderCommand *command, size_t number);
 
 // Returns false with a message, before anything is rendered, if an image would overwrite a file that one of
 // several scenes is read from. Reads those scenes whose image exists.
-bool render_command_spares_scenes(RenderCommand *command);
+bool render_command_check_overwrites(RenderCommand *command);
 // Opens the devices before the first scene is read. Returns false with a message if there is none.
 bool render_command_open_devices(RenderCommand *command);
 

@@ -274,8 +274,8 @@ static void precision_verify(Verification *verification, Compute *compute)
         record->start_seconds = clock_seconds();
         if (tier == TIER_D && verify_reference_bits() < 64)
             fprintf(stderr,
-                    "glint: verify: the reference has %d bits here: tier D is checked against numbers of its "
-                    "own precision\n",
+                    "glint: verify: the reference has %d bits here: tier D is checked against numbers of the "
+                    "precision that it tests\n",
                     verify_reference_bits());
         if (verification->has_text) {
             line_begin(verification);
