@@ -132,17 +132,21 @@ bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *
     text->capacity = text->count + 1;
     text->items = memory_resize(text->items, text->capacity, 1);
 
-    if (ferror(file)) return message_error(messages, "cannot read '%s': %s", path, strerror(error));
-    if (text->count - start > largest)
-        return message_error(messages, "cannot read '%s': larger than 2 GiB", path);
-    return true;
+    const bool has_failed = ferror(file), is_too_large = text->count - start > largest;
+    if (has_failed || is_too_large) text_free(text);
+    if (has_failed) return message_error(messages, "cannot read '%s': %s", path, strerror(error));
+    return !is_too_large || message_error(messages, "cannot read '%s': larger than 2 GiB", path);
 }
 
 bool text_read_file(Text *text, const char *path, MessageList *messages)
 {
     bool is_standard_input = strcmp(path, "-") == 0;
     FILE *file = is_standard_input ? stdin : fopen(path, "rbe");
-    if (!file) return message_error(messages, "cannot read '%s': %s", path, strerror(errno));
+    if (!file) {
+        message_error(messages, "cannot read '%s': %s", path, strerror(errno));
+        text_free(text);
+        return false;
+    }
     bool whole = text_read_open_file(text, file, path, messages);
     if (!is_standard_input) fclose(file);
     return whole;

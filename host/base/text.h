@@ -40,7 +40,8 @@ static inline bool text_ends_line(const char *text, size_t length)
 // with one.
 size_t text_character_size(const char *text, size_t length);
 
-// Reads a whole file (`-`: standard input). On failure adds a message that names the file and returns false.
+// Reads a whole file (`-`: standard input). On failure frees the text, adds a message that names the file and
+// returns false.
 bool text_read_file(Text *text, const char *path, MessageList *messages);
 // Reads the rest of an open file and leaves it open; `path` is used in messages only.
 bool text_read_open_file(Text *text, FILE *file, const char *path, MessageList *messages);
