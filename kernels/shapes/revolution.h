@@ -115,8 +115,10 @@ static inline mask revolution_reaches(const Revolution *shape, const RevolutionQ
 static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ray *ray, real *t)
 {
     mask hit = RAY_ACTIVE(ray);
-    if (IS_COMPENSATED) hit = hit & !revolution_is_off_line(shape, ray);
-    if (IS_COMPENSATED && !lanes_any(hit)) return hit;
+    if (IS_COMPENSATED) {
+        hit = hit & !revolution_is_off_line(shape, ray);
+        if (!lanes_any(hit)) return hit;
+    }
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
     hit = hit & revolution_line_crosses(&quadric);
     if (!lanes_any(hit)) return hit;
