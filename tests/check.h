@@ -10,5 +10,35 @@
 
 #include <cmocka.h>
 
-// A test that keeps no state.
-#define TEST(name) static void name(__attribute__((unused)) void **state)
+// Adds a test to those that tests_run runs, in this order.
+void test_register(const struct CMUnitTest *test);
+
+// Runs the tests of the program, or those whose names match the pattern of its first argument, between the
+// group's setup and teardown, which may be NULL. Returns the program's exit status.
+int tests_run(int argument_count, char **arguments, CMFixtureFunction setup, CMFixtureFunction teardown);
+
+// A constructor registers each test, so that none is forgotten. Its priority keeps the order of the lines.
+#define TEST_REGISTER(name, ...)                                                                             \
+    static const struct CMUnitTest name##_test = {#name, __VA_ARGS__};                                       \
+    __attribute__((constructor(101 + __LINE__))) static void name##_register(void)                           \
+    {                                                                                                        \
+        test_register(&name##_test);                                                                         \
+    }
+
+// Defines a test that runs between a setup and a teardown.
+#define TEST_WITH(name, setup, teardown)                                                                     \
+    static void name(void **state);                                                                          \
+    TEST_REGISTER(name, name, setup, teardown, NULL)                                                         \
+    static void name(__attribute__((unused)) void **state)
+
+// Defines a test.
+#define TEST(name) TEST_WITH(name, NULL, NULL)
+
+// Defines a test that calls a function with a pointer to its case as the state.
+#define TEST_CASE(name, function, ...) TEST_REGISTER(name, function, NULL, NULL, __VA_ARGS__)
+
+#define TEST_MAIN(setup, teardown)                                                                           \
+    int main(int argument_count, char **arguments)                                                           \
+    {                                                                                                        \
+        return tests_run(argument_count, arguments, setup, teardown);                                        \
+    }

@@ -333,19 +333,4 @@ TEST(test_pareto_front_and_picks)
     accuracy_scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_edges),
-        cmocka_unit_test(test_equal),
-        cmocka_unit_test(test_wrong_objects),
-        cmocka_unit_test(test_wrong_shadows),
-        cmocka_unit_test(test_wrong_paths),
-        cmocka_unit_test(test_shading),
-        cmocka_unit_test(test_distances_and_normals),
-        cmocka_unit_test(test_unsound_pixels),
-        cmocka_unit_test(test_colors_only),
-        cmocka_unit_test(test_pareto_front_and_picks),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -116,15 +116,4 @@ TEST(test_decoded_texels_do_not_depend_on_pow)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_rounds_each_operation),
-        cmocka_unit_test(test_functions_are_rounded_correctly),
-        cmocka_unit_test(test_lengths_neither_overflow_nor_underflow),
-        cmocka_unit_test(test_quad_has_its_bits),
-        cmocka_unit_test(test_quad_roots),
-        cmocka_unit_test(test_decoded_texels_do_not_depend_on_pow),
-    };
-    return cmocka_run_group_tests_name("arithmetic", tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

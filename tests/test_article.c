@@ -235,17 +235,4 @@ TEST(keeps_a_sphere_round)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sees_a_sphere_from_inside),
-        cmocka_unit_test(sees_a_cylinder_from_inside),
-        cmocka_unit_test(looks_along_a_cylinder),
-        cmocka_unit_test(looks_along_a_cone),
-        cmocka_unit_test(turns_a_cones_normal_by_its_tangent),
-        cmocka_unit_test(adds_light_before_it_cuts),
-        cmocka_unit_test(sees_far_and_near),
-        cmocka_unit_test(keeps_a_sphere_round),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -536,32 +536,4 @@ TEST(test_stage)
     stage_close(NULL);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_message_place),
-        cmocka_unit_test(test_message_characters),
-        cmocka_unit_test(test_message_long_line),
-        cmocka_unit_test(test_message_without_place),
-        cmocka_unit_test(test_text),
-        cmocka_unit_test(test_text_quantities),
-        cmocka_unit_test(test_text_character_size),
-        cmocka_unit_test(test_text_nearest),
-        cmocka_unit_test(test_array),
-        cmocka_unit_test(test_stage),
-        cmocka_unit_test(test_hash),
-        cmocka_unit_test(test_read_failures),
-        cmocka_unit_test(test_output_commit),
-        cmocka_unit_test(test_output_replaces_what_a_link_leads_to),
-        cmocka_unit_test(test_output_makes_what_a_link_leads_to),
-        cmocka_unit_test(test_output_where_there_are_no_modes),
-        cmocka_unit_test(test_output_finish),
-        cmocka_unit_test(test_output_failures),
-        cmocka_unit_test(test_output_abandon),
-        cmocka_unit_test(test_output_of_killed_processes),
-        cmocka_unit_test(test_base64),
-        cmocka_unit_test(test_fault_removes_the_temporary),
-        cmocka_unit_test(test_products_do_not_wrap),
-    };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
-}
+TEST_MAIN(folder_open, folder_close)

@@ -263,20 +263,4 @@ TEST(test_without_memory)
     assert_true(failed >= 2); // the key and the value
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_text_that_looks_like_something_else),
-        cmocka_unit_test(test_keys),
-        cmocka_unit_test(test_spaces),
-        cmocka_unit_test(test_escapes),
-        cmocka_unit_test(test_utf8),
-        cmocka_unit_test(test_long_text_stays_on_its_line),
-        cmocka_unit_test(test_numbers_read_back),
-        cmocka_unit_test(test_number_words),
-        cmocka_unit_test(test_nesting),
-        cmocka_unit_test(test_deep_nesting),
-        cmocka_unit_test(test_without_memory),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -341,20 +341,4 @@ TEST(test_baseline_without_memory)
     assert_true(failed >= 25); // values and keys of the report
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_quantiles),
-        cmocka_unit_test(test_events_that_agree),
-        cmocka_unit_test(test_clock_that_drifts),
-        cmocka_unit_test(test_stalled_launches),
-        cmocka_unit_test(test_event_without_times),
-        cmocka_unit_test(test_drift),
-        cmocka_unit_test(test_runs_that_scatter),
-        cmocka_unit_test(test_figures),
-        cmocka_unit_test(test_baseline),
-        cmocka_unit_test(test_broken_baselines),
-        cmocka_unit_test(test_baseline_without_memory),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

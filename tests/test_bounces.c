@@ -193,16 +193,14 @@ static void shows_what_the_reference_shows(void **state)
     scene_free(&scene);
 }
 
-int main(void)
+int main(int argument_count, char **arguments)
 {
     if (tests_are_long()) {
         width = 64;
         height = 48;
     }
-    struct CMUnitTest tests[TRIAL_COUNT];
-    for (size_t i = 0; i < TRIAL_COUNT; i++) {
-        tests[i] =
-            (struct CMUnitTest){trials[i].name, shows_what_the_reference_shows, NULL, NULL, &trials[i]};
-    }
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
+    for (size_t i = 0; i < TRIAL_COUNT; i++)
+        test_register(
+            &(struct CMUnitTest){trials[i].name, shows_what_the_reference_shows, NULL, NULL, &trials[i]});
+    return tests_run(argument_count, arguments, probe_open, probe_close);
 }

@@ -371,12 +371,4 @@ TEST(closed_meshes_do_not_leak)
     free(hits);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_hit_depends_on_the_tree),
-        cmocka_unit_test(rays_may_look_behind_their_start),
-        cmocka_unit_test(closed_meshes_do_not_leak),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

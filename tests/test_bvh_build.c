@@ -297,12 +297,4 @@ TEST(points_make_a_tree)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(any_boxes_make_a_tree),    cmocka_unit_test(few_boxes_make_a_tree),
-        cmocka_unit_test(blocks_keep_other_leaves), cmocka_unit_test(planets_stay_outside_the_tree),
-        cmocka_unit_test(points_make_a_tree),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -320,18 +320,4 @@ TEST(one_slow_frame_changes_nothing)
     assert_true(preview_divisor(&preview, size.width, size.height) > divisor);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(grabbed_point_stays_under_the_cursor),
-        cmocka_unit_test(view_does_not_turn_over),
-        cmocka_unit_test(useless_up_is_replaced),
-        cmocka_unit_test(camera_turns_and_flies),
-        cmocka_unit_test(yaml_gives_the_same_camera),
-        cmocka_unit_test(camera_is_written_into_the_file),
-        cmocka_unit_test(camera_is_recorded_in_the_file),
-        cmocka_unit_test(coarse_frames_are_in_time),
-        cmocka_unit_test(one_slow_frame_changes_nothing),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -197,13 +197,4 @@ TEST(open_questions_are_uncertain)
     assert_int_equal(hits[COUNT - 1].certainty, TRACE_CERTAIN_IN_DOUBLE);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_shape_is_certain),
-        cmocka_unit_test(mesh_edges_are_certain),
-        cmocka_unit_test(open_questions_are_uncertain),
-        cmocka_unit_test(least_and_largest_numbers),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -564,17 +564,4 @@ TEST(smooth_meshes_are_decided)
     assert_true(uncertified * 200 < count * SMALL_SIDE * SMALL_SIDE);
 }
 
-int main(int argc, char **argv)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(flat_shapes_are_decided),
-                                       cmocka_unit_test(round_shapes_are_decided),
-                                       cmocka_unit_test(ovals_are_decided),
-                                       cmocka_unit_test(terminators_of_ovals_are_decided),
-                                       cmocka_unit_test(planets_are_decided),
-                                       cmocka_unit_test(horizons_are_decided),
-                                       cmocka_unit_test(mirrors_glass_and_spots_are_decided),
-                                       cmocka_unit_test(hard_cases_are_decided),
-                                       cmocka_unit_test(smooth_meshes_are_decided)};
-    if (argc > 1) cmocka_set_test_filter(argv[1]);
-    return cmocka_run_group_tests(tests, probe_open, painters_close);
-}
+TEST_MAIN(probe_open, painters_close)

@@ -334,17 +334,4 @@ TEST(mixed_sizes_are_decided)
     assert_true(uncertified * 16 < count * SMALL_SIDE * SMALL_SIDE);
 }
 
-int main(int argc, char **argv)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(lights_on_surfaces_are_decided),
-                                       cmocka_unit_test(checkers_far_out_are_decided),
-                                       cmocka_unit_test(faint_paths_are_decided),
-                                       cmocka_unit_test(skimming_rays_are_decided),
-                                       cmocka_unit_test(thin_walls_are_decided),
-                                       cmocka_unit_test(needles_have_an_area),
-                                       cmocka_unit_test(slim_triangles_are_seldom_rerendered),
-                                       cmocka_unit_test(fine_meshes_are_seldom_rerendered),
-                                       cmocka_unit_test(mixed_sizes_are_decided)};
-    if (argc > 1) cmocka_set_test_filter(argv[1]);
-    return cmocka_run_group_tests(tests, probe_open, painters_close);
-}
+TEST_MAIN(probe_open, painters_close)

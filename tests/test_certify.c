@@ -161,11 +161,4 @@ TEST(there_are_no_false_alarms)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(the_best_precision_is_right), cmocka_unit_test(panoramas_are_right),
-        cmocka_unit_test(tilted_normals_are_decided),  cmocka_unit_test(colors_of_certified_are_exact),
-        cmocka_unit_test(there_are_no_false_alarms),   cmocka_unit_test(skies_light_the_reference)};
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

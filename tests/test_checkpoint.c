@@ -389,16 +389,4 @@ static int set_up(void **state)
     return 0;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_bands_are_read_again),
-                                       cmocka_unit_test(test_torn_writes),
-                                       cmocka_unit_test(test_wrong_bytes),
-                                       cmocka_unit_test(test_other_sizes),
-                                       cmocka_unit_test(test_refusals),
-                                       cmocka_unit_test(test_symbolic_links),
-                                       cmocka_unit_test(test_a_file_that_stays),
-                                       cmocka_unit_test(test_a_file_removed_before_the_lock),
-                                       cmocka_unit_test(test_a_render_resumes)};
-    return cmocka_run_group_tests(tests, set_up, scratch_tear_down);
-}
+TEST_MAIN(set_up, scratch_tear_down)

@@ -191,11 +191,5 @@ TEST(test_crashes)
 #endif
 }
 
-int main(void)
-{
-    // each command is a separate process, which forks before this one has opened a device
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_commands), cmocka_unit_test(test_several_devices),
-        cmocka_unit_test(test_release_after_the_output), cmocka_unit_test(test_crashes)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+// Each command is a separate process, which forks before this one has opened a device.
+TEST_MAIN(NULL, NULL)

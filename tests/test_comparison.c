@@ -315,17 +315,4 @@ TEST(test_intervals)
     series_free(&ratios);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_reports_of_few_runs),
-        cmocka_unit_test(test_intervals),
-        cmocka_unit_test(test_rows),
-        cmocka_unit_test(test_same_build_against_itself),
-        cmocka_unit_test(test_slower_build_is_found),
-        cmocka_unit_test(test_rows_of_one_process),
-        cmocka_unit_test(test_reports_of_one_build),
-        cmocka_unit_test(test_reports_of_a_slower_build),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

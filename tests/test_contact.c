@@ -170,11 +170,9 @@ TEST(many_pairs_hold_as_much)
     }
 }
 
-int main(void)
+int main(int argument_count, char **arguments)
 {
-    struct CMUnitTest tests[TRIAL_COUNT + 1];
     for (size_t i = 0; i < TRIAL_COUNT; i++)
-        tests[i] = (struct CMUnitTest){trials[i].name, holds_where_they_touch, NULL, NULL, &trials[i]};
-    tests[TRIAL_COUNT] = (struct CMUnitTest)cmocka_unit_test(many_pairs_hold_as_much);
-    return cmocka_run_group_tests(tests, NULL, NULL);
+        test_register(&(struct CMUnitTest){trials[i].name, holds_where_they_touch, NULL, NULL, &trials[i]});
+    return tests_run(argument_count, arguments, NULL, NULL);
 }

@@ -231,13 +231,9 @@ static void culling_check(void **state)
     clReleaseProgram(program);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        {"from_the_eye", culling_check, NULL, NULL, &(Variant){false, true}},
-        {"from_the_eye_in_double", culling_check, NULL, NULL, &(Variant){true, true}},
-        {"to_a_light", culling_check, NULL, NULL, &(Variant){false, false}},
-        {"to_a_light_in_double", culling_check, NULL, NULL, &(Variant){true, false}},
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_CASE(from_the_eye, culling_check, &(Variant){false, true})
+TEST_CASE(from_the_eye_in_double, culling_check, &(Variant){true, true})
+TEST_CASE(to_a_light, culling_check, &(Variant){false, false})
+TEST_CASE(to_a_light_in_double, culling_check, &(Variant){true, false})
+
+TEST_MAIN(probe_open, probe_close)

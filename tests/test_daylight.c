@@ -225,17 +225,4 @@ TEST(test_shadow)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_days),
-                                       cmocka_unit_test(test_sun_position),
-                                       cmocka_unit_test(test_exponential),
-                                       cmocka_unit_test(test_sun_color),
-                                       cmocka_unit_test(test_sky),
-                                       cmocka_unit_test(test_sky_values),
-                                       cmocka_unit_test(test_sky_is_brightest_at_the_sun),
-                                       cmocka_unit_test(test_sky_colors),
-                                       cmocka_unit_test(test_scene),
-                                       cmocka_unit_test(test_shadow)};
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

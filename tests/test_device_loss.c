@@ -143,11 +143,4 @@ TEST(test_both_of_two_devices)
     injected.call = NULL;
 }
 
-int main(void)
-{
-    first_thread = pthread_self();
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_one_of_two_devices),
-                                       cmocka_unit_test(test_a_device_without_a_thread),
-                                       cmocka_unit_test(test_both_of_two_devices)};
-    return cmocka_run_group_tests(tests, work_set_up, work_tear_down);
-}
+TEST_MAIN(work_set_up, work_tear_down)

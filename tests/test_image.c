@@ -634,31 +634,4 @@ TEST(test_text_pixmap)
     image_free(&image);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_display_formats),
-        cmocka_unit_test(test_float_formats),
-        cmocka_unit_test(test_small_exr),
-        cmocka_unit_test(test_npy_types),
-        cmocka_unit_test(test_doubles_keep_their_bits),
-        cmocka_unit_test(test_npy_bytes),
-        cmocka_unit_test(test_png_notes),
-        cmocka_unit_test(test_exr_notes),
-        cmocka_unit_test(test_abandoned_leaves_the_old_file),
-        cmocka_unit_test(test_finished_is_yet_to_be_renamed),
-        cmocka_unit_test(test_disk_full),
-        cmocka_unit_test(test_exr_layers),
-        cmocka_unit_test(test_png_of_other_colors),
-        cmocka_unit_test(test_jpeg_is_turned_upright),
-        cmocka_unit_test(test_jpeg_of_other_colors),
-        cmocka_unit_test(test_folder_that_is_not_there),
-        cmocka_unit_test(test_format_by_ending),
-        cmocka_unit_test(test_bad_files),
-        cmocka_unit_test(test_png_that_declares_too_much),
-        cmocka_unit_test(test_png_with_a_large_note),
-        cmocka_unit_test(test_pixels_are_limited),
-        cmocka_unit_test(test_text_pixmap),
-    };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
-}
+TEST_MAIN(folder_open, folder_close)

@@ -146,7 +146,7 @@ static Text file_text(const char *path)
 }
 
 // The pattern lies in the whole image, so that a region, and bands, have the bits of the whole.
-TEST(test_regions_and_bands)
+TEST_WITH(test_regions_and_bands, folder_open, folder_close)
 {
     part_write("whole.ppm", 0, 0, 32, 32);
     part_write("part.ppm", 5, 11, 20, 9);
@@ -179,16 +179,4 @@ TEST(test_rows_at_once)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_filmic_curve),
-        cmocka_unit_test(test_exposure),
-        cmocka_unit_test(test_dither_keeps_the_mean),
-        cmocka_unit_test(test_dither_keeps_exact_values),
-        cmocka_unit_test(test_dither_spreads),
-        cmocka_unit_test(test_rows_at_once),
-        cmocka_unit_test_setup_teardown(test_regions_and_bands, folder_open, folder_close),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -431,20 +431,4 @@ TEST(test_integer_channels_are_refused)
     check_refused(NULL, "EXR: channel Y is not of floats or not of full resolution");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_compressions),
-        cmocka_unit_test(test_choice_of_channels),
-        cmocka_unit_test(test_layers_by_name),
-        cmocka_unit_test(test_alpha_is_read),
-        cmocka_unit_test(test_parts_are_layers),
-        cmocka_unit_test(test_windows),
-        cmocka_unit_test(test_luminance_and_chroma),
-        cmocka_unit_test(test_other_primaries_are_named),
-        cmocka_unit_test(test_blocks_as_large_as_compressed),
-        cmocka_unit_test(test_rows_in_any_number),
-        cmocka_unit_test(test_integer_channels_are_refused),
-    };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
-}
+TEST_MAIN(folder_open, folder_close)

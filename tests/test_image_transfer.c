@@ -85,12 +85,4 @@ TEST(test_many_values)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_special_values),
-        cmocka_unit_test(test_thresholds),
-        cmocka_unit_test(test_many_values),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

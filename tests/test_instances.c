@@ -494,20 +494,4 @@ TEST(instances_take_little_memory)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(shared_meshes_look_as_copies),
-        cmocka_unit_test(lanes_agree),
-        cmocka_unit_test(many_instances_look_as_copies),
-        cmocka_unit_test(the_feature_alone_and_all_together_agree),
-        cmocka_unit_test(renderers_share_a_compiled_scene),
-        cmocka_unit_test(a_moved_camera_sees_what_a_new_one_sees),
-        cmocka_unit_test(meshes_are_shared_where_copies_are_large),
-        cmocka_unit_test(an_uneven_transform_makes_a_copy),
-        cmocka_unit_test(materials_share_geometry),
-        cmocka_unit_test(too_many_are_refused),
-        cmocka_unit_test(instances_take_little_memory),
-    };
-    return cmocka_run_group_tests(tests, instances_open, instances_close);
-}
+TEST_MAIN(instances_open, instances_close)

@@ -225,6 +225,10 @@ static void precision_holds(void **state)
     }
 }
 
+TEST_CASE(single_holds, precision_holds, &(Precision){PRECISION_SINGLE})
+TEST_CASE(strict_holds, precision_holds, &(Precision){PRECISION_STRICT})
+TEST_CASE(double_holds, precision_holds, &(Precision){PRECISION_DOUBLE})
+
 // Without BVH, mirrors and glass up to 32 objects are culled for several packets at once. With one lane there
 // are no packets, and with every feature built in there may be mirrors.
 TEST(culls_of_several_packets_change_nothing)
@@ -260,13 +264,4 @@ TEST(culls_of_several_packets_change_nothing)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(culls_of_several_packets_change_nothing),
-        {"single_holds", precision_holds, NULL, NULL, &(Precision){PRECISION_SINGLE}},
-        {"strict_holds", precision_holds, NULL, NULL, &(Precision){PRECISION_STRICT}},
-        {"double_holds", precision_holds, NULL, NULL, &(Precision){PRECISION_DOUBLE}},
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

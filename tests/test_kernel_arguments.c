@@ -115,11 +115,4 @@ TEST(every_kernel_has_few)
     assert_true(count >= KERNELS_MIN);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(arguments_are_counted),
-        cmocka_unit_test(every_kernel_has_few),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

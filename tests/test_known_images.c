@@ -49,13 +49,10 @@ static void run_at_each_precision(void **state)
     at_each_precision(*(const Check *)*state);
 }
 
-#define AT_EACH_PRECISION(check)                                                                             \
-    {                                                                                                        \
-#check, run_at_each_precision, NULL, NULL, &(Check)                                                  \
-        {                                                                                                    \
-            check                                                                                            \
-        }                                                                                                    \
-    }
+#define TEST_AT_EACH_PRECISION(name)                                                                         \
+    static void name(Precision precision);                                                                   \
+    TEST_CASE(name, run_at_each_precision, &(Check){name})                                                   \
+    static void name(Precision precision)
 
 static bool near(double value, double expected, double tolerance)
 {
@@ -75,7 +72,7 @@ static Vector3 film_place(const Film *film, const Scene *scene, size_t pixel)
 }
 
 // Float holds all numbers exactly, so that the answer is exact at every precision.
-static void background_and_ambient(Precision precision)
+TEST_AT_EACH_PRECISION(background_and_ambient)
 {
     Scene scene =
         scene_of("camera: {position: [0, 0, -4], look_at: [0, 0, 0], fov: 90}\n"
@@ -104,7 +101,7 @@ static void background_and_ambient(Precision precision)
 
 // A light straight above a plane, seen from above, gives kd C I N.L, and with ks the whole highlight in the
 // middle.
-static void light_above_plane(Precision precision)
+TEST_AT_EACH_PRECISION(light_above_plane)
 {
     Scene scene =
         scene_of("camera: {position: [0, 2, 0], look_at: [0, 0, 0], up: [0, 0, 1], fov: 90}\n"
@@ -136,7 +133,7 @@ static void light_above_plane(Precision precision)
 }
 
 // R1: a sphere on a plane under a light has a shadow with the radius 10 / sqrt(80) that reaches the contact.
-static void contact_shadow(Precision precision)
+TEST_AT_EACH_PRECISION(contact_shadow)
 {
     Scene scene = scene_of("camera: {position: [3, 2, 3], look_at: [0, 0, 0], fov: 50}\n"
                            "lights: [{point: {position: [0, 10, 0]}}]\n"
@@ -168,7 +165,7 @@ static void contact_shadow(Precision precision)
 
 // A spot shines straight down on a plane from height 5. The cone of 30 degrees intersects it in a circle of
 // radius 5 tan 30, full within 5 tan 20 if the penumbra is 10 degrees wide.
-static void spot_cone(Precision precision)
+TEST_AT_EACH_PRECISION(spot_cone)
 {
     Scene scene =
         scene_of("camera: {position: [0.3, 6, -0.4], look_at: [0.2, 0, 0.1], up: [0, 0, 1], fov: 70}\n"
@@ -225,7 +222,7 @@ static long double highlight_of(const Film *film, const Scene *scene, size_t pix
 
 // R5: highlights of every sharpness on a sphere are never below 0 nor above ks, nor NaN. Light and eye are
 // as far from the center, so that the peak is halfway between. The field of view narrows with the highlight.
-static void highlight(Precision precision)
+TEST_AT_EACH_PRECISION(highlight)
 {
     static const double exponents[] = {0, 1, 10, 100, 1e3, 1e4, 1e5, 1e6};
     Scene scene = scene_of(
@@ -262,7 +259,7 @@ static void highlight(Precision precision)
 
 // P2: no pixel of a tilted plane of size S, at distance O from the world's origin under a low sun, shadows
 // itself.
-static void tilted_plane(Precision precision)
+TEST_AT_EACH_PRECISION(tilted_plane)
 {
     static const double pairs[][2] = {{1, 0}, {1, 1e3}, {1, 1e6}, {1e-4, 0}, {1e-4, 1}, {1e4, 0}};
     static const double elevations[] = {0.01, 1, 45};
@@ -300,7 +297,7 @@ static void tilted_plane(Precision precision)
 }
 
 // The eye and a light are inside a closed shape, all of which is seen and lit.
-static void inside(Precision precision)
+TEST_AT_EACH_PRECISION(inside)
 {
     static const char *const shapes[] = {
         "sphere: {center: [0, 0, 0], radius: 2}",
@@ -341,7 +338,7 @@ static bool hits_ground(const double *direction, double slope)
 
 // The horizon of ground that is a cylinder or a cone is within a row of the exact one in every column. Next
 // to the side the plain discriminant tears it (S4 has the sphere's).
-static void ground_horizon(Precision precision)
+TEST_AT_EACH_PRECISION(ground_horizon)
 {
     static const struct {
         const char *view;
@@ -526,7 +523,7 @@ TEST(distance_from_origin_changes_nothing)
 }
 
 // Plates so far away that both ends round to one point keep their form.
-static void plates_far_away(Precision precision)
+TEST_AT_EACH_PRECISION(plates_far_away)
 {
     const char *const shapes[] = {"cylinder: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: 1e6}",
                                   "cone: {from: [0, 0, -2e7], to: [0, 0, -20000000.63], radius: [1e6, 9e5]}",
@@ -576,7 +573,7 @@ static void check_normal(const Film *film, size_t pixel, Vector3 outward, double
 // A tube of radius r = 0.1 whose circle has the radius R = 10^6, seen from outside in its plane. Next to the
 // eye the circle bends away from its tangent, at the distance s, by s^2 / 2 R. The turn s / R of its normals
 // is left out.
-static void thin_torus_next_to_eye(Precision precision)
+TEST_AT_EACH_PRECISION(thin_torus_next_to_eye)
 {
     const double major = 1e6, minor = 0.1, distance = 0.01,
                  u = precision == PRECISION_DOUBLE ? 1e-9 : 0x1p-24;
@@ -621,30 +618,10 @@ static void check_deep_paraboloid(double distance, Precision precision)
     free(object);
 }
 
-static void deep_paraboloid_next_to_eye(Precision precision)
+TEST_AT_EACH_PRECISION(deep_paraboloid_next_to_eye)
 {
     check_deep_paraboloid(0.01, precision);
     check_deep_paraboloid(1.5, precision);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        AT_EACH_PRECISION(background_and_ambient),
-        AT_EACH_PRECISION(light_above_plane),
-        AT_EACH_PRECISION(contact_shadow),
-        AT_EACH_PRECISION(spot_cone),
-        AT_EACH_PRECISION(highlight),
-        AT_EACH_PRECISION(tilted_plane),
-        AT_EACH_PRECISION(inside),
-        AT_EACH_PRECISION(ground_horizon),
-        AT_EACH_PRECISION(plates_far_away),
-        AT_EACH_PRECISION(thin_torus_next_to_eye),
-        AT_EACH_PRECISION(deep_paraboloid_next_to_eye),
-        cmocka_unit_test(facing_panes),
-        cmocka_unit_test(degenerate_cameras),
-        cmocka_unit_test(single_pixel_and_extreme_fields),
-        cmocka_unit_test(distance_from_origin_changes_nothing),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -266,6 +266,9 @@ static void layout_check(void **state)
     clReleaseProgram(program);
 }
 
+TEST_CASE(layout_in_float, layout_check, &(bool){false})
+TEST_CASE(layout_in_double, layout_check, &(bool){true})
+
 // Returns a number that differs from that of any other place and that float holds exactly.
 static double real_at(size_t member, size_t component)
 {
@@ -338,6 +341,9 @@ static void values_check(void **state)
     clReleaseProgram(program);
 }
 
+TEST_CASE(values_in_float, values_check, &(bool){false})
+TEST_CASE(values_in_double, values_check, &(bool){true})
+
 // The list above has every member, since they fill their struct. In a shape's struct the id is last.
 TEST(list_is_complete)
 {
@@ -390,16 +396,7 @@ static void threads_write_what_one_does(void **state)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        {"threads_narrow_as_one_does", threads_write_what_one_does, NULL, NULL, &(bool){false}},
-        {"threads_copy_as_one_does", threads_write_what_one_does, NULL, NULL, &(bool){true}},
-        cmocka_unit_test(list_is_complete),
-        {"layout_in_float", layout_check, NULL, NULL, &(bool){false}},
-        {"layout_in_double", layout_check, NULL, NULL, &(bool){true}},
-        {"values_in_float", values_check, NULL, NULL, &(bool){false}},
-        {"values_in_double", values_check, NULL, NULL, &(bool){true}},
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_CASE(threads_narrow_as_one_does, threads_write_what_one_does, &(bool){false})
+TEST_CASE(threads_copy_as_one_does, threads_write_what_one_does, &(bool){true})
+
+TEST_MAIN(probe_open, probe_close)

@@ -101,15 +101,10 @@ static void test_forgotten(void **state)
     assert_int_equal(end.status, expected);
 }
 
-int main(void)
-{
-    static Forgotten forgotten[] = {NOTHING, MEMORY, BUFFER, KERNEL, PROGRAM};
-    const struct CMUnitTest tests[] = {
-        {"nothing", test_forgotten, NULL, NULL, &forgotten[0]},
-        {"memory", test_forgotten, NULL, NULL, &forgotten[1]},
-        {"a buffer", test_forgotten, NULL, NULL, &forgotten[2]},
-        {"a kernel", test_forgotten, NULL, NULL, &forgotten[3]},
-        {"a program", test_forgotten, NULL, NULL, &forgotten[4]},
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_CASE(nothing, test_forgotten, &(Forgotten){NOTHING})
+TEST_CASE(memory, test_forgotten, &(Forgotten){MEMORY})
+TEST_CASE(a_buffer, test_forgotten, &(Forgotten){BUFFER})
+TEST_CASE(a_kernel, test_forgotten, &(Forgotten){KERNEL})
+TEST_CASE(a_program, test_forgotten, &(Forgotten){PROGRAM})
+
+TEST_MAIN(NULL, NULL)

@@ -247,9 +247,4 @@ TEST(no_shadow_of_a_far_lamp_depends_on_the_bvh)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(no_pixel_depends_on_the_bvh),
-                                       cmocka_unit_test(no_shadow_of_a_far_lamp_depends_on_the_bvh)};
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -624,31 +624,4 @@ TEST(device_without_room_is_reported)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(vertices_are_joined),
-        cmocka_unit_test(transforms_scale_then_turn_then_move),
-        cmocka_unit_test(mirrored_mesh_keeps_its_outer_side),
-        cmocka_unit_test(normals_come_from_the_triangles),
-        cmocka_unit_test(normals_do_not_see_the_cut_of_a_polygon),
-        cmocka_unit_test(normals_of_the_file_are_taken),
-        cmocka_unit_test(materials_come_from_the_file),
-        cmocka_unit_test(every_format_is_read),
-        cmocka_unit_test(faces_without_corners_are_left_out),
-        cmocka_unit_test(what_no_face_uses_does_not_count),
-        cmocka_unit_test(concave_polygon_is_cut_in_full),
-        cmocka_unit_test(polygons_that_cannot_be_filled_are_reported),
-        cmocka_unit_test(faults_name_file_and_vertex),
-        cmocka_unit_test(other_formats_are_read),
-        cmocka_unit_test(every_format_has_normals_and_texture_coordinates),
-        cmocka_unit_test(child_is_limited),
-        cmocka_unit_test(scene_file_faults_are_reported),
-        cmocka_unit_test(ids_count_the_triangles),
-        cmocka_unit_test(triangles_without_area_are_never_hit),
-        cmocka_unit_test(too_many_triangles_are_refused),
-        cmocka_unit_test(copies_are_limited),
-        cmocka_unit_test(device_without_room_is_reported),
-    };
-    return cmocka_run_group_tests(tests, meshes_open, meshes_close);
-}
+TEST_MAIN(meshes_open, meshes_close)

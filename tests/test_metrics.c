@@ -179,15 +179,4 @@ TEST(test_heatmap_rises)
     assert_near((double)color[0] + (double)color[1] + (double)color[2], 3, 1e-6);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_equal_images),       cmocka_unit_test(test_one_black_pixel),
-        cmocka_unit_test(test_one_step_lighter),   cmocka_unit_test(test_black_and_white),
-        cmocka_unit_test(test_what_is_not_finite), cmocka_unit_test(test_zeros_of_two_signs_differ),
-        cmocka_unit_test(test_ulp_distance),       cmocka_unit_test(test_summary_by_hand),
-        cmocka_unit_test(test_percentile),         cmocka_unit_test(test_kinds_that_do_not_compare),
-        cmocka_unit_test(test_heatmap_rises),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -354,16 +354,4 @@ TEST(loops_over_threads_cover_each_index_once)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(moved_scene_has_the_numbers_of_a_compiled_one),
-        cmocka_unit_test(powers_come_and_go),
-        cmocka_unit_test(turned_camera_changes_the_header_alone),
-        cmocka_unit_test(missing_bvh_stays_empty),
-        cmocka_unit_test(far_eyes),
-        cmocka_unit_test(moves_after_a_failure),
-        cmocka_unit_test(loops_over_threads_cover_each_index_once),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

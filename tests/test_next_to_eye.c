@@ -149,14 +149,4 @@ TEST(a_triangle_has_the_eyes_height)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ordinary_scenes_have_no_powers),
-        cmocka_unit_test(a_cylinder_is_seen_from_its_nearest_point),
-        cmocka_unit_test(a_plane_goes_through_its_nearest_point),
-        cmocka_unit_test(explicit_rays_see_a_plane_through_its_own_point),
-        cmocka_unit_test(a_triangle_has_the_eyes_height),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

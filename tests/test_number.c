@@ -110,13 +110,4 @@ TEST(scan_ends_behind_the_number)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(random_numbers_are_nearest),
-        cmocka_unit_test(limits_of_the_short_way_are_right),
-        cmocka_unit_test(what_is_no_number_is_refused),
-        cmocka_unit_test(scan_ends_behind_the_number),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

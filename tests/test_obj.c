@@ -586,24 +586,4 @@ TEST(test_progress)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layouts_are_read),
-        cmocka_unit_test(corners_combine_their_parts),
-        cmocka_unit_test(one_position_may_have_many_normals),
-        cmocka_unit_test(opacity_is_dissolve),
-        cmocka_unit_test(invalid_numbers_become_defaults),
-        cmocka_unit_test(materials_are_those_of_their_faces),
-        cmocka_unit_test(missing_materials_are_reported),
-        cmocka_unit_test(images_of_materials_are_used),
-        cmocka_unit_test(bumps_are_normals),
-        cmocka_unit_test(what_is_not_used_is_reported_once),
-        cmocka_unit_test(missing_parts_are_dropped),
-        cmocka_unit_test(files_have_each_message_once),
-        cmocka_unit_test(many_large_polygons_are_refused),
-        cmocka_unit_test(faults_have_their_place),
-        cmocka_unit_test(test_progress),
-    };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
-}
+TEST_MAIN(folder_open, folder_close)

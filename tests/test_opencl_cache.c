@@ -40,7 +40,7 @@ static bool loads(const char *entry_key)
     return found;
 }
 
-TEST(test_store_and_load)
+TEST_WITH(test_store_and_load, scratch_set_up, scratch_tear_down)
 {
     assert_false(loads(key));
     store(key);
@@ -65,7 +65,7 @@ static void entry_set_used(const char *entry_key, time_t when)
 }
 
 // Whatever the umask permits, entries are private.
-TEST(test_modes)
+TEST_WITH(test_modes, scratch_set_up, scratch_tear_down)
 {
     mode_t before = umask(0);
     store(key);
@@ -117,7 +117,7 @@ static void assert_refused(const char *reason)
 }
 
 // An entry that others may have written is not loaded, and replaced.
-TEST(test_entry_others_may_access)
+TEST_WITH(test_entry_others_may_access, scratch_set_up, scratch_tear_down)
 {
     static const mode_t modes[] = {0620, 0602, 0644};
     char *path = cache_entry_path(key);
@@ -133,7 +133,7 @@ TEST(test_entry_others_may_access)
 }
 
 // Nothing is loaded from a folder that belongs to another user, or stored in it.
-TEST(test_folder_of_others)
+TEST_WITH(test_folder_of_others, scratch_set_up, scratch_tear_down)
 {
     char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
     assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
@@ -171,7 +171,7 @@ TEST(test_folder_of_others)
 }
 
 // Entries are useless without the key of their hash. A key that others may know is replaced.
-TEST(test_key_of_the_hash)
+TEST_WITH(test_key_of_the_hash, scratch_set_up, scratch_tear_down)
 {
     char *cache = cache_folder_path();
     store(key);
@@ -189,7 +189,7 @@ TEST(test_key_of_the_hash)
 }
 
 // A file of 20 GB without contents is not read, and goes first.
-TEST(test_too_large)
+TEST_WITH(test_too_large, scratch_set_up, scratch_tear_down)
 {
     store(key);
     store("another key");
@@ -212,7 +212,7 @@ TEST(test_too_large)
 }
 
 // Four processes on an empty cache make one key of the hash, so that all load what each stores.
-TEST(test_race_on_an_empty_cache)
+TEST_WITH(test_race_on_an_empty_cache, scratch_set_up, scratch_tear_down)
 {
     enum { PROCESSES = 4, ROUNDS = 20 };
     for (int round = 0; round < ROUNDS; round++) {
@@ -238,7 +238,7 @@ TEST(test_race_on_an_empty_cache)
     }
 }
 
-TEST(test_list)
+TEST_WITH(test_list, scratch_set_up, scratch_tear_down)
 {
     static const char described[] = "options x\nlaunch render 8x1\ndevice y, z\n";
     MessageList messages = {0};
@@ -281,7 +281,7 @@ TEST(test_list)
     free(path);
 }
 
-TEST(test_clear_that_fails)
+TEST_WITH(test_clear_that_fails, scratch_set_up, scratch_tear_down)
 {
     MessageList messages = {0};
     char *path = cache_folder_path(), *secret;
@@ -299,7 +299,7 @@ TEST(test_clear_that_fails)
     free(path);
 }
 
-TEST(test_folder_without_rights)
+TEST_WITH(test_folder_without_rights, scratch_set_up, scratch_tear_down)
 {
     char *cache = cache_folder_path();
     store(key);
@@ -310,7 +310,7 @@ TEST(test_folder_without_rights)
 }
 
 // However few files may be open, no entry is left out in silence, and none is called removed that is not.
-TEST(test_few_descriptors)
+TEST_WITH(test_few_descriptors, scratch_set_up, scratch_tear_down)
 {
     enum { ROOM_END = 4 };
     struct rlimit usual;
@@ -340,7 +340,7 @@ TEST(test_few_descriptors)
 }
 
 // Each changed byte, each shorter length and one more byte are noticed. Storing repairs the entry.
-TEST(test_damage)
+TEST_WITH(test_damage, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
@@ -371,7 +371,7 @@ TEST(test_damage)
 }
 
 // The entry of one key lies where another is looked for, as if both had the same hash.
-TEST(test_entry_of_another_key)
+TEST_WITH(test_entry_of_another_key, scratch_set_up, scratch_tear_down)
 {
     store("another key");
     store(key);
@@ -382,7 +382,7 @@ TEST(test_entry_of_another_key)
     free(to);
 }
 
-TEST(test_entry_without_rights)
+TEST_WITH(test_entry_without_rights, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
@@ -394,7 +394,7 @@ TEST(test_entry_without_rights)
 }
 
 // What is not an entry is replaced when the key is stored. A pipe that nobody writes into is not waited for.
-TEST(test_entry_that_is_none_of_ours)
+TEST_WITH(test_entry_that_is_none_of_ours, scratch_set_up, scratch_tear_down)
 {
     char *path = cache_entry_path(key), *other = cache_entry_path("another key");
     alarm(60);
@@ -423,7 +423,7 @@ TEST(test_entry_that_is_none_of_ours)
     free(other);
 }
 
-TEST(test_no_place)
+TEST_WITH(test_no_place, scratch_set_up, scratch_tear_down)
 {
     const char *before = getenv("HOME");
     char *home = before ? strdup(before) : NULL;
@@ -453,7 +453,7 @@ TEST(test_no_place)
 }
 
 // A file in place of the folder stops even root.
-TEST(test_unwritable)
+TEST_WITH(test_unwritable, scratch_set_up, scratch_tear_down)
 {
     char *path = NULL;
     assert_true(asprintf(&path, "%s/glint", scratch) > 0);
@@ -469,7 +469,7 @@ TEST(test_unwritable)
     free(path);
 }
 
-TEST(test_folder_in_place_of_entry)
+TEST_WITH(test_folder_in_place_of_entry, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
@@ -482,7 +482,7 @@ TEST(test_folder_in_place_of_entry)
 }
 
 // While two processes replace the entry, a reader always finds it whole.
-TEST(test_many_processes)
+TEST_WITH(test_many_processes, scratch_set_up, scratch_tear_down)
 {
     store(key);
     pid_t writers[2];
@@ -505,7 +505,7 @@ TEST(test_many_processes)
 }
 
 // The entries that were used last stay, whenever they were stored.
-TEST(test_trim)
+TEST_WITH(test_trim, scratch_set_up, scratch_tear_down)
 {
     static const char *const keys[] = {"key a", "key b", "key c", "key d"};
     enum { KEY_COUNT = COUNT_OF(keys) };
@@ -547,29 +547,4 @@ TEST(test_trim)
     free(path);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_store_and_load, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_modes, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_others_may_access, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_folder_of_others, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_key_of_the_hash, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_too_large, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_race_on_an_empty_cache, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_list, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_clear_that_fails, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_folder_without_rights, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_few_descriptors, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_damage, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_of_another_key, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_without_rights, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_entry_that_is_none_of_ours, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_no_place, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_unwritable, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_folder_in_place_of_entry, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_many_processes, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_trim, scratch_set_up, scratch_tear_down),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

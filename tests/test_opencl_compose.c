@@ -96,14 +96,4 @@ TEST(test_work_groups_fit)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_each_include_once),
-        cmocka_unit_test(test_missing_files),
-        cmocka_unit_test(test_every_embedded_file_composes),
-        cmocka_unit_test(test_event_times),
-        cmocka_unit_test(test_work_groups_fit),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

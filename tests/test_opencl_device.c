@@ -215,15 +215,4 @@ TEST(test_list_without_platforms)
     scratch_close(empty);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_choice),
-        cmocka_unit_test(test_choice_falls_back),
-        cmocka_unit_test(test_lanes),
-        cmocka_unit_test(test_selector),
-        cmocka_unit_test(test_list_of_this_machine),
-        cmocka_unit_test(test_list_without_platforms),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

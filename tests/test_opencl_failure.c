@@ -198,13 +198,4 @@ TEST(test_unknown_memory)
     work_device = known;
 }
 
-int main(void)
-{
-    first_thread = pthread_self();
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_needed_calls),   cmocka_unit_test(test_unmaps),
-        cmocka_unit_test(test_needed_objects), cmocka_unit_test(test_dispensable_calls),
-        cmocka_unit_test(test_builds),         cmocka_unit_test(test_empty_build_log),
-        cmocka_unit_test(test_discovery),      cmocka_unit_test(test_unknown_memory)};
-    return cmocka_run_group_tests(tests, work_set_up, work_tear_down);
-}
+TEST_MAIN(work_set_up, work_tear_down)

@@ -127,7 +127,7 @@ static void drivers_own_cache_empty(void)
     free(empty);
 }
 
-TEST(test_cold_and_warm)
+TEST_WITH(test_cold_and_warm, scratch_set_up, scratch_tear_down)
 {
     Run cold = run_in_child(triple_request());
     assert_false(cold.from_cache);
@@ -140,7 +140,7 @@ TEST(test_cold_and_warm)
     if (warm.is_pocl) assert_true(warm.compiled_before_launch > 0);
 }
 
-TEST(test_what_the_key_holds)
+TEST_WITH(test_what_the_key_holds, scratch_set_up, scratch_tear_down)
 {
     ProgramRequest request = triple_request();
     run_in_child(request);
@@ -158,7 +158,7 @@ TEST(test_what_the_key_holds)
     free(other);
 }
 
-TEST(test_no_cache)
+TEST_WITH(test_no_cache, scratch_set_up, scratch_tear_down)
 {
     ProgramRequest request = triple_request();
     run_in_child(request);
@@ -197,7 +197,7 @@ static Text the_entry(char **key)
     return entry;
 }
 
-TEST(test_damaged_entry_is_replaced)
+TEST_WITH(test_damaged_entry_is_replaced, scratch_set_up, scratch_tear_down)
 {
     run_in_child(triple_request());
     char *key;
@@ -216,7 +216,7 @@ TEST(test_damaged_entry_is_replaced)
 }
 
 // A whole entry whose binary the driver cannot use.
-TEST(test_refused_binary_is_replaced)
+TEST_WITH(test_refused_binary_is_replaced, scratch_set_up, scratch_tear_down)
 {
     run_in_child(triple_request());
     char *key;
@@ -232,7 +232,7 @@ TEST(test_refused_binary_is_replaced)
     text_free(&nonsense);
 }
 
-TEST(test_two_processes_at_once)
+TEST_WITH(test_two_processes_at_once, scratch_set_up, scratch_tear_down)
 {
     pid_t children[2];
     for (int i = 0; i < 2; i++) {
@@ -251,7 +251,7 @@ TEST(test_two_processes_at_once)
     assert_true(run_in_child(triple_request()).from_cache);
 }
 
-TEST(test_unwritable_cache)
+TEST_WITH(test_unwritable_cache, scratch_set_up, scratch_tear_down)
 {
     setenv("XDG_CACHE_HOME", "/dev/null", 1);
     assert_false(run_in_child(triple_request()).from_cache);
@@ -265,7 +265,7 @@ static bool names_place(const char *log, const char *place)
     return strstr(log, place) || strstr(log, "<kernel>:");
 }
 
-TEST(test_text_that_does_not_compile)
+TEST_WITH(test_text_that_does_not_compile, scratch_set_up, scratch_tear_down)
 {
     Run run = {.request = {.root = "features.h",
                            .prelude = "// one\nkernel void triple(global uint *v) { v[0] = x; }"}};
@@ -283,7 +283,7 @@ TEST(test_text_that_does_not_compile)
     text_free(&text);
 }
 
-TEST(test_missing_root)
+TEST_WITH(test_missing_root, scratch_set_up, scratch_tear_down)
 {
     Run run = {.request = {.root = "absent.cl", .prelude = ""}};
     ChildEnd end = child_run(run_triple, &run, sizeof run);
@@ -322,7 +322,7 @@ static void build_broken(void *result)
     opened_close(&opened);
 }
 
-TEST(test_place_of_a_compile_error)
+TEST_WITH(test_place_of_a_compile_error, scratch_set_up, scratch_tear_down)
 {
     BuildLog log = {0};
     assert_int_equal(child_run(build_broken, &log, sizeof log).status, 0);
@@ -363,7 +363,7 @@ static void make_empty_buffers(void *result)
     opened_close(&opened);
 }
 
-TEST(test_failures)
+TEST_WITH(test_failures, scratch_set_up, scratch_tear_down)
 {
     Run run = {.request = triple_request()};
     ChildEnd end = child_run(ask_for_too_much, &run, sizeof run);
@@ -376,20 +376,4 @@ TEST(test_failures)
     assert_int_equal(child_run(make_empty_buffers, &run, sizeof run).status, 0);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test_setup_teardown(test_cold_and_warm, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_what_the_key_holds, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_no_cache, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_damaged_entry_is_replaced, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_refused_binary_is_replaced, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_two_processes_at_once, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_unwritable_cache, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_text_that_does_not_compile, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_missing_root, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_place_of_a_compile_error, scratch_set_up, scratch_tear_down),
-        cmocka_unit_test_setup_teardown(test_failures, scratch_set_up, scratch_tear_down),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

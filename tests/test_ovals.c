@@ -282,15 +282,11 @@ TEST(ellipsoids_follow_the_textbook)
     }
 }
 
-int main(void)
+int main(int argument_count, char **arguments)
 {
-    struct CMUnitTest tests[SHAPE_FORMS_MAX + 2] = {0};
     const size_t form_count = shape_forms(forms);
-    size_t count = 0;
     for (size_t i = 0; i < form_count; i++)
         if (has_ovals(forms[i].type))
-            tests[count++] = (struct CMUnitTest){forms[i].name, hits_ovals, NULL, NULL, &forms[i]};
-    tests[count++] = (struct CMUnitTest)cmocka_unit_test(certain_hits_of_ovals_are_right);
-    tests[count++] = (struct CMUnitTest)cmocka_unit_test(ellipsoids_follow_the_textbook);
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
+            test_register(&(struct CMUnitTest){forms[i].name, hits_ovals, NULL, NULL, &forms[i]});
+    return tests_run(argument_count, arguments, probe_open, probe_close);
 }

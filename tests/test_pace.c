@@ -182,15 +182,4 @@ TEST(parts_cover_a_place)
         }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(glass_below_sky_has_no_long_launch),
-        cmocka_unit_test(rows_shrink_after_a_slow_band),
-        cmocka_unit_test(launches_begin_small),
-        cmocka_unit_test(busy_device_grows_by_four),
-        cmocka_unit_test(parts_cover_a_place),
-        cmocka_unit_test(plain_images_have_few_launches),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

@@ -219,14 +219,4 @@ TEST(eye_next_to_a_sphere_builds_two_kernels)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(passes_give_the_bits_of_one_render),
-        cmocka_unit_test(passes_stop),
-        cmocka_unit_test(moved_renderer_gives_the_bits_of_a_new_one),
-        cmocka_unit_test(preview_differs_by_roundings),
-        cmocka_unit_test(eye_next_to_a_sphere_builds_two_kernels),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -187,11 +187,4 @@ TEST(fma_in_software_is_exact)
         free(numbers[i]);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(wrong_quotients_and_roots_are_repaired),
-        cmocka_unit_test(fma_in_software_is_exact),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

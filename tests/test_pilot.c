@@ -225,12 +225,4 @@ TEST(pilot_chooses)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sample_has_a_pixel_of_each_cell), cmocka_unit_test(bound_of_zeros_and_ones),
-        cmocka_unit_test(bound_covers_the_mean),           cmocka_unit_test(verdicts_of_a_sample),
-        cmocka_unit_test(scene_bounds_its_colors),         cmocka_unit_test(pilot_chooses),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -338,17 +338,4 @@ TEST(vertices_without_a_coordinate_are_refused)
     text_free(&text);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(ascii_layouts_are_read),
-        cmocka_unit_test(binary_layouts_are_read),
-        cmocka_unit_test(faults_name_line_and_row),
-        cmocka_unit_test(binary_faults_name_byte_and_row),
-        cmocka_unit_test(binary_file_cut_short_is_refused),
-        cmocka_unit_test(normals_and_uvs_are_read),
-        cmocka_unit_test(what_is_not_used_is_reported),
-        cmocka_unit_test(vertices_without_a_coordinate_are_refused),
-    };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
-}
+TEST_MAIN(folder_open, folder_close)

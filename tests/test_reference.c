@@ -508,27 +508,4 @@ TEST(nonfinite_colors_are_errors)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(knows_spheres),
-        cmocka_unit_test(sees_only_insides),
-        cmocka_unit_test(knows_flat_shapes),
-        cmocka_unit_test(knows_cylinders),
-        cmocka_unit_test(knows_cones),
-        cmocka_unit_test(knows_tori),
-        cmocka_unit_test(shades_as_phong),
-        cmocka_unit_test(casts_shadows),
-        cmocka_unit_test(lays_checkers),
-        cmocka_unit_test(aims_cameras),
-        cmocka_unit_test(aims_panoramas),
-        cmocka_unit_test(rounds_cameras),
-        cmocka_unit_test(rounds_every_number),
-        cmocka_unit_test(finds_the_nearest),
-        cmocka_unit_test(finds_small_shapes_exactly),
-        cmocka_unit_test(measures_distances),
-        cmocka_unit_test(knows_highlights),
-        cmocka_unit_test(nonfinite_colors_are_errors),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

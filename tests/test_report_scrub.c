@@ -59,11 +59,4 @@ TEST(host_is_scrubbed)
     scrubber_close(&scrubber);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(texts_are_scrubbed),
-        cmocka_unit_test(host_is_scrubbed),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

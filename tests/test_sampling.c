@@ -125,12 +125,4 @@ TEST(disc_is_uniform)
     free(points);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(points_are_nets),
-        cmocka_unit_test(precisions_agree),
-        cmocka_unit_test(disc_is_uniform),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -67,13 +67,4 @@ TEST(test_unbounded)
     assert_true(empty.min.x > empty.max.x);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_sphere_box_triangle),
-        cmocka_unit_test(test_discs),
-        cmocka_unit_test(test_cylinder_and_cone),
-        cmocka_unit_test(test_unbounded),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

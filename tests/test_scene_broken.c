@@ -149,6 +149,12 @@ static void check_table(void **state)
     text_free(&table);
 }
 
+TEST_CASE(test_yaml, check_table, "yaml")
+TEST_CASE(test_rt, check_table, "rt")
+TEST_CASE(test_cfg, check_table, "cfg")
+TEST_CASE(test_nff, check_table, "nff")
+TEST_CASE(test_dat, check_table, "dat")
+
 // Returns the longest literal part of a format, which identifies the message.
 static char *format_core(const char *format, size_t length)
 {
@@ -229,16 +235,4 @@ TEST(test_names)
     message_list_free(&messages);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        {"test_yaml", check_table, NULL, NULL, "yaml"},
-        {"test_rt", check_table, NULL, NULL, "rt"},
-        {"test_cfg", check_table, NULL, NULL, "cfg"},
-        {"test_nff", check_table, NULL, NULL, "nff"},
-        {"test_dat", check_table, NULL, NULL, "dat"},
-        cmocka_unit_test(test_every_message_has_a_scene),
-        cmocka_unit_test(test_names),
-    };
-    return cmocka_run_group_tests(tests, NULL, NULL);
-}
+TEST_MAIN(NULL, NULL)

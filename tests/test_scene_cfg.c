@@ -96,18 +96,4 @@ TEST(test_no_lights_no_objects)
     assert_messages("s.cfg", CAMERA, "warning: s.cfg: no objects\nwarning: s.cfg: no lights\n");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scene),
-        cmocka_unit_test(test_light),
-        cmocka_unit_test(test_sphere),
-        cmocka_unit_test(test_plane),
-        cmocka_unit_test(test_cylinder),
-        cmocka_unit_test(test_cone),
-        cmocka_unit_test(test_any_order_and_blanks),
-        cmocka_unit_test(test_text_between_blocks_is_skipped),
-        cmocka_unit_test(test_no_lights_no_objects),
-    };
-    return cmocka_run_group_tests(tests, set_up, complete_close);
-}
+TEST_MAIN(set_up, complete_close)

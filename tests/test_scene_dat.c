@@ -305,13 +305,4 @@ TEST(test_picture)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_camera),  cmocka_unit_test(test_lights),  cmocka_unit_test(test_materials),
-        cmocka_unit_test(test_shapes),  cmocka_unit_test(test_meshes),  cmocka_unit_test(test_losses),
-        cmocka_unit_test(test_fading),  cmocka_unit_test(test_frustum), cmocka_unit_test(test_orthographic),
-        cmocka_unit_test(test_picture),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_MAIN(set_up, tear_down)

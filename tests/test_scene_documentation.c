@@ -53,6 +53,11 @@ static void check_examples(void **state)
     text_free(&name);
 }
 
+TEST_CASE(test_yaml_examples, check_examples, &(Examples){"yaml", 2})
+TEST_CASE(test_rt_examples, check_examples, &(Examples){"rt", 1})
+TEST_CASE(test_cfg_examples, check_examples, &(Examples){"cfg", 1})
+TEST_CASE(test_nff_examples, check_examples, &(Examples){"nff", 1})
+
 TEST(test_every_shape_is_named)
 {
     for (size_t i = 0; i < SHAPE_COUNT; i++) {
@@ -100,15 +105,4 @@ TEST(test_names_of_colors)
     }
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        {"test_yaml_examples", check_examples, NULL, NULL, &(Examples){"yaml", 2}},
-        {"test_rt_examples", check_examples, NULL, NULL, &(Examples){"rt", 1}},
-        {"test_cfg_examples", check_examples, NULL, NULL, &(Examples){"cfg", 1}},
-        {"test_nff_examples", check_examples, NULL, NULL, &(Examples){"nff", 1}},
-        cmocka_unit_test(test_every_shape_is_named),
-        cmocka_unit_test(test_names_of_colors),
-    };
-    return cmocka_run_group_tests(tests, page_read, page_free);
-}
+TEST_MAIN(page_read, page_free)

@@ -290,19 +290,4 @@ TEST(test_number_of_files)
     text_free(&list);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_files_are_joined),
-        cmocka_unit_test(test_scene_has_precedence),
-        cmocka_unit_test(test_hash_covers_the_files),
-        cmocka_unit_test(test_aliases_of_files),
-        cmocka_unit_test(test_values_are_set),
-        cmocka_unit_test(test_files_are_named),
-        cmocka_unit_test(test_names_of_two_files),
-        cmocka_unit_test(test_mistakes_in_files),
-        cmocka_unit_test(test_cycles),
-        cmocka_unit_test(test_number_of_files),
-    };
-    return cmocka_run_group_tests(tests, set_up, folder_close);
-}
+TEST_MAIN(set_up, folder_close)

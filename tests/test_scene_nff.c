@@ -176,13 +176,4 @@ TEST(test_only_inside)
     check_sides("c 0 -1 0 -1 0 1 0 0", 0.5, true);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_view),        cmocka_unit_test(test_lights),
-        cmocka_unit_test(test_materials),   cmocka_unit_test(test_round_shapes),
-        cmocka_unit_test(test_polygons),    cmocka_unit_test(test_tolerated),
-        cmocka_unit_test(test_only_inside),
-    };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
-}
+TEST_MAIN(set_up, tear_down)

@@ -267,19 +267,4 @@ static int triangles_free(void **state)
     return 0;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_small),
-        cmocka_unit_test(test_corners_on_edges),
-        cmocka_unit_test(test_gear),
-        cmocka_unit_test(test_comb_and_spiral),
-        cmocka_unit_test(test_stars),
-        cmocka_unit_test(test_hole),
-        cmocka_unit_test(test_repeated_corners),
-        cmocka_unit_test(test_not_simple),
-        cmocka_unit_test(test_orientation_is_exact),
-        cmocka_unit_test(test_area_is_exact),
-    };
-    return cmocka_run_group_tests(tests, NULL, triangles_free);
-}
+TEST_MAIN(NULL, triangles_free)

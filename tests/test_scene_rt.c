@@ -231,26 +231,4 @@ TEST(test_many_warnings_are_counted)
     text_free(&text);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scene),
-        cmocka_unit_test(test_lights),
-        cmocka_unit_test(test_sphere_and_plane),
-        cmocka_unit_test(test_cylinder_and_cone),
-        cmocka_unit_test(test_square_and_triangle),
-        cmocka_unit_test(test_square_on_the_floor),
-        cmocka_unit_test(test_blanks_comments_and_line_ends),
-        cmocka_unit_test(test_missing_parts_are_fine),
-        cmocka_unit_test(test_axes_are_made_unit),
-        cmocka_unit_test(test_zero_camera_direction),
-        cmocka_unit_test(test_far_camera_keeps_its_direction),
-        cmocka_unit_test(test_color_before_sizes),
-        cmocka_unit_test(test_first_of_several_old_cameras),
-        cmocka_unit_test(test_lenient_skips_what_it_does_not_know),
-        cmocka_unit_test(test_lenient_reads_dialects),
-        cmocka_unit_test(test_lenient_keeps_other_errors),
-        cmocka_unit_test(test_many_warnings_are_counted),
-    };
-    return cmocka_run_group_tests(tests, set_up, complete_close);
-}
+TEST_MAIN(set_up, complete_close)

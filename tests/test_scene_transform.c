@@ -183,12 +183,4 @@ TEST(a_scale_that_is_nearly_the_same_counts_as_the_same)
     assert_false(affine_keeps_balls(&clearly, &scale));
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(transformed_objects_are_hit_where_plain_ones_are),
-        cmocka_unit_test(an_instance_may_have_a_material),
-        cmocka_unit_test(a_scale_that_is_nearly_the_same_counts_as_the_same),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

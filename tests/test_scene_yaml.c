@@ -432,7 +432,7 @@ static void write_layered_image(const char *path)
     assert_true(image_writer_commit(writer, &messages));
 }
 
-TEST(test_layers_of_images)
+TEST_WITH(test_layers_of_images, folder_open, folder_close)
 {
     assert_int_equal(mkdir("scenes", 0700), 0);
     write_layered_image("scenes/a.exr");
@@ -500,33 +500,4 @@ TEST(test_more_than_2_gibibytes_are_refused)
     message_list_free(&messages);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(test_scene_keys),
-        cmocka_unit_test(test_lights),
-        cmocka_unit_test(test_materials),
-        cmocka_unit_test(test_tints),
-        cmocka_unit_test(test_energy),
-        cmocka_unit_test(test_round_shapes),
-        cmocka_unit_test(test_cylinders),
-        cmocka_unit_test(test_cones),
-        cmocka_unit_test(test_flat_shapes),
-        cmocka_unit_test(test_defaults),
-        cmocka_unit_test(test_focal_length),
-        cmocka_unit_test(test_block_style_and_number_forms),
-        cmocka_unit_test(test_names_in_every_style),
-        cmocka_unit_test(test_tiny_numbers_are_zero),
-        cmocka_unit_test(test_colors),
-        cmocka_unit_test(test_values_are_set),
-        cmocka_unit_test(test_values_are_removed),
-        cmocka_unit_test(test_aliases_keep_what_is_set_elsewhere),
-        cmocka_unit_test(test_textures_that_are_set_have_a_place),
-        cmocka_unit_test_setup_teardown(test_layers_of_images, folder_open, folder_close),
-        cmocka_unit_test(test_materials_may_follow_objects),
-        cmocka_unit_test(test_warnings),
-        cmocka_unit_test(test_a_failed_scene_is_empty),
-        cmocka_unit_test(test_more_than_2_gibibytes_are_refused),
-    };
-    return cmocka_run_group_tests(tests, set_up, complete_close);
-}
+TEST_MAIN(set_up, complete_close)

@@ -54,8 +54,4 @@ TEST(scenes_render)
     globfree(&scenes);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(scenes_render)};
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -215,13 +215,4 @@ TEST(keeps_small_shadows_on_huge_ground)
         keeps_small_shadows_on(&grounds[i]);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(keeps_small_shadows_on_huge_ground),
-        cmocka_unit_test(takes_a_veils_light_once),
-        cmocka_unit_test(darkens_an_eclipse_in_meters),
-        cmocka_unit_test(smooth_meshes_do_not_shade_themselves),
-    };
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

@@ -313,14 +313,10 @@ TEST(gives_the_same_bits_at_every_width)
     }
 }
 
-int main(void)
+int main(int argument_count, char **arguments)
 {
-    struct CMUnitTest tests[SHAPE_FORMS_MAX + 3] = {0};
     form_count = shape_forms(forms);
     for (size_t i = 0; i < form_count; i++)
-        tests[i] = (struct CMUnitTest){forms[i].name, hits_each_shape, NULL, NULL, &forms[i]};
-    tests[form_count] = (struct CMUnitTest)cmocka_unit_test(hits_the_nearest_of_many);
-    tests[form_count + 1] = (struct CMUnitTest)cmocka_unit_test(gives_the_same_bits_at_every_width);
-    tests[form_count + 2] = (struct CMUnitTest)cmocka_unit_test(hits_from_next_to_the_side);
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
+        test_register(&(struct CMUnitTest){forms[i].name, hits_each_shape, NULL, NULL, &forms[i]});
+    return tests_run(argument_count, arguments, probe_open, probe_close);
 }

@@ -207,10 +207,4 @@ TEST(what_is_seen_shines)
     film_free(&seen);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(colors_are_a_light), cmocka_unit_test(an_image_is_a_light),
-        cmocka_unit_test(what_hides_the_sky_casts_a_shadow), cmocka_unit_test(what_is_seen_shines)};
-    return cmocka_run_group_tests(tests, probe_open, probe_close);
-}
+TEST_MAIN(probe_open, probe_close)

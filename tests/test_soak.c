@@ -273,8 +273,4 @@ static int image_close(void **state)
     return unlink(image_path) == 0 && rmdir(folder) == 0 ? 0 : -1;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {cmocka_unit_test(memory_and_images_stay)};
-    return cmocka_run_group_tests(tests, image_open, image_close);
-}
+TEST_MAIN(image_open, image_close)

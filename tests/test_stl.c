@@ -124,12 +124,4 @@ TEST(faults_have_their_place)
                     "4:18: error: a.stl: vertex 0 (from 0) is not finite or too large\n");
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(text_is_read),
-        cmocka_unit_test(binary_is_read),
-        cmocka_unit_test(faults_have_their_place),
-    };
-    return cmocka_run_group_tests(tests, folder_open, folder_close);
-}
+TEST_MAIN(folder_open, folder_close)

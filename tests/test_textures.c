@@ -610,28 +610,4 @@ TEST(textures_are_shared)
     scene_free(&scene);
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(sphere_shows_east_and_west),
-        cmocka_unit_test(sphere_shows_north_and_south),
-        cmocka_unit_test(sphere_agrees_all_around),
-        cmocka_unit_test(planes_repeat_it),
-        cmocka_unit_test(meshes_have_it_by_uv),
-        cmocka_unit_test(meshes_wrap_it),
-        cmocka_unit_test(far_away_it_is_its_mean),
-        cmocka_unit_test(between_levels_it_blends),
-        cmocka_unit_test(mirrors_filter_textures),
-        cmocka_unit_test(every_build_gives_the_same_bits),
-        cmocka_unit_test(every_build_has_the_same_holes),
-        cmocka_unit_test(normal_maps_tilt_normals),
-        cmocka_unit_test(flat_normal_maps_change_nothing),
-        cmocka_unit_test(opaque_images_cut_nothing),
-        cmocka_unit_test(instances_have_the_holes_of_copies),
-        cmocka_unit_test(jpeg_is_read),
-        cmocka_unit_test(scene_faults_are_reported),
-        cmocka_unit_test(texture_faults_are_reported),
-        cmocka_unit_test(textures_are_shared),
-    };
-    return cmocka_run_group_tests(tests, textures_open, textures_close);
-}
+TEST_MAIN(textures_open, textures_close)

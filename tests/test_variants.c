@@ -432,20 +432,4 @@ TEST(functions_stay_out_of_line)
     probe_compute.device = device;
 }
 
-int main(void)
-{
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(scene_has_every_feature),
-        cmocka_unit_test(functions_stay_out_of_line),
-        cmocka_unit_test(lanes_agree),
-        cmocka_unit_test(lanes_agree_on_aovs),
-        cmocka_unit_test(features_alone_and_all_together_agree),
-        cmocka_unit_test(launches_of_samples_agree),
-        cmocka_unit_test(regions_are_cuts_of_the_whole),
-        cmocka_unit_test(shifted_frames_are_cuts_of_a_larger_one),
-        cmocka_unit_test(points_of_areas_agree),
-        cmocka_unit_test(panoramas_agree),
-        cmocka_unit_test(mirror_gives_the_mirrored_image),
-    };
-    return cmocka_run_group_tests(tests, variants_open, variants_close);
-}
+TEST_MAIN(variants_open, variants_close)

@@ -74,6 +74,7 @@ void assert_work_is_right(void)
 int work_set_up(void **state)
 {
     (void)state;
+    first_thread = pthread_self();
     setenv("TMPDIR", "/dev/null", 1); // no place for the text of programs that do not build
     MessageList messages = {0};
     device_list_open(&devices);
