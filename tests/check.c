@@ -1,6 +1,8 @@
 #include "tests/check.h"
 
 #include "host/base/fault.h"
+#include <stdio.h>
+#include <stdlib.h>
 
 enum { TESTS_MAX = 64 };
 
@@ -17,4 +19,24 @@ int tests_run(int argument_count, char **arguments, CMFixtureFunction setup, CMF
 {
     if (argument_count > 1) cmocka_set_test_filter(arguments[1]);
     return cmocka_run_group_tests(tests, setup, teardown);
+}
+
+void check_only_message(MessageList *messages, const char *expected)
+{
+    assert_int_equal(messages->count, 1);
+    assert_string_equal(messages->items[0].text, expected);
+    message_list_free(messages);
+}
+
+const char *formatted(const char *format, ...)
+{
+    static char *texts[4];
+    static size_t next;
+    char **text = &texts[next++ % COUNT_OF(texts)];
+    free(*text);
+    va_list arguments;
+    va_start(arguments, format);
+    if (vasprintf(text, format, arguments) < 0) fault("out of memory");
+    va_end(arguments);
+    return *text;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/base/array.h"
+#include "host/base/message.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -9,6 +10,12 @@
 #include <stdint.h>
 
 #include <cmocka.h>
+
+// Returns a formatted text, which stays until the fourth later call.
+const char *formatted(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+// Fails the test unless the text of the only message is the expected one. Frees the list.
+void check_only_message(MessageList *messages, const char *expected);
 
 // Adds a test to those that tests_run runs, in this order.
 void test_register(const struct CMUnitTest *test);

@@ -105,11 +105,17 @@ void file_write_bytes(const char *path, const void *bytes, size_t size)
     assert_int_equal(fclose(file), 0);
 }
 
-void check_content(const char *path, const char *expected)
+Text file_text(const char *path)
 {
     Text text = {0};
     MessageList messages = {0};
-    assert_true(text_read_file(&text, path, &messages));
+    if (!text_read_file(&text, path, &messages)) fail_msg("%s", messages.items[0].text);
+    return text;
+}
+
+void check_content(const char *path, const char *expected)
+{
+    Text text = file_text(path);
     assert_string_equal(text_c(&text), expected);
     text_free(&text);
 }

@@ -1,6 +1,7 @@
 // Creates the files of a test in a separate, empty folder.
 #pragma once
 
+#include "host/base/text.h"
 #include <stddef.h>
 #include <sys/types.h>
 
@@ -23,5 +24,6 @@ int scratch_tear_down(void **state);
 
 void file_write(const char *path, const char *text);
 void file_write_bytes(const char *path, const void *bytes, size_t size);
+Text file_text(const char *path); // of a file that can be read
 void check_content(const char *path, const char *expected);
 mode_t mode_of(const char *path); // the permissions alone

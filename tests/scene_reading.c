@@ -25,6 +25,15 @@ bool scene_read_set(Scene *scene, const char *name, const Text *text, const char
     return scene_read_yaml(scene, &source, &options, messages);
 }
 
+Text text_with_line_ends(const char *text, int ends)
+{
+    const char *line_end = (const char *const[]){"\n", "\r\n", "\r"}[ends];
+    Text changed = {0};
+    for (const char *at = text; *at; at++)
+        text_append(&changed, *at == '\n' ? line_end : at, *at == '\n' ? strlen(line_end) : 1);
+    return changed;
+}
+
 void message_describe(Text *description, const Message *message)
 {
     if (message->file && !strcmp(message->file, "--set")) text_appendf(description, "--set:");

@@ -10,6 +10,9 @@ bool scene_read_text(Scene *scene, const char *name, const Text *text, bool leni
 bool scene_read_set(Scene *scene, const char *name, const Text *text, const char *const *overrides,
                     size_t count, MessageList *messages);
 
+// Returns a text with \n, \r\n or \r at the ends of its lines, for `ends` from 0 to 2.
+Text text_with_line_ends(const char *text, int ends);
+
 // Describes a message as tests write it: `line:column: severity: text`, or only the severity and text if it
 // has no place. A place in a --set is `--set:line:column`.
 void message_describe(Text *description, const Message *message);

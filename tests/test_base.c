@@ -9,6 +9,7 @@
 #include "host/base/stage.h"
 #include "host/base/text.h"
 #include "tests/check.h"
+#include "tests/child.h"
 #include "tests/files.h"
 
 #include <dirent.h>
@@ -164,13 +165,6 @@ TEST(test_array)
     for (uint64_t i = 0; i < 5000; i++)
         assert_int_equal(numbers.items[i], i * i);
     free(numbers.items);
-}
-
-static void check_only_message(MessageList *messages, const char *expected)
-{
-    assert_int_equal(messages->count, 1);
-    assert_string_equal(messages->items[0].text, expected);
-    message_list_free(messages);
 }
 
 TEST(test_read_failures)
@@ -418,25 +412,28 @@ TEST(test_output_of_killed_processes)
     unlink("kept");
 }
 
+static void fault_with_open_output(void *unused)
+{
+    (void)unused;
+    MessageList messages = {0};
+    OutputFile output;
+    if (output_open(&output, "kept", &messages)) fault("as meant");
+}
+
 // A process that faults with a file half written exits with status 2, leaves the old file whole, and leaves
 // nothing next to it (otherwise the folder could not be removed at the end).
 TEST(test_fault_removes_the_temporary)
 {
     file_write("kept", "old");
-    pid_t child = fork();
-    assert_true(child >= 0);
-    if (child == 0) {
-        MessageList messages = {0};
-        OutputFile output;
-        if (!freopen("/dev/null", "w", stderr) || !output_open(&output, "kept", &messages)) _exit(9);
-        fault("as meant");
-    }
-    int status;
-    assert_int_equal(waitpid(child, &status, 0), child);
-    assert_true(WIFEXITED(status));
-    assert_int_equal(WEXITSTATUS(status), EXIT_MACHINE);
+    assert_int_equal(child_run(fault_with_open_output, &(char){0}, 1).status, EXIT_MACHINE);
     check_content("kept", "old");
     unlink("kept");
+}
+
+static void product_wrap(void *unused)
+{
+    (void)unused;
+    memory_product(SIZE_MAX / 2 + 1, 2);
 }
 
 // A product that wraps would make an allocation that is too small.
@@ -445,17 +442,7 @@ TEST(test_products_do_not_wrap)
     assert_int_equal(memory_product(3, 5), 15);
     assert_int_equal(memory_product(0, SIZE_MAX), 0);
     assert_true(memory_product(SIZE_MAX / 2, 2) == SIZE_MAX - 1);
-    pid_t child = fork();
-    assert_true(child >= 0);
-    if (child == 0) {
-        if (!freopen("/dev/null", "w", stderr)) _exit(9);
-        memory_product(SIZE_MAX / 2 + 1, 2);
-        _exit(0);
-    }
-    int status;
-    assert_int_equal(waitpid(child, &status, 0), child);
-    assert_true(WIFEXITED(status));
-    assert_int_equal(WEXITSTATUS(status), EXIT_MACHINE);
+    assert_int_equal(child_run(product_wrap, &(char){0}, 1).status, EXIT_MACHINE);
 }
 
 // Values published with the function: draft-eastlake-fnv, appendix "FNV-1a 64 bit".

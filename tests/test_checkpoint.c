@@ -103,10 +103,7 @@ static Text file_make(void)
     for (uint32_t i = BANDS; i-- > 0;)
         append(checkpoint, i * BAND_ROWS);
     close_checked(checkpoint, false);
-    Text bytes = {0};
-    MessageList messages = {0};
-    assert_true(text_read_file(&bytes, path, &messages));
-    return bytes;
+    return file_text(path);
 }
 
 static size_t file_size(void)
@@ -213,14 +210,13 @@ TEST(test_other_sizes)
 // Expects a refusal with a reason, which leaves the file unchanged.
 static void refused(const char *other_key, const char *reason)
 {
-    Text before = {0}, after = {0};
+    Text before = file_text(path);
     MessageList messages = {0};
-    text_read_file(&before, path, &messages);
     assert_null(checkpoint_open(path, other_key, &film, &messages));
     assert_int_equal(messages.count, 1);
     if (!strstr(messages.items[0].text, reason)) fail_msg("%s", messages.items[0].text);
     message_list_free(&messages);
-    text_read_file(&after, path, &messages);
+    Text after = file_text(path);
     assert_int_equal(before.count, after.count);
     assert_memory_equal(before.items, after.items, before.count);
     text_free(&before);

@@ -81,9 +81,7 @@ TEST(test_commands)
 
 static void assert_same_bytes(const char *one, const char *other)
 {
-    Text first = {0}, second = {0};
-    MessageList messages = {0};
-    assert_true(text_read_file(&first, one, &messages) && text_read_file(&second, other, &messages));
+    Text first = file_text(one), second = file_text(other);
     assert_true(first.count > 0);
     assert_int_equal(first.count, second.count);
     assert_memory_equal(first.items, second.items, first.count);

@@ -121,9 +121,7 @@ static void check_beyond(const char *name, double value, double bound)
 static void holds_where_they_touch(void **state)
 {
     const Trial *trial = *state;
-    Text text = {0};
-    text_appendf(&text, STAGE "%s", trial->objects);
-    Scene scene = scene_of_text("contact.yaml", text_c(&text));
+    Scene scene = scene_of_text("contact.yaml", formatted(STAGE "%s", trial->objects));
     Bounds contact = contact_of(&scene);
     assert_int_equal(bounds_is_empty(&contact), !trial->touch);
     if (trial->touch) {
@@ -135,7 +133,6 @@ static void holds_where_they_touch(void **state)
         check_beyond(trial->name, contact.max.z, trial->high.z);
     }
     scene_free(&scene);
-    text_free(&text);
 }
 
 // With enough pairs, all opaque objects count as one box, which is unbounded if many of them are.

@@ -154,10 +154,9 @@ TEST(test_sky_colors)
 
 static Scene scene_of_background(const char *background)
 {
-    Text text = {0};
-    text_appendf(&text, "camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nbackground: %s\n", background);
-    Scene scene = scene_of_text("s.yaml", text_c(&text));
-    text_free(&text);
+    Scene scene = scene_of_text(
+        "s.yaml",
+        formatted("camera: {position: [0, 0, -5], look_at: [0, 0, 0]}\nbackground: %s\n", background));
     return scene;
 }
 

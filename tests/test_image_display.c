@@ -137,14 +137,6 @@ static void part_write(const char *path, uint32_t left, uint32_t top, uint32_t w
     assert_true(image_writer_commit(writer, &messages));
 }
 
-static Text file_text(const char *path)
-{
-    Text text = {0};
-    MessageList messages = {0};
-    assert_true(text_read_file(&text, path, &messages));
-    return text;
-}
-
 // The pattern lies in the whole image, so that a region, and bands, have the bits of the whole.
 TEST_WITH(test_regions_and_bands, folder_open, folder_close)
 {

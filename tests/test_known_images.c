@@ -309,13 +309,10 @@ TEST_AT_EACH_PRECISION(inside)
     };
     for (size_t i = 0; i < COUNT_OF(shapes); i++) {
         snprintf(place, sizeof place, "%s, inside %s", precision_names[precision], shapes[i]);
-        Text text = {0};
-        text_appendf(&text,
-                     "camera: {position: [0.1, 0.2, 0.3], look_at: [1, -0.4, 0.5], fov: 100}\n"
-                     "lights: [{point: {position: [-0.2, 0.1, -0.1]}}]\nobjects: [{%s}]\n",
-                     shapes[i]);
-        Scene scene = scene_of(text_c(&text));
-        text_free(&text);
+        Scene scene =
+            scene_of(formatted("camera: {position: [0.1, 0.2, 0.3], look_at: [1, -0.4, 0.5], fov: 100}\n"
+                               "lights: [{point: {position: [-0.2, 0.1, -0.1]}}]\nobjects: [{%s}]\n",
+                               shapes[i]));
         Film film = render(&scene, 96, 96, precision, AOV_OBJECT | AOV_SHADOW);
         for (size_t pixel = 0; pixel < (size_t)96 * 96; pixel++) {
             check(film.object[pixel] == 0);
@@ -504,16 +501,13 @@ TEST(distance_from_origin_changes_nothing)
     for (size_t i = 0; i < 2; i++) {
         double far = i == 0 ? 0 : 0x1p23;
         snprintf(place, sizeof place, "moved by %g", far);
-        Text text = {0};
-        text_appendf(&text,
-                     "camera: {position: [%.17g, 1.5, -4], look_at: [%.17g, 0.5, 0], fov: 45}\n"
-                     "lights: [{point: {position: [%.17g, 5, -3]}}]\n"
-                     "objects:\n  - sphere: {center: [%.17g, 0.75, 0.5], radius: 0.75}\n"
-                     "  - plane: {point: [%.17g, 0, 0], normal: [0, 1, 0], material: {checker: {colors: "
-                     "[[1, 1, 1], [0, 0, 0]], size: 0.5}}}\n",
-                     far + 0.25, far + 0.25, far + 2, far + 0.5, far);
-        Scene scene = scene_of(text_c(&text));
-        text_free(&text);
+        Scene scene = scene_of(
+            formatted("camera: {position: [%.17g, 1.5, -4], look_at: [%.17g, 0.5, 0], fov: 45}\n"
+                      "lights: [{point: {position: [%.17g, 5, -3]}}]\n"
+                      "objects:\n  - sphere: {center: [%.17g, 0.75, 0.5], radius: 0.75}\n"
+                      "  - plane: {point: [%.17g, 0, 0], normal: [0, 1, 0], material: {checker: {colors: "
+                      "[[1, 1, 1], [0, 0, 0]], size: 0.5}}}\n",
+                      far + 0.25, far + 0.25, far + 2, far + 0.5, far));
         films[i] = render(&scene, 64, 48, PRECISION_SINGLE, AOV_T | AOV_SHADOW | AOV_OBJECT);
         scene_free(&scene);
     }
@@ -530,13 +524,10 @@ TEST_AT_EACH_PRECISION(plates_far_away)
                                   ("cylinder: {from: [0, -2e7, -2e7], to: [0, -20000000.5, -20000000.5], "
                                    "radius: 1e6}")};
     for (size_t i = 0; i < COUNT_OF(shapes); i++) {
-        Text text = {0};
-        text_appendf(&text,
-                     "camera: {position: [0, 0, 0], look_at: [0, %d, -1], fov: 10}\nbackground: [0.25, 0.25, "
-                     "0.25]\nambient: [1, 1, 1]\nobjects:\n  - %s\n",
-                     i == 2 ? -1 : 0, shapes[i]);
-        Scene scene = scene_of(text_c(&text));
-        text_free(&text);
+        Scene scene = scene_of(formatted(
+            "camera: {position: [0, 0, 0], look_at: [0, %d, -1], fov: 10}\nbackground: [0.25, 0.25, "
+            "0.25]\nambient: [1, 1, 1]\nobjects:\n  - %s\n",
+            i == 2 ? -1 : 0, shapes[i]));
         Film film = render(&scene, 15, 15, precision, AOV_OBJECT);
         check(film.object[7 * 15 + 7] == 0);
         check(film.object[0] == UINT32_MAX && film.object[14 * 15 + 7] == UINT32_MAX);
@@ -551,16 +542,13 @@ static const Vector3 skew_axis = {2 / 7.0, -3 / 7.0, 6 / 7.0}, skew_across = {6 
 // Returns a film of an object that lies in the direction of -skew_across and fills the view.
 static Film render_next_to_eye(const char *object, Precision precision)
 {
-    Text text = {0};
-    text_appendf(&text,
-                 "camera: {position: [0, 0, 0], look_at: [%.17g, %.17g, %.17g], fov: 40}\nobjects:\n  - %s\n",
-                 -skew_across.x, -skew_across.y, -skew_across.z, object);
-    Scene scene = scene_of(text_c(&text));
+    Scene scene = scene_of(formatted(
+        "camera: {position: [0, 0, 0], look_at: [%.17g, %.17g, %.17g], fov: 40}\nobjects:\n  - %s\n",
+        -skew_across.x, -skew_across.y, -skew_across.z, object));
     Film film = render(&scene, 32, 24, precision, AOV_POSITION | AOV_NORMAL | AOV_OBJECT);
     for (size_t i = 0; i < film_pixel_count(&film); i++)
         check(film.object[i] == 0);
     scene_free(&scene);
-    text_free(&text);
     return film;
 }
 

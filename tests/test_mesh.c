@@ -32,10 +32,7 @@ static int meshes_close(void **state)
 // Returns a scene whose only objects are `objects`, one per line.
 static Scene scene_of_objects(const char *objects)
 {
-    Text text = {0};
-    text_appendf(&text, CAMERA_AND_LIGHT "objects:\n%s", objects);
-    Scene scene = scene_of_text("scene.yaml", text_c(&text));
-    text_free(&text);
+    Scene scene = scene_of_text("scene.yaml", formatted(CAMERA_AND_LIGHT "objects:\n%s", objects));
     return scene;
 }
 
@@ -230,9 +227,7 @@ TEST(what_no_face_uses_does_not_count)
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, cases[i].text);
-        Text objects = {0};
-        text_appendf(&objects, "  - mesh: {file: %s}\n", cases[i].name);
-        Scene scene = scene_of_objects(text_c(&objects));
+        Scene scene = scene_of_objects(formatted("  - mesh: {file: %s}\n", cases[i].name));
         assert_int_equal(scene.meshes.items[0].triangle_count, 1);
         assert_int_equal(scene.meshes.items[0].vertex_count, 3);
         size_t unbounded_count;
@@ -240,7 +235,6 @@ TEST(what_no_face_uses_does_not_count)
         assert_vector(bounds.min, 0, 0, 0);
         assert_vector(bounds.max, 1, 1, 0);
         scene_free(&scene);
-        text_free(&objects);
     }
 }
 
@@ -321,34 +315,24 @@ TEST(faults_name_file_and_vertex)
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         file_write(cases[i].name, cases[i].text);
-        Text scene = {0}, expected = {0};
-        text_appendf(&scene, CAMERA_AND_LIGHT "objects:\n  - mesh: {file: %s}\n", cases[i].name);
-        text_appendf(&expected, "%s\n", cases[i].message);
-        assert_messages("scene.yaml", text_c(&scene), text_c(&expected));
-        text_free(&scene);
-        text_free(&expected);
+        assert_messages("scene.yaml",
+                        formatted(CAMERA_AND_LIGHT "objects:\n  - mesh: {file: %s}\n", cases[i].name),
+                        formatted("%s\n", cases[i].message));
     }
 }
 
 static void assert_file_refused(const char *name, const char *reason)
 {
-    Text scene = {0}, expected = {0};
-    text_appendf(&scene, CAMERA_AND_LIGHT "objects:\n  - mesh: {file: %s}\n", name);
-    text_appendf(&expected, "4:18: error: %s: %s\n", name, reason);
-    assert_messages("scene.yaml", text_c(&scene), text_c(&expected));
-    text_free(&scene);
-    text_free(&expected);
+    assert_messages("scene.yaml", formatted(CAMERA_AND_LIGHT "objects:\n  - mesh: {file: %s}\n", name),
+                    formatted("4:18: error: %s: %s\n", name, reason));
 }
 
 TEST(other_formats_are_read)
 {
     static const char *const endings[] = {"fbx", "dae", "3ds", "off"};
     for (size_t i = 0; i < COUNT_OF(endings); i++) {
-        Text object = {0};
-        text_appendf(&object, "  - mesh: {file: %s/triangle.%s}\n", corpus, endings[i]);
-        Scene scene = scene_of_objects(text_c(&object));
+        Scene scene = scene_of_objects(formatted("  - mesh: {file: %s/triangle.%s}\n", corpus, endings[i]));
         assert_int_equal(scene.meshes.items[0].triangle_count, 1);
-        text_free(&object);
         scene_free(&scene);
     }
 }

@@ -30,12 +30,11 @@ static CompiledScene compile(const Scene *scene, Precision precision)
 
 static CompiledScene compile_text(const char *objects, Precision precision)
 {
-    Text text = {0};
-    text_appendf(&text, "camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\nobjects:\n%s", objects);
-    Scene scene = scene_of_text("next.yaml", text_c(&text));
+    Scene scene = scene_of_text(
+        "next.yaml",
+        formatted("camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\nobjects:\n%s", objects));
     CompiledScene compiled = compile(&scene, precision);
     scene_free(&scene);
-    text_free(&text);
     return compiled;
 }
 
@@ -110,18 +109,15 @@ TEST(a_plane_goes_through_its_nearest_point)
 TEST(explicit_rays_see_a_plane_through_its_own_point)
 {
     const double point[3] = {-7351234.1, 1534783.4, 1735961.9};
-    Text text = {0};
-    text_appendf(&text,
-                 "camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\n"
-                 "objects:\n  - plane: {point: [%.17g, %.17g, %.17g], normal: [1, 2, 3]}\n",
-                 point[0], point[1], point[2]);
-    Scene scene = scene_of_text("far.yaml", text_c(&text));
+    Scene scene = scene_of_text(
+        "far.yaml", formatted("camera: {position: [0, 1.75, 0], look_at: [0, 0, 4]}\n"
+                              "objects:\n  - plane: {point: [%.17g, %.17g, %.17g], normal: [1, 2, 3]}\n",
+                              point[0], point[1], point[2]));
     CompiledScene compiled = compile_for(&scene, PRECISION_DOUBLE, false);
     const Plane *plane = first(&compiled, TYPE_PLANES);
     assert_true(plane->point.x == point[0] && plane->point.y == point[1] && plane->point.z == point[2]);
     compiled_scene_free(&compiled);
     scene_free(&scene);
-    text_free(&text);
 }
 
 // The stored height and normal are those of the triangle before its vertices are rounded, also in double,

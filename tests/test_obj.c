@@ -80,11 +80,7 @@ TEST(layouts_are_read)
     };
     for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
-            static const char *const line_ends[] = {"\n", "\r\n", "\r"};
-            Text text = {0};
-            for (const char *at = texts[i]; *at; at++)
-                text_append(&text, *at == '\n' ? line_ends[ends] : at,
-                            *at == '\n' ? strlen(line_ends[ends]) : 1);
+            Text text = text_with_line_ends(texts[i], ends);
             assert_unit_square(text_c(&text));
             text_free(&text);
         }
@@ -165,10 +161,8 @@ TEST(opacity_is_dissolve)
     };
     file_write("a.ppm", "P3 1 1 255 255 0 0\n");
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        Text mtl = {0};
-        text_appendf(&mtl, "newmtl red\nKd 0.5 0 0\nKs 0.5\nNi 1.5\n%smap_Kd a.ppm\n", cases[i].lines);
-        file_write("a.mtl", text_c(&mtl));
-        text_free(&mtl);
+        file_write("a.mtl",
+                   formatted("newmtl red\nKd 0.5 0 0\nKs 0.5\nNi 1.5\n%smap_Kd a.ppm\n", cases[i].lines));
         Scene scene =
             scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", cases[i].expected);
         const Material *red = triangle_material(&scene, 0);
@@ -330,10 +324,7 @@ TEST(images_of_materials_are_used)
          "a.mtl:3:6: warning: a second map of normals or heights: it replaces the first\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        Text mtl = {0};
-        text_appendf(&mtl, "newmtl red\n%s", cases[i].mtl);
-        file_write("a.mtl", text_c(&mtl));
-        text_free(&mtl);
+        file_write("a.mtl", formatted("newmtl red\n%s", cases[i].mtl));
         scene =
             scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n", cases[i].expected);
         assert_int_equal(scene.textures.count, strstr(cases[i].mtl, "a.ppm") != NULL);
@@ -348,14 +339,12 @@ TEST(bumps_are_normals)
     const char *ramp = "P3 5 1 255 0 0 0 51 51 51 102 102 102 51 51 51 0 0 0\n",
                *colors = "P3 2 1 255 0 51 102 153 204 255\n";
     for (int i = 0; i < 4; i++) {
-        Text mtl = {0};
         const bool is_ramp = i < 2;
         file_write("a.ppm", is_ramp ? ramp : colors);
-        text_appendf(&mtl, "newmtl red\n%s%s -bm -2.5 a.ppm\n", i == 3 ? "bump -bm 9 a.ppm\n" : "",
-                     i % 2    ? "norm"
-                     : i == 0 ? "map_Bump"
-                              : "bump");
-        file_write("a.mtl", text_c(&mtl));
+        file_write("a.mtl", formatted("newmtl red\n%s%s -bm -2.5 a.ppm\n", i == 3 ? "bump -bm 9 a.ppm\n" : "",
+                                      i % 2    ? "norm"
+                                      : i == 0 ? "map_Bump"
+                                               : "bump"));
         Scene scene = scene_of_obj("mtllib a.mtl\nusemtl red\n" CORNERS "vt 0 0\nf 1/1 2/1 3/1\n",
                                    i == 3 ? "a.mtl:3:6: warning: a second map of normals or heights: it "
                                             "replaces the first\n"
@@ -373,7 +362,6 @@ TEST(bumps_are_normals)
         const Vector3 got = {values[at], values[at + 1], values[at + 2]};
         assert_true(vector_length(vector_subtract(got, expected)) < 1e-6);
         scene_free(&scene);
-        text_free(&mtl);
     }
 }
 

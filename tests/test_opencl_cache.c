@@ -48,12 +48,9 @@ TEST_WITH(test_store_and_load, scratch_set_up, scratch_tear_down)
     assert_false(loads("device x\ntext z"));
     assert_false(loads(""));
 
-    Text path = {0};
-    text_appendf(&path, "%s/glint", scratch);
     struct stat status;
-    assert_int_equal(stat(text_c(&path), &status), 0);
+    assert_int_equal(stat(formatted("%s/glint", scratch), &status), 0);
     assert_int_equal(status.st_mode & 0777, 0700);
-    text_free(&path);
 }
 
 static void entry_set_used(const char *entry_key, time_t when)
@@ -250,8 +247,7 @@ TEST_WITH(test_list, scratch_set_up, scratch_tear_down)
     entry_set_used(described, 1000);
     char *path = cache_entry_path(key);
     // an entry of another version is not a fault
-    Text content = {0};
-    assert_true(text_read_file(&content, path, &messages));
+    Text content = file_text(path);
     content.items[FORMAT_OFFSET]++;
     memset(content.items + FORMAT_END, 0xff, content.count - FORMAT_END); // whatever follows the format
     const size_t lengths[] = {FORMAT_END, content.count};
@@ -344,9 +340,7 @@ TEST_WITH(test_damage, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
-    MessageList messages = {0};
-    Text entry = {0};
-    assert_true(text_read_file(&entry, path, &messages));
+    Text entry = file_text(path);
     assert_true(entry.count > strlen(key) + CODE_LENGTH);
     for (size_t i = 0; i < entry.count; i++) {
         entry.items[i] ^= 0x10;

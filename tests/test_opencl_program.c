@@ -188,9 +188,7 @@ static Text the_entry(char **key)
     entry_path_found = NULL;
     nftw(scratch, find_entry, 16, FTW_PHYS);
     assert_non_null(entry_path_found);
-    Text entry = {0};
-    MessageList messages = {0};
-    assert_true(text_read_file(&entry, entry_path_found, &messages));
+    Text entry = file_text(entry_path_found);
     uint64_t key_length;
     memcpy(&key_length, entry.items + 16, sizeof key_length);
     *key = strndup(entry.items + 64, (size_t)key_length);
@@ -276,9 +274,7 @@ TEST_WITH(test_text_that_does_not_compile, scratch_set_up, scratch_tear_down)
     char *saved = strstr(end.errors, scratch);
     assert_non_null(saved);
     saved[strcspn(saved, "\n")] = '\0';
-    Text text = {0};
-    MessageList messages = {0};
-    assert_true(text_read_file(&text, saved, &messages));
+    Text text = file_text(saved);
     assert_non_null(strstr(text_c(&text), "#line 1 \"features.h\""));
     text_free(&text);
 }

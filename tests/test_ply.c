@@ -40,13 +40,10 @@ static void assert_square(const Text *text)
     scene_free(&scene);
 }
 
-static void assert_refused(const Text *text, const char *message)
+// Checks the only message about a.ply.
+static void assert_refused(const char *message)
 {
-    Text expected = {0};
-    file_write_bytes("a.ply", text->items, text->count);
-    text_appendf(&expected, "%s\n", message);
-    assert_messages("scene.yaml", SCENE, text_c(&expected));
-    text_free(&expected);
+    assert_messages("scene.yaml", SCENE, formatted("%s\n", message));
 }
 
 TEST(ascii_layouts_are_read)
@@ -75,11 +72,7 @@ TEST(ascii_layouts_are_read)
     };
     for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
-            static const char *const line_ends[] = {"\n", "\r\n", "\r"};
-            Text text = {0};
-            for (const char *at = texts[i]; *at; at++)
-                text_append(&text, *at == '\n' ? line_ends[ends] : at,
-                            *at == '\n' ? strlen(line_ends[ends]) : 1);
+            Text text = text_with_line_ends(texts[i], ends);
             assert_square(&text);
             text_free(&text);
         }
@@ -201,10 +194,8 @@ TEST(faults_name_line_and_row)
         {"", "1:1: error: not a PLY file, which starts with a line 'ply'"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
-        Text text = {0};
-        text_appendf(&text, "%s", cases[i].text);
-        assert_refused(&text, cases[i].message);
-        text_free(&text);
+        file_write("a.ply", cases[i].text);
+        assert_refused(cases[i].message);
     }
 }
 
@@ -244,14 +235,12 @@ TEST(binary_faults_name_byte_and_row)
                  {2, 1e300, 7, "1e+300"}};
     for (size_t i = 0; i < COUNT_OF(cases); i++) {
         const Type *type = &types[cases[i].type];
-        Text text = binary_with_count(headers[cases[i].header], cases[i].count, type), message = {0};
-        text_appendf(&message,
-                     "4:18: error: a.ply: byte %zu: face 1 (from 0) declares %s numbers of 'vertex_indices', "
-                     "the file has 3 more",
-                     text.count - type->size - 12, cases[i].promise);
-        assert_refused(&text, text_c(&message));
+        Text text = binary_with_count(headers[cases[i].header], cases[i].count, type);
+        file_write_bytes("a.ply", text.items, text.count);
+        assert_refused(formatted("4:18: error: a.ply: byte %zu: face 1 (from 0) declares %s numbers of "
+                                 "'vertex_indices', the file has 3 more",
+                                 text.count - type->size - 12, cases[i].promise));
         text_free(&text);
-        text_free(&message);
     }
 }
 
@@ -261,23 +250,17 @@ TEST(binary_file_cut_short_is_refused)
     Text whole = binary_with_count(BINARY("uchar"), 3, &types[1]);
     assert_square(&whole);
     for (size_t size = strlen(BINARY("uchar")); size < whole.count; size++) {
-        Text cut = {0};
-        text_append(&cut, text_c(&whole), size);
-        file_write_bytes("a.ply", cut.items, cut.count);
+        file_write_bytes("a.ply", whole.items, size);
         Text messages = scene_messages("scene.yaml", SCENE, false);
         assert_non_null(strstr(text_c(&messages), "4:18: error: a.ply: byte "));
         text_free(&messages);
-        text_free(&cut);
     }
     text_free(&whole);
 }
 
 static Scene scene_of_ply(const char *ply, const char *expected)
 {
-    Text text = {0};
-    text_appendf(&text, "%s", ply);
-    file_write_bytes("a.ply", text.items, text.count);
-    text_free(&text);
+    file_write("a.ply", ply);
     assert_messages("scene.yaml", SCENE, expected);
     return scene_of_text("scene.yaml", SCENE);
 }
@@ -331,11 +314,9 @@ TEST(what_is_not_used_is_reported)
 
 TEST(vertices_without_a_coordinate_are_refused)
 {
-    Text text = {0};
-    text_appendf(&text,
-                 ASCII "element vertex 1\nproperty float x\nproperty float z\n" FACES END "0 0\n" TRIANGLES);
-    assert_refused(&text, "3:9: error: the vertices have no 'y'");
-    text_free(&text);
+    file_write("a.ply",
+               ASCII "element vertex 1\nproperty float x\nproperty float z\n" FACES END "0 0\n" TRIANGLES);
+    assert_refused("3:9: error: the vertices have no 'y'");
 }
 
 TEST_MAIN(folder_open, folder_close)

@@ -9,14 +9,11 @@
 
 static Bounds bounds_of(const char *objects, size_t expected_unbounded_count)
 {
-    Text text = {0};
-    text_appendf(&text, CAMERA "%s", objects);
-    Scene scene = scene_of_text("s.yaml", text_c(&text));
+    Scene scene = scene_of_text("s.yaml", formatted(CAMERA "%s", objects));
     size_t unbounded_count;
     Bounds bounds = scene_bounds(&scene, &unbounded_count);
     assert_int_equal(unbounded_count, expected_unbounded_count);
     scene_free(&scene);
-    text_free(&text);
     return bounds;
 }
 

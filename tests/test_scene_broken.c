@@ -3,6 +3,7 @@
 #include "host/base/array.h"
 #include "host/import/load.h"
 #include "tests/check.h"
+#include "tests/files.h"
 #include "tests/scene_reading.h"
 
 #include <ctype.h>
@@ -14,15 +15,6 @@
 enum { BROKEN_SCENES_MIN = 30, SETS_MAX = 40 };
 
 static Text all_expected;
-
-static Text file_text(const char *path)
-{
-    Text text = {0};
-    MessageList messages = {0};
-    if (!text_read_file(&text, path, &messages)) message_list_print(&messages, stderr);
-    assert_int_equal(messages.count, 0);
-    return text;
-}
 
 // A section of a table (tests/broken).
 typedef struct {
@@ -199,10 +191,7 @@ static size_t check_sources(const char *folder)
     for (const struct dirent *entry; (entry = readdir(entries));) {
         const char *ending = strrchr(entry->d_name, '.');
         if (!ending || strcmp(ending, ".c") != 0) continue;
-        Text path = {0};
-        text_appendf(&path, "%s/%s", folder, entry->d_name);
-        count += check_source(text_c(&path));
-        text_free(&path);
+        count += check_source(formatted("%s/%s", folder, entry->d_name));
     }
     closedir(entries);
     return count;

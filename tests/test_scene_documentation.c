@@ -32,9 +32,8 @@ static void check_examples(void **state)
 {
     const Examples *examples = *state;
     const char *camera_alone = "warning: s.yaml: no objects\nwarning: s.yaml: no lights\n";
-    Text fence = {0}, name = {0};
+    Text fence = {0};
     text_appendf(&fence, "\n```%s\n", examples->language);
-    text_appendf(&name, "s.%s", examples->language);
     size_t count = 0;
     for (const char *at = text_c(&page); (at = strstr(at, text_c(&fence))); count++) {
         at += fence.count;
@@ -42,7 +41,7 @@ static void check_examples(void **state)
         assert_non_null(end);
         Text example = {0};
         text_append(&example, at, (size_t)(end - at) + 1);
-        Text messages = scene_messages(text_c(&name), text_c(&example), false);
+        Text messages = scene_messages(formatted("s.%s", examples->language), text_c(&example), false);
         if (messages.count && strcmp(text_c(&messages), camera_alone) != 0)
             fail_msg("%s%s", text_c(&example), text_c(&messages));
         text_free(&messages);
@@ -50,7 +49,6 @@ static void check_examples(void **state)
     }
     assert_true(count >= examples->count_min && count <= 100);
     text_free(&fence);
-    text_free(&name);
 }
 
 TEST_CASE(test_yaml_examples, check_examples, &(Examples){"yaml", 2})
@@ -62,10 +60,7 @@ TEST(test_every_shape_is_named)
 {
     for (size_t i = 0; i < SHAPE_COUNT; i++) {
         if (i == SHAPE_OVAL) continue; // not in files
-        Text row = {0};
-        text_appendf(&row, "\n| `%s` | ", shape_names[i]);
-        assert_non_null(strstr(text_c(&page), text_c(&row)));
-        text_free(&row);
+        assert_non_null(strstr(text_c(&page), formatted("\n| `%s` | ", shape_names[i])));
     }
 }
 
@@ -90,18 +85,14 @@ TEST(test_names_of_colors)
         count++;
     assert_int_equal(count, 2 * COUNT_OF(colors));
     for (size_t i = 0; i < COUNT_OF(colors); i++) {
-        Text quoted = {0}, text = {0};
-        text_appendf(&quoted, "`%s`", colors[i].name);
-        const char *named = strstr(names, text_c(&quoted));
+        const char *named = strstr(names, formatted("`%s`", colors[i].name));
         assert_true(named && named < end);
-        text_appendf(&text,
-                     "camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nambient: %s\nbackground: '#%s'\n",
-                     colors[i].name, colors[i].hex);
-        Scene scene = scene_of_text("s.yaml", text_c(&text));
+        Scene scene = scene_of_text(
+            "s.yaml",
+            formatted("camera: {position: [0, 0, 5], look_at: [0, 0, 0]}\nambient: %s\nbackground: '#%s'\n",
+                      colors[i].name, colors[i].hex));
         assert_memory_equal(&scene.ambient, &scene.background, sizeof scene.ambient);
         scene_free(&scene);
-        text_free(&text);
-        text_free(&quoted);
     }
 }
 

@@ -148,9 +148,7 @@ TEST(test_tolerated)
 static void check_sides(const char *shape, double reach, bool only_inside)
 {
     const TraceRay rays[] = {{{0, 0, -5}, {0, 0, 1}, 0, INFINITY}, {{0, 0, 0}, {0, 0, 1}, 0, INFINITY}};
-    Text text = {0};
-    text_appendf(&text, LIT MATERIAL "%s\n", shape);
-    Scene scene = scene_of_text("s.nff", text_c(&text));
+    Scene scene = scene_of_text("s.nff", formatted(LIT MATERIAL "%s\n", shape));
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         if (!probe_has(precision)) continue;
         TraceHit hits[2] = {0};
@@ -161,7 +159,6 @@ static void check_sides(const char *shape, double reach, bool only_inside)
         assert_true(fabs(hits[1].t - reach) < 1e-6);
     }
     scene_free(&scene);
-    text_free(&text);
 }
 
 // Rays along the z axis, from outside and from inside. What is seen only from inside is hit at its far side

@@ -186,21 +186,18 @@ static const Ground grounds[] = {
 // of a degree high.
 static void keeps_small_shadows_on(const Ground *ground)
 {
-    Text text = {0};
-    text_appendf(&text,
-                 "camera: {position: [0, 2, 0], look_at: [0, 1, 2], fov: 60}\n"
-                 "lights:\n"
-                 "  - directional: {direction: [0.5, -0.75, 0.5], intensity: 0.5}\n"
-                 "  - directional: {direction: [-1, -0.001, 0.25], intensity: 0.5}\n"
-                 "  - point: {position: [1, 4, 1], intensity: 0.5}\n"
-                 "objects:\n"
-                 "  - %s\n"
-                 "  - sphere: {center: [-0.25, 0.0625, 2], radius: 0.01}\n"
-                 "  - sphere: {center: [0.25, 0.0625, 2.5], radius: 0.03125}\n"
-                 "  - sphere: {center: [0, 0.25, 4], radius: 0.25}\n",
-                 ground->shape);
-    Scene scene = scene_of_text("ground.yaml", text_c(&text));
-    text_free(&text);
+    Scene scene = scene_of_text("ground.yaml",
+                                formatted("camera: {position: [0, 2, 0], look_at: [0, 1, 2], fov: 60}\n"
+                                          "lights:\n"
+                                          "  - directional: {direction: [0.5, -0.75, 0.5], intensity: 0.5}\n"
+                                          "  - directional: {direction: [-1, -0.001, 0.25], intensity: 0.5}\n"
+                                          "  - point: {position: [1, 4, 1], intensity: 0.5}\n"
+                                          "objects:\n"
+                                          "  - %s\n"
+                                          "  - sphere: {center: [-0.25, 0.0625, 2], radius: 0.01}\n"
+                                          "  - sphere: {center: [0.25, 0.0625, 2.5], radius: 0.03125}\n"
+                                          "  - sphere: {center: [0, 0.25, 4], radius: 0.25}\n",
+                                          ground->shape));
     for (Precision precision = ground->from; precision < ARITHMETIC_COUNT; precision++) {
         if (precision < probe_sound_from() || !probe_has(precision)) continue;
         compare_with_reference(&scene, film_settings(128, 96, precision), ground->error, ground->name);

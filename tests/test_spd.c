@@ -51,10 +51,7 @@ static void glass_reflect(Scene *scene)
 // including the camera ray.
 static void rays_count(const char *name, uint64_t counts[COLUMN_COUNT])
 {
-    Text path = {0};
-    text_appendf(&path, SPD "/%s.nff", name);
-    Scene scene = scene_of_file(text_c(&path));
-    text_free(&path);
+    Scene scene = scene_of_file(formatted(SPD "/%s.nff", name));
     glass_reflect(&scene);
     scene.camera.half_tangent *= 513.0 / 512;
     RenderSettings settings = film_settings(513, 513, PRECISION_SINGLE);

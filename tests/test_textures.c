@@ -60,21 +60,16 @@ static void texture_write(const TestTexture *texture)
 }
 
 // Returns a scene that shows colors as they are, with one object whose material has the texture.
-static Text scene_text(const char *camera, const char *object)
+static const char *scene_text(const char *camera, const char *object)
 {
-    Text text = {0};
-    text_appendf(&text, "camera: {%s}\nambient: [1, 1, 1]\nmaterials: {texture: {image: %s, size: 2}}\n",
-                 camera, texture_path);
-    text_appendf(&text, "objects: [{%s material: texture}}]\n", object);
-    return text;
+    return formatted("camera: {%s}\nambient: [1, 1, 1]\nmaterials: {texture: {image: %s, size: 2}}\n"
+                     "objects: [{%s material: texture}}]\n",
+                     camera, texture_path, object);
 }
 
 static Scene scene_make(const char *camera, const char *object)
 {
-    Text text = scene_text(camera, object);
-    Scene scene = scene_of_text("s.yaml", text_c(&text));
-    text_free(&text);
-    return scene;
+    return scene_of_text("s.yaml", scene_text(camera, object));
 }
 
 // Checks the color along the camera's axis by one ray.
@@ -393,18 +388,15 @@ TEST(opaque_images_cut_nothing)
 {
     static const char *const images[] = {"scenes/images/globe.png", "tests/textures/leaf.png"};
     for (size_t i = 0; i < 2; i++) {
-        Text text = {0};
-        text_appendf(&text,
-                     "camera: {%s}\nlights: [{point: {position: [0, 5, 5]}}]\n"
-                     "objects: [{%s material: {image: %s, cutout: 0.5}}}]\n",
-                     FROM(0, 0, 5), BALL, images[i]);
-        Scene scene = scene_of_text("s.yaml", text_c(&text));
+        const char *text = formatted("camera: {%s}\nlights: [{point: {position: [0, 5, 5]}}]\n"
+                                     "objects: [{%s material: {image: %s, cutout: 0.5}}}]\n",
+                                     FROM(0, 0, 5), BALL, images[i]);
+        Scene scene = scene_of_text("s.yaml", text);
         assert_int_equal((features_of(&scene) & FEATURE_CUTOUTS) != 0, i == 1);
-        assert_messages("s.yaml", text_c(&text),
+        assert_messages("s.yaml", text,
                         i == 1 ? ""
                                : "3:69: warning: the alpha of 'scenes/images/globe.png' is 1 everywhere: "
                                  "nothing is cut out\n");
-        text_free(&text);
         scene_free(&scene);
     }
 }
@@ -416,21 +408,18 @@ static void check_shade(const char *camera, const char *object, const char *more
 {
     TestTexture texture = {1, 1, {{texel[0], texel[1], texel[2]}}};
     texture_write(&texture);
-    Text text = {0};
-    text_appendf(&text,
-                 "camera: {%s}\nlights: [{directional: {direction: %s}}]\n"
-                 "define: {square: {objects: [{mesh: {file: tests/textures/quad.obj}}]}}\n"
-                 "objects: [{%s material: {ambient: 0, normal_map: %s%s}}}]\n",
-                 camera, light, object, texture_path, more);
-    Scene scene = scene_of_text("s.yaml", text_c(&text));
+    const char *text = formatted("camera: {%s}\nlights: [{directional: {direction: %s}}]\n"
+                                 "define: {square: {objects: [{mesh: {file: tests/textures/quad.obj}}]}}\n"
+                                 "objects: [{%s material: {ambient: 0, normal_map: %s%s}}}]\n",
+                                 camera, light, object, texture_path, more);
+    Scene scene = scene_of_text("s.yaml", text);
     RenderSettings settings = film_settings(1, 1, PRECISION_STRICT);
     settings.instances = INSTANCES_SHARED;
     Film film = film_render(&probe_compute, &scene, &settings, 0);
     if (!(fabs(film.color[0] - expected) < 4e-7))
-        fail_msg("%s: the shade is %.9g, not %.9g", text_c(&text), film.color[0], expected);
+        fail_msg("%s: the shade is %.9g, not %.9g", text, film.color[0], expected);
     film_free(&film);
     scene_free(&scene);
-    text_free(&text);
 }
 
 #define SQUARE "mesh: {file: tests/textures/quad.obj,"
@@ -474,24 +463,20 @@ TEST(flat_normal_maps_change_nothing)
     texture_write(&texture);
     Film films[2];
     for (int i = 0; i < 2; i++) {
-        Text text = {0}, map = {0};
-        if (i == 1) text_appendf(&map, ", normal_map: %s, normal_strength: 3", texture_path);
-        text_appendf(&text,
-                     "camera: {position: [0, 1, 5], look_at: [0, 0, 0]}\n"
-                     "lights: [{point: {position: [2, 3, 4]}}]\n"
-                     "materials: {shiny: {specular: 0.5, reflection: 0.3%s}}\n"
-                     "objects:\n  - sphere: {center: [1, 0, 0], radius: 1, material: shiny}\n"
-                     "  - plane: {point: [0, -1, 0], normal: [0.1, 1, 0], material: shiny}\n"
-                     "  - mesh: {file: tests/textures/quad.obj, material: shiny, transform: "
-                     "{rotate: [0, 30, 0], translate: [-1, 0, -1]}}\n",
-                     map.count > 0 ? text_c(&map) : "");
-        Scene scene = scene_of_text("s.yaml", text_c(&text));
+        const char *map = i == 1 ? formatted(", normal_map: %s, normal_strength: 3", texture_path) : "";
+        Scene scene = scene_of_text(
+            "s.yaml", formatted("camera: {position: [0, 1, 5], look_at: [0, 0, 0]}\n"
+                                "lights: [{point: {position: [2, 3, 4]}}]\n"
+                                "materials: {shiny: {specular: 0.5, reflection: 0.3%s}}\n"
+                                "objects:\n  - sphere: {center: [1, 0, 0], radius: 1, material: shiny}\n"
+                                "  - plane: {point: [0, -1, 0], normal: [0.1, 1, 0], material: shiny}\n"
+                                "  - mesh: {file: tests/textures/quad.obj, material: shiny, transform: "
+                                "{rotate: [0, 30, 0], translate: [-1, 0, -1]}}\n",
+                                map));
         assert_int_equal((features_of(&scene) & FEATURE_NORMAL_MAPS) != 0, i == 1);
         const RenderSettings settings = film_settings(64, 48, PRECISION_STRICT);
         films[i] = film_render(&probe_compute, &scene, &settings, 0);
         scene_free(&scene);
-        text_free(&text);
-        text_free(&map);
     }
     film_assert_same(&films[1], &films[0], "a flat normal map");
     film_free(&films[0]);
@@ -570,11 +555,10 @@ TEST(scene_faults_are_reported)
 // Checks the message about the texture, at its place in the scene file.
 static void check_refused(const char *expected)
 {
-    Text text = scene_text(FROM(0, 0, 5), BALL), described = scene_messages("s.yaml", text_c(&text), false);
+    Text described = scene_messages("s.yaml", scene_text(FROM(0, 0, 5), BALL), false);
     if (!strstr(text_c(&described), expected) || strncmp(text_c(&described), "3:30: error: ", 13) != 0)
         fail_msg("%s lacks %s", text_c(&described), expected);
     text_free(&described);
-    text_free(&text);
 }
 
 TEST(texture_faults_are_reported)
@@ -596,17 +580,15 @@ TEST(textures_are_shared)
 {
     const TestTexture texture = texture_make(3, 2);
     texture_write(&texture);
-    Text text = {0};
-    text_appendf(&text,
-                 MATERIALS "  a: {image: globe.png}\n  b: {image: ../images/globe.png}\n"
-                           "  c: {image: globe.png}\n  d: {image: %s}\n",
-                 texture_path);
-    Scene scene = scene_of_text("scenes/images/s.yaml", text_c(&text));
+    Scene scene =
+        scene_of_text("scenes/images/s.yaml",
+                      formatted(MATERIALS "  a: {image: globe.png}\n  b: {image: ../images/globe.png}\n"
+                                          "  c: {image: globe.png}\n  d: {image: %s}\n",
+                                texture_path));
     assert_int_equal(scene.textures.count, 3);
     assert_string_equal(scene.textures.items[0].path, "scenes/images/globe.png");
     assert_string_equal(scene.textures.items[2].path, texture_path);
     assert_int_equal(scene.materials.items[2].image.texture, 1);
-    text_free(&text);
     scene_free(&scene);
 }
 
