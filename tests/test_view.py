@@ -5,27 +5,15 @@ bits that glint render writes with the camera that is printed.
 Nothing here depends on time: a test waits until glint has printed or shown what it must.
 """
 import os
-import queue
 import random
 import re
 import shutil
 import signal
-import struct
-import subprocess
-import tempfile
-import threading
-import time
 from pathlib import Path
 
-from glint import IS_LONG, PROGRAM, ROOT, TestCase, main, need_device, npy_read, png_read, run, shim_build, skip_all, write
+from glint import IS_LONG, ROOT, TestCase, main, need_device, npy_read, png_read, read, run, shim_build, skip_all, write
+from window import DEADLINE, HEIGHT, SAMPLES, SCENE, WIDTH, Window, display_open, png_rows, screen, wait_until, windows_shown, xdotool
 
-SCENE = """\
-camera: {position: [0.5, 1, -4], look_at: [0, 0, 0], fov: 50}
-background: [0.125, 0.25, 0.5]
-lights: [{point: {position: [3, 4, -5]}}]
-objects:
-  - mesh: {file: mesh.obj, material: {color: [0.9, 0.8, 0.7]}}
-"""
 FRAMES = 8
 ANIMATION = f"frames: {FRAMES}\n" + SCENE.replace("[0.5, 1, -4]", "{keys: {0: [0.5, 1, -4], 7: [2, 1, -3]}}").replace(
     "[0.9, 0.8, 0.7]", "{keys: {0: [0.9, 0.8, 0.7], 7: [0.1, 0.5, 0.9]}}")
@@ -38,236 +26,6 @@ f 1 2 3
 f 1 3 4
 f 4 2 1
 """
-# Launches fail while a file `fails` exists. Files cannot be watched if there is one `unwatched`, folders if `folders`.
-FAILING_CALLS = """\
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <errno.h>
-#include <stddef.h>
-#include <unistd.h>
-int clEnqueueNDRangeKernel(void *queue, void *kernel, unsigned dimensions, const size_t *offset, const size_t *items,
-                           const size_t *group, unsigned count, const void *events, void *event)
-{
-    int (*launch)(void *, void *, unsigned, const size_t *, const size_t *, const size_t *, unsigned, const void *,
-                  void *) = dlsym(RTLD_NEXT, "clEnqueueNDRangeKernel");
-    if (access("fails", F_OK) == 0) return -5;
-    return launch(queue, kernel, dimensions, offset, items, group, count, events, event);
-}
-int inotify_init1(int flags)
-{
-    int (*init)(int) = dlsym(RTLD_NEXT, "inotify_init1");
-    if (access("unwatched", F_OK) != 0) return init(flags);
-    errno = EMFILE;
-    return -1;
-}
-int inotify_add_watch(int notify, const char *folder, unsigned events)
-{
-    int (*add)(int, const char *, unsigned) = dlsym(RTLD_NEXT, "inotify_add_watch");
-    if (access("folders", F_OK) != 0) return add(notify, folder, events);
-    errno = ENOSPC;
-    return -1;
-}
-"""
-WIDTH, HEIGHT = 160, 120
-SAMPLES = 3
-DEADLINE = 300  # seconds until a test gives up what it waits for, also on a machine that hardly lets it run
-
-
-def display_open(width=320, height=360):
-    """Starts Xvfb, whose screen is a file in the format of xwd(1), and returns the process.
-
-    By default it resets itself when its last client has gone, and refuses those that come meanwhile.
-    """
-    read, write_end = os.pipe()
-    folder = os.environ["VIEW_FOLDER"]
-    command = ["Xvfb", "-noreset", "-nocursor", "-displayfd", str(write_end), "-screen", "0", f"{width}x{height}x24",
-               "-fbdir", folder]
-    process = subprocess.Popen(command, pass_fds=[write_end], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    os.close(write_end)
-    with os.fdopen(read) as file:
-        number = file.readline().strip()
-    if not number:
-        skip_all("Xvfb does not start")
-    os.environ["DISPLAY"] = f":{number}"
-    return process
-
-
-def screen():
-    """Returns the width of a row in bytes, and the pixels of the display: blue, green, red, and one unused."""
-    data = Path(os.environ["VIEW_FOLDER"], "Xvfb_screen0").read_bytes()
-    head = struct.unpack(">25I", data[:100])
-    size, row, colors = head[0], head[12], head[19]
-    return row, data[size + 12 * colors :]
-
-
-def xdotool(*arguments):
-    return subprocess.run(["xdotool", *map(str, arguments)], check=True, capture_output=True, text=True).stdout
-
-
-def windows_shown(process):
-    """Returns the windows that the process shows."""
-    command = ["xdotool", "search", "--onlyvisible", "--pid", str(process)]
-    return subprocess.run(command, check=False, capture_output=True, text=True).stdout.split()
-
-
-def wait_until(condition, otherwise):
-    """Waits until the condition holds, and leaves the machine to glint between checks."""
-    end = time.monotonic() + DEADLINE
-    while not condition():
-        if time.monotonic() > end:
-            raise AssertionError(otherwise)
-        time.sleep(0.01)
-
-
-def png_rows(path):
-    """Returns rows of RGB of an 8-bit image, unfiltered."""
-    (width, height, _, _), data, _, _ = png_read(path)
-    stride, rows, above = 3 * width, [], bytes(3 * width)
-    for y in range(height):
-        kind, line = data[y * (stride + 1)], bytearray(data[y * (stride + 1) + 1 : (y + 1) * (stride + 1)])
-        for x in range(stride):
-            left = line[x - 3] if x >= 3 else 0
-            corner = above[x - 3] if x >= 3 else 0
-            guess = left + above[x] - corner
-            paeth = min((abs(guess - left), 0, left), (abs(guess - above[x]), 1, above[x]), (abs(guess - corner), 2, corner))
-            line[x] = line[x] + [0, left, above[x], (left + above[x]) // 2, paeth[2]][kind] & 255
-        above = bytes(line)
-        rows.append(above)
-    return rows
-
-
-class Window:
-    """A running glint view, whose lines of output are read as they come."""
-
-    def __init__(self, test, scene="scene.yaml", options="", waits=True, **environment):
-        self.test, self.lines = test, queue.Queue()
-        command = [PROGRAM, "view", scene, "--size", f"{WIDTH}x{HEIGHT}", "--samples", str(SAMPLES), *options.split()]
-        # the libraries that SDL loads and unloads leak
-        sanitizer = os.environ.get("ASAN_OPTIONS", "") + ":detect_leaks=0:verify_asan_link_order=0"
-        variables = os.environ | {
-            "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", "ASAN_OPTIONS": sanitizer, **environment}
-        self.process = subprocess.Popen(
-            command, env=variables, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.reader = threading.Thread(target=self.read, daemon=True)
-        self.reader.start()
-        test.addCleanup(self.kill)
-        self.id = self.shown_at_last()
-        xdotool("windowfocus", "--sync", self.id, "windowmove", self.id, 0, 0)
-        if waits:
-            self.title_at_last(" sample")  # until the scene is loaded, there is no camera
-
-    def shown_at_last(self):
-        """Returns the window's number once it is shown."""
-        end = time.monotonic() + DEADLINE
-        while not (shown := windows_shown(self.process.pid)):
-            if self.process.poll() is not None:
-                self.line("a window")  # fails with what was printed
-            self.test.assertLess(time.monotonic(), end, "no window is shown")
-            time.sleep(0.01)
-        return shown[0]
-
-    def read(self):
-        for line in self.process.stdout:
-            self.lines.put(line)
-        self.lines.put("")
-
-    def kill(self):
-        self.process.kill()
-        self.process.wait()
-        self.reader.join()
-        self.process.stdout.close()
-
-    def line(self, pattern):
-        """Returns the next line that matches."""
-        seen = []
-        while True:
-            try:
-                line = self.lines.get(timeout=DEADLINE)
-            except queue.Empty:
-                self.test.fail(f"glint view has not printed {pattern}: {''.join(seen)}")
-            seen.append(line)
-            if match := re.search(pattern, line):
-                return match
-            if line == "":
-                self.test.fail(f"glint view ended without printing {pattern}: {''.join(seen)}")
-
-    def mouse(self, x, y, *more):
-        xdotool("mousemove", "--window", self.id, x, y, *more)
-
-    def key(self, *keys):
-        xdotool("key", *keys)
-
-    def drag(self, button, start, *path):
-        """Presses a button at the first point, releases it at the last."""
-        moves = [word for point in path for word in ("mousemove", "--window", self.id, *point)]
-        self.mouse(*start, "mousedown", button, *moves, "mouseup", button)
-
-    def camera(self):
-        self.key("c")
-        return self.line("^camera: .*")[0]
-
-    def saved(self, key="s"):
-        """Saves the image once it is complete, and returns the file's name."""
-        self.key(key)
-        return self.line("^saved (.*)$")[1]
-
-    def rendered(self, camera, ending="png", size=None):
-        """Returns the file that glint render writes with the camera."""
-        os.makedirs("rendered", exist_ok=True)
-        shutil.copy("mesh.obj", "rendered")
-        write("rendered/scene.yaml", re.sub("^camera: .*", camera, SCENE))
-        path = f"rendered/image.{ending}"
-        width, height = size or (WIDTH, HEIGHT)
-        self.test.glint(f"render rendered/scene.yaml --size {width}x{height} --samples {SAMPLES} -o {path}")
-        return path
-
-    def check(self, size=None):
-        """Checks that the saved image and the display are what glint render makes of the printed camera, which is returned."""
-        camera = self.camera()
-        path = self.rendered(camera, size=size)
-        self.test.assertSameBytes(self.saved(), path)
-        self.key("x")  # hides the message
-        rows = png_rows(path)
-        self.shows_at_last(rows)
-        return camera
-
-    def pixel(self, x, y):
-        stride, pixels = screen()
-        return tuple(pixels[y * stride + 4 * x + channel] for channel in (2, 1, 0))
-
-    @staticmethod
-    def most_colors_of_a_column(columns, rows):
-        stride, pixels = screen()
-        return max(len({pixels[y * stride + 4 * x : y * stride + 4 * x + 3] for y in rows}) for x in columns)
-
-    def frame(self):
-        """Returns the frame of the animation from the title."""
-        return int(re.search(", frame (.*?) of ", xdotool("getwindowname", self.id))[1])
-
-    def title_at_last(self, text):
-        wait_until(lambda: text in xdotool("getwindowname", self.id), f"the title has no '{text}'")
-
-    def shows_at_last(self, rows):
-        wait_until(lambda: self.shows(rows), "the display does not show the image")
-
-    def shows(self, rows):
-        stride, pixels = screen()
-        for y, row in enumerate(rows):
-            line = pixels[y * stride : y * stride + len(row) // 3 * 4]
-            if (line[2::4], line[1::4], line[0::4]) != (row[0::3], row[1::3], row[2::3]):
-                return False
-        return True
-
-    def says_at_last(self):
-        """Waits until something is shown in white."""
-        wait_until(lambda: b"\xff\xff\xff" in screen()[1], "nothing is said")
-
-    def changes_at_last(self, before):
-        wait_until(lambda: screen() != before, "the display does not change")
-
-    def close(self, status=0):
-        self.key("Escape")
-        self.test.assertEqual(self.process.wait(DEADLINE), status)
 
 
 def numbers(camera, name):
@@ -471,7 +229,7 @@ class View(TestCase):
 
     @staticmethod
     def failing_calls():
-        return shim_build("calls.so", FAILING_CALLS, "-ldl")
+        return shim_build("calls.so", read(ROOT / "tests/shims/calls.c"), "-ldl")
 
     def test_unwatched_files(self):
         """Whoever uses up what the system has for watching files learns that changes are not seen."""
@@ -517,7 +275,7 @@ class View(TestCase):
                 os.mkfifo("slow.yaml")
                 window = Window(self, "slow.yaml", waits=False)
                 window.title_at_last("preparing")
-                window.says_at_last()  # what is read
+                window.message_at_last()  # what is read
                 if closes:
                     window.key("Escape")
                     wait_until(lambda: not windows_shown(window.process.pid), "the window is still shown")
@@ -540,17 +298,14 @@ class View(TestCase):
         return png_rows("expected.png")
 
     def test_views_and_precisions(self):
-        """Views have titles, and their colors at the corner, which sees the background, and at the center."""
-        window = Window(self)
-        for view, corner in (("color", None), ("depth", (0, 0, 0)), ("normal", (0, 0, 0)), ("object", (0, 0, 0)),
-                             ("shadow", (0, 0, 0)), ("error against double", (0, 0, 0))):
+        """Views have titles. Those but the color are black at the corner, which sees the background, and not at the center."""
+        window, black = Window(self), (0, 0, 0)
+        for view in "color", "depth", "normal", "object", "shadow", "error against double":
             with self.subTest(view):
                 window.title_at_last(f", {view}, single, ")
-                if corner:
-                    end = time.monotonic() + DEADLINE
-                    while window.pixel(0, 0) != corner or (window.pixel(80, 60) == corner and "error" not in view):
-                        self.assertLess(time.monotonic(), end, (window.pixel(0, 0), window.pixel(80, 60)))
-                        time.sleep(0.01)
+                if view != "color":
+                    wait_until(lambda: window.pixel(0, 0) == black and (window.pixel(80, 60) != black or "error" in view),
+                               "the corner is not black, or the center is")
                 window.key("v")
         for key, precision in ("2", "strict"), ("3", "double"), ("4", "certified"), ("1", "single"):
             with self.subTest(precision):
@@ -639,7 +394,7 @@ class View(TestCase):
         write("scene.yaml", ANIMATION + "# kept\n")
         window = Window(self)
         window.key("k")  # needs --write-camera
-        window.says_at_last()
+        window.message_at_last()
         window.close()
         window = Window(self, options="--write-camera")
         window.key("period", "period")
@@ -764,11 +519,5 @@ if __name__ == "__main__":
     need_device()
     if "built without a window" in run("view scenes/demo.yaml", env={"DISPLAY": ""}).stderr:
         skip_all("glint is built without a window")
-    with tempfile.TemporaryDirectory() as display_folder:
-        os.environ["VIEW_FOLDER"] = display_folder
-        display = display_open()
-        try:
-            main()
-        finally:
-            display.terminate()
-            display.wait()
+    with display_open():
+        main()
