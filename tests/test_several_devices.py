@@ -153,7 +153,7 @@ class SeveralDevices(TestCase):
     def test_makes(self):
         """All makes render one image. Oclgrind, ten thousand times slower than the others, gets a few rows."""
         together = self.makes()
-        command = f"render sphere.yaml {LARGE} --precision strict --no-cache"
+        command = f"render sphere.yaml {LARGE} --precision strict"
         self.glint(f"{command} -o one.npy", **POCL)
         report = self.on_all(command, together)
         self.assertSameBytes("one.npy", "all.npy")
