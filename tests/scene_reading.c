@@ -84,6 +84,17 @@ Scene scene_of_text(const char *name, const char *text)
     return scene;
 }
 
+CompiledScene scene_compiled(const Scene *scene, const CompileSettings *settings)
+{
+    CompiledScene compiled;
+    MessageList messages = {0};
+    const bool done = scene_compile(&compiled, scene, settings, &messages);
+    message_list_print(&messages, stderr);
+    assert_true(done);
+    assert_int_equal(messages.count, 0);
+    return compiled;
+}
+
 Scene complete;
 
 int complete_open(const char *path)

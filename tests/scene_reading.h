@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/base/text.h"
+#include "host/compile/compile.h"
 #include "host/scene/scene.h"
 
 // Reads with the reader for the ending of `name`.
@@ -25,6 +26,9 @@ Text scene_messages(const char *name, const char *text, bool lenient);
 Scene scene_of_file(const char *path);
 // Returns the scene of a text, which may get warnings.
 Scene scene_of_text(const char *name, const char *text);
+
+// Returns the flat arrays of a scene, which must be compiled with no messages.
+CompiledScene scene_compiled(const Scene *scene, const CompileSettings *settings);
 
 // The scene of a file that has all of its format, for the tests of a group.
 extern Scene complete;

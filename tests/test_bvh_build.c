@@ -263,9 +263,7 @@ TEST(planets_stay_outside_the_tree)
                          0.9 * (2.0 * k / (HOUSES - 1) - 1));
         Scene scene = scene_of_text("town.yaml", text_c(&text));
         const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
-        CompiledScene compiled;
-        MessageList messages = {0};
-        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+        CompiledScene compiled = scene_compiled(&scene, &settings);
         assert_int_equal(compiled.bvh_counts[TYPE_SPHERES], HOUSES + skies[i].in_tree);
         // the first two objects, the larger one last
         const ObjectEntry *entries = compiled.arrays[FLAT_OBJECTS].items;
@@ -288,9 +286,7 @@ TEST(points_make_a_tree)
     for (int i = 0; i < POINTS; i++)
         array_push(scene.objects, ((Object){.type = SHAPE_TRIANGLE}));
     const CompileSettings settings = {.width = 9, .height = 9, .sample_count = 1, .lanes = 8};
-    CompiledScene compiled;
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+    CompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.bvh_counts[TYPE_TRIANGLES], POINTS);
     assert_int_equal(compiled.bvh_counts[TYPE_SPHERES], 0);
     compiled_scene_free(&compiled);

@@ -97,11 +97,9 @@ enum { TRIAL_COUNT = COUNT_OF(trials) };
 
 static Bounds contact_of(const Scene *scene)
 {
-    CompiledScene compiled;
     const CompileSettings settings = {
         .width = 1, .height = 1, .sample_count = 1, .extra_features = FEATURE_TRANSMISSION};
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, scene, &settings, &messages));
+    CompiledScene compiled = scene_compiled(scene, &settings);
     const SceneHeader *header = compiled.arrays[FLAT_HEADER].items;
     Bounds contact = {vector3_of(&header->contact_low), vector3_of(&header->contact_high)};
     compiled_scene_free(&compiled);

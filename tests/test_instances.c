@@ -363,18 +363,9 @@ static const CompileSettings plain_settings = {.width = 1,
                                                .lanes = 16,
                                                .shift_to_eye = true};
 
-static CompiledScene compiled_make(const Scene *scene, const CompileSettings *settings)
-{
-    CompiledScene compiled;
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, scene, settings, &messages));
-    assert_int_equal(messages.count, 0);
-    return compiled;
-}
-
 static size_t instance_count(const Scene *scene, const CompileSettings *settings)
 {
-    CompiledScene compiled = compiled_make(scene, settings);
+    CompiledScene compiled = scene_compiled(scene, settings);
     const size_t count = compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count;
     compiled_scene_free(&compiled);
     return count;
@@ -403,7 +394,7 @@ TEST(an_uneven_transform_makes_a_copy)
                        INSTANCE("flat", "{scale: [1, 0.01, 1]}") INSTANCE("flat", "{rotate: [0, 0, 45]}"));
     CompileSettings settings = plain_settings;
     settings.instances = INSTANCES_SHARED;
-    CompiledScene compiled = compiled_make(&scene, &settings);
+    CompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count, 2);
     assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].count, 2 * TRIANGLES);
     compiled_scene_free(&compiled);
@@ -421,7 +412,7 @@ TEST(materials_share_geometry)
                                                       "        - instance: {of: smooth, material: globe}\n");
     CompileSettings settings = plain_settings;
     settings.instances = INSTANCES_SHARED;
-    CompiledScene compiled = compiled_make(&scene, &settings);
+    CompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.arrays[FLAT_SHARED_MESHES].count, 3);
     compiled_scene_free(&compiled);
     scene_free(&scene);
@@ -481,7 +472,7 @@ TEST(instances_take_little_memory)
     for (uint32_t lanes = 1; lanes <= 16; lanes *= 16) {
         CompileSettings settings = plain_settings;
         settings.lanes = lanes;
-        CompiledScene compiled = compiled_make(&scene, &settings);
+        CompiledScene compiled = scene_compiled(&scene, &settings);
         size_t device = 0, host = 0;
         for (size_t type = 0; type < FLAT_COUNT; type++) {
             device += flat_array_size(&compiled.arrays[type], false);

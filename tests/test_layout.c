@@ -156,7 +156,6 @@ static const char instance_text[] = "camera: {position: [0, 0, -5], look_at: [0,
 static void layouts_of_scene(FlatLayout layouts[FLAT_COUNT], const char *text, bool is_double, bool certifies)
 {
     Scene scene = scene_of_text("layout.yaml", text);
-    CompiledScene compiled;
     const CompileSettings settings = {.width = 1,
                                       .height = 1,
                                       .sample_count = 1,
@@ -166,8 +165,7 @@ static void layouts_of_scene(FlatLayout layouts[FLAT_COUNT], const char *text, b
                                       .lanes = BVH_WIDTH_MIN, // with blocks of triangles
                                       .bvh = BVH_ON,
                                       .shift_to_eye = true};
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+    CompiledScene compiled = scene_compiled(&scene, &settings);
     for (size_t type = 0; type < FLAT_COUNT; type++)
         if (compiled.arrays[type].count > 0) layouts[type] = compiled.arrays[type].layout;
     compiled_scene_free(&compiled);

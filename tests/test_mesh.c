@@ -478,10 +478,8 @@ TEST(ids_count_the_triangles)
                                    "  - mesh: {file: a.obj}\n"
                                    "  - triangle: {vertices: [[0, 0, 5], [1, 0, 5], [0, 1, 5]]}\n"
                                    "  - sphere: {center: [-9, 0, 0], radius: 1}\n");
-    CompiledScene flat;
     const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .bvh = BVH_OFF};
-    MessageList messages = {0};
-    assert_true(scene_compile(&flat, &scene, &settings, &messages));
+    CompiledScene flat = scene_compiled(&scene, &settings);
     assert_int_equal(flat.arrays[FLAT_OBJECTS].count, 11);
     const ObjectEntry *entries = flat.arrays[FLAT_OBJECTS].items;
     for (uint32_t id = 0; id < 11; id++) {

@@ -49,14 +49,6 @@ static const CompileSettings single = {.width = 40,
                                        .lanes = 8,
                                        .shift_to_eye = true};
 
-static CompiledScene compiled_make(const Scene *scene, const CompileSettings *settings)
-{
-    CompiledScene compiled;
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, scene, settings, &messages));
-    return compiled;
-}
-
 static uint4 entry_of(const CompiledScene *compiled, size_t id)
 {
     return ((const ObjectEntry *)compiled->arrays[FLAT_OBJECTS].items)[id].type_index_material;
@@ -196,13 +188,13 @@ TEST(moved_scene_has_the_numbers_of_a_compiled_one)
         CompileSettings settings = single;
         if (is_double) settings.precision = PRECISION_DOUBLE;
         scene.camera = start;
-        CompiledScene moved = compiled_make(&scene, &settings);
+        CompiledScene moved = scene_compiled(&scene, &settings);
         for (size_t i = 0; i < COUNT_OF(eyes); i++) {
             scene.camera.position = eyes[i];
             settings.width += 2;
             MessageList messages = {0};
             assert_true(scene_move(&moved, &scene, &settings, &messages));
-            CompiledScene expected = compiled_make(&scene, &settings);
+            CompiledScene expected = scene_compiled(&scene, &settings);
             check_numbers(&moved, &expected);
             check_bvh(&moved);
             compiled_scene_free(&expected);
@@ -219,7 +211,7 @@ TEST(powers_come_and_go)
         scene_of_text("planet.yaml", "camera: {position: [0, 1e7, 0], look_at: [0, 0, 1]}\n"
                                      "objects:\n"
                                      "  - sphere: {center: [0, -6371000.3, 0], radius: 6371000.3}\n");
-    CompiledScene moved = compiled_make(&scene, &single);
+    CompiledScene moved = scene_compiled(&scene, &single);
     assert_false(moved.features & FEATURE_EYE_POWERS);
     for (int i = 0; i < 4; i++) {
         const bool is_near = i % 2 == 0;
@@ -236,14 +228,14 @@ TEST(powers_come_and_go)
 TEST(turned_camera_changes_the_header_alone)
 {
     Scene scene = scene_of_text("move.yaml", scene_text);
-    CompiledScene compiled = compiled_make(&scene, &single);
+    CompiledScene compiled = scene_compiled(&scene, &single);
     memset(compiled.changed, 0, sizeof compiled.changed);
     scene.camera.look_at = (Vector3){3, 3, 3};
     MessageList messages = {0};
     assert_true(scene_move(&compiled, &scene, &single, &messages));
     for (size_t type = 0; type < FLAT_COUNT; type++)
         assert_int_equal(compiled.changed[type], type == FLAT_HEADER);
-    CompiledScene expected = compiled_make(&scene, &single);
+    CompiledScene expected = scene_compiled(&scene, &single);
     check_array(&compiled, &expected, FLAT_HEADER);
     compiled_scene_free(&expected);
     compiled_scene_free(&compiled);
@@ -257,7 +249,7 @@ TEST(missing_bvh_stays_empty)
     CompileSettings settings = single;
     settings.bvh = BVH_OFF;
     settings.extra_features = FEATURE_BVH;
-    CompiledScene compiled = compiled_make(&scene, &settings), expected = compiled_make(&scene, &settings);
+    CompiledScene compiled = scene_compiled(&scene, &settings), expected = scene_compiled(&scene, &settings);
     scene.camera.position.z -= 1;
     MessageList messages = {0};
     assert_true(scene_move(&compiled, &scene, &settings, &messages));
@@ -272,7 +264,7 @@ TEST(far_eyes)
 {
     Scene scene = scene_of_text("move.yaml", scene_text);
     const Vector3 start = scene.camera.position;
-    CompiledScene compiled = compiled_make(&scene, &single);
+    CompiledScene compiled = scene_compiled(&scene, &single);
     static const double distances[] = {1e11, 1e39, 0};
     for (size_t i = 0; i < COUNT_OF(distances); i++) {
         scene.camera.position = (Vector3){start.x, start.y, start.z - distances[i]};
@@ -282,7 +274,7 @@ TEST(far_eyes)
         assert_int_equal(message_count(&messages, MESSAGE_ERROR), !moved);
         message_list_free(&messages);
         if (!moved) continue;
-        CompiledScene expected = compiled_make(&scene, &single);
+        CompiledScene expected = scene_compiled(&scene, &single);
         assert_true(compiled.unit == expected.unit);
         assert_true((compiled.unit != 1) == (distances[i] == 1e11));
         check_numbers(&compiled, &expected);
@@ -296,7 +288,7 @@ TEST(far_eyes)
 static void check_move_after_failure(const char *text, const Camera *failing, const Camera *next)
 {
     Scene scene = scene_of_text("move.yaml", text);
-    CompiledScene compiled = compiled_make(&scene, &single);
+    CompiledScene compiled = scene_compiled(&scene, &single);
     MessageList messages = {0};
     scene.camera = *failing;
     assert_false(scene_move(&compiled, &scene, &single, &messages));
@@ -304,7 +296,7 @@ static void check_move_after_failure(const char *text, const Camera *failing, co
     message_list_free(&messages);
     scene.camera = *next;
     assert_true(scene_move(&compiled, &scene, &single, &messages));
-    CompiledScene expected = compiled_make(&scene, &single);
+    CompiledScene expected = scene_compiled(&scene, &single);
     check_numbers(&compiled, &expected);
     if (expected.pending_children_max > 0) check_bvh(&compiled);
     compiled_scene_free(&expected);

@@ -16,11 +16,7 @@ static CompiledScene compile_for(const Scene *scene, Precision precision, bool s
                                       .shift_to_eye = shift_to_eye,
                                       .bvh = BVH_OFF,
                                       .lanes = 1};
-    CompiledScene compiled;
-    MessageList messages = {0};
-    assert_true(scene_compile(&compiled, scene, &settings, &messages));
-    message_list_free(&messages);
-    return compiled;
+    return scene_compiled(scene, &settings);
 }
 
 static CompiledScene compile(const Scene *scene, Precision precision)

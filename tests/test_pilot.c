@@ -166,13 +166,11 @@ TEST(scene_bounds_its_colors)
         "0.5]], size: 1},\n"
         "            specular: 100, diffuse: 0.5, reflection: 0.3, transmission: 0.2, shininess: 1.0e15}}\n";
     Scene scene = scene_of_text("a.yaml", text);
-    MessageList messages = {0};
     const double red = 0.1 + 3 * (0.5 + 100), blue = 0.05 + 2 * (0.25 + 100);
     for (uint32_t bounces = 0; bounces < 3; bounces++) {
         const CompileSettings settings = {
             .width = 9, .height = 9, .sample_count = 1, .lanes = 4, .bounce_count = bounces};
-        CompiledScene compiled;
-        assert_true(scene_compile(&compiled, &scene, &settings, &messages));
+        CompiledScene compiled = scene_compiled(&scene, &settings);
         const double halves = 2 - pow(0.5, bounces), largest = scene_color_max(&compiled, &scene, bounces);
         assert_true(blue < red && fabs(largest / (1.01 * red * halves) - 1) < 1e-12);
         compiled_scene_free(&compiled);

@@ -6,6 +6,7 @@
 #include "tests/film.h"
 #include "tests/probe.h"
 #include "tests/random_ray.h"
+#include "tests/scene_reading.h"
 #include <math.h>
 
 enum { RAYS_PER_SHAPE = 2000, SHAPES_IN_SCENE = 40, SHAPES_NEXT_TO_SIDE = 3, SEEDS_NEXT_TO_SIDE = 80 };
@@ -172,8 +173,7 @@ static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, s
 static bool scene_has_eye_powers(const Scene *scene, Precision precision)
 {
     const CompileSettings settings = {.width = 1, .height = 1, .sample_count = 1, .precision = precision};
-    CompiledScene compiled;
-    assert_true(scene_compile(&compiled, scene, &settings, NULL));
+    CompiledScene compiled = scene_compiled(scene, &settings);
     const bool has = (compiled.features & FEATURE_EYE_POWERS) != 0;
     compiled_scene_free(&compiled);
     return has;
