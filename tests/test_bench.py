@@ -277,11 +277,11 @@ for line in worker.stdout:
 
     def test_passports_of_variants(self):
         """Rows with work-groups have the device's passports, and those with build options have separate ones."""
-        command = f"bench sphere.yaml {TINY} --seconds 0.1 --json"
+        command = f"bench sphere.yaml {TINY} --seconds 0.1 --lanes 1 --json"
         report = self.json(f"{command} --variant '--work-group 4x2' --variant '--work-group 2x2'")
         self.assertTrue(report["device"]["passports"])
         self.assertEqual(["passports" in run for run in report["runs"]], [False, False])
-        report = self.json(f"{command} --variant '--build-options -DUNUSED=1'")
+        report = self.json(f"{command} --variant \"--build-options '-DUNUSED=1 -DOTHER=2'\"")  # the programs of test_variants
         self.assertFalse(report["device"]["passports"])
         self.assertEqual([passport["precision"] for passport in report["runs"][0]["passports"]], ["single"])
 
