@@ -4,9 +4,9 @@ were cut into the shape. Also tests what formats of meshes make of alpha.
 
 run_tests: sanitize-long-only"""
 import math
-import struct
 
 from glint import IS_LONG, TestCase, csv_rows, main, need_device, npy_read, png_bytes, write
+from mesh_files import WHOLE, Gltf
 
 HAS_DOUBLE = need_device()["fp64"]
 PRECISIONS = ["single", "strict"] + ["double"] * HAS_DOUBLE if IS_LONG else ["strict"]
@@ -204,24 +204,11 @@ class Cutouts(TestCase):
         self.assertIn("the alpha of 'hole.png' does not blend", self.glint(f"check {write('scene.yaml', head + blended + cut)}").stderr)
 
     def gltf(self, factor=1, **material):
-        import json
-
-        data = struct.pack("<12f8f6H", -1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0, 1, 2, 0, 2, 3)
-        write_bytes("a.bin", data)
-        views = [{"buffer": 0, "byteOffset": at, "byteLength": size} for at, size in ((0, 48), (48, 32), (80, 12))]
-        accessors = [
-            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, 0], "max": [1, 1, 0]},
-            {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
-            {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"},
-        ]
         pbr = {"baseColorTexture": {"index": 0}, "baseColorFactor": [1, 1, 1, factor]}
-        scene = {
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
-            "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}],
-            "buffers": [{"uri": "a.bin", "byteLength": len(data)}], "bufferViews": views, "accessors": accessors,
-            "images": [{"uri": "hole.png"}], "textures": [{"source": 0}], "materials": [material | {"pbrMetallicRoughness": pbr}],
-        }  # fmt: skip
-        return write("a.gltf", json.dumps(scene))
+        gltf = Gltf(images=[{"uri": "hole.png"}], textures=[{"source": 0}], materials=[material | {"pbrMetallicRoughness": pbr}])
+        corners = gltf.accessor([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
+        gltf.square(WHOLE, attributes={"POSITION": corners}, material=0)
+        return gltf.write("a.gltf")
 
     def test_refused(self):
         """Certified and certify refuse cutouts and normal maps. An opaque image is named."""
