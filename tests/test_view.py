@@ -210,6 +210,21 @@ class View(TestCase):
         write("scene.cfg", "")
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
+    def test_changes_during_a_write(self):
+        """What others write into the scene's files shortly before the camera is written, or at the same time, is read."""
+        window = Window(self, options="--write-camera", LD_PRELOAD=self.failing_calls())
+        window.saved()
+        for path, old, new in ("mesh.obj", "1 1 0", "1.5 1 0"), ("scene.yaml", "0.9, 0.8, 0.7", "1, 0, 0"):
+            with self.subTest(path):
+                write("late", "")
+                write(path, read(path).replace(old, new))
+                window.key("Left", "c")
+                window.line("^camera written to scene.yaml")
+                window.key("x")  # hides it
+                os.remove("late")
+                window.shows_at_last(self.image_of(read("scene.yaml")))
+        window.close()
+
     def test_camera_of_another_file(self):
         """Another file is watched, and the camera is written into it."""
         camera, *others = SCENE.splitlines(keepends=True)

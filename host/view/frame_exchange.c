@@ -16,8 +16,8 @@
 //  7. `ends` and `quits` are set once, in this order, and never cleared.
 //  8. Each change for which the loop may wait signals `changed`. Each one for which the window may wait calls
 //     `notify`.
-//  9. `written` is not empty only while the watch may still report the window's own write of the scene's
-//     file. `update.camera` is the camera of that file, as read or as written.
+//  9. `is_stale` is set by each change of a file but the window's own, and cleared before the files are read.
+//     A change during the reading sets it again. `update.camera` is the camera of `camera_text`.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/file.h"
@@ -44,7 +44,7 @@ void exchange_close(FrameLoop *loop)
     free(loop->shared.save_path);
     free(loop->shared.message);
     free(loop->shared.facts);
-    text_free(&loop->shared.written);
+    text_free(&loop->shared.camera_text);
 }
 
 static SharedState *shared_lock(FrameLoop *loop)
@@ -149,14 +149,27 @@ char *save_path_acquire(FrameLoop *loop)
     return text_acquire(loop, &loop->shared.save_path);
 }
 
-Text written_acquire(FrameLoop *loop)
+static bool texts_equal(const Text *a, const Text *b)
 {
-    Text written = {0};
+    return a->count == b->count && memcmp(text_c(a), text_c(b), a->count) == 0;
+}
+
+void reading_begin(FrameLoop *loop, Text camera_text)
+{
     SharedState *shared = shared_lock(loop);
-    const Text taken = shared->written;
-    shared->written = written;
+    text_free(&shared->camera_text);
+    shared->camera_text = camera_text;
+    shared->is_written = shared->is_stale = false;
     shared_unlock(loop);
-    return taken;
+}
+
+bool written_matches(FrameLoop *loop, const Text *camera_text)
+{
+    const SharedState *shared = shared_lock(loop);
+    const bool is_own =
+        shared->is_written && !shared->is_stale && texts_equal(camera_text, &shared->camera_text);
+    shared_unlock(loop);
+    return is_own;
 }
 
 void message_publish(FrameLoop *loop, char *message)
@@ -231,10 +244,12 @@ void refusal_publish(FrameLoop *loop)
 
 // The thread that watches the scene's files.
 
-void files_changed(void *context)
+void file_changed(void *context, const char *path)
 {
     FrameLoop *loop = context;
-    shared_lock(loop)->reloads = true;
+    SharedState *shared = shared_lock(loop);
+    shared->reloads = true;
+    shared->is_stale |= !path || strcmp(path, camera_path(&loop->options)) != 0;
     atomic_store(&loop->has_news, true);
     shared_signal(loop);
 }
@@ -319,15 +334,17 @@ bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update)
     return is_new;
 }
 
-void written_exchange(FrameLoop *loop, Text *written, Camera *camera)
+void written_exchange(FrameLoop *loop, const Text *old, Text *written, Camera *camera)
 {
     SharedState *shared = shared_lock(loop);
-    const Text old_text = shared->written;
-    const Camera old_camera = shared->update.camera;
-    shared->written = *written;
+    const Text earlier_text = shared->camera_text;
+    const Camera earlier_camera = shared->update.camera;
+    shared->is_written = true;
+    shared->is_stale |= !texts_equal(old, &earlier_text); // others wrote the file
+    shared->camera_text = *written;
     shared->update.camera = *camera;
-    *written = old_text;
-    *camera = old_camera;
+    *written = earlier_text;
+    *camera = earlier_camera;
     shared_unlock(loop);
 }
 

@@ -82,7 +82,7 @@ FrameLoop *frame_loop_open(const FrameLoopOptions *options)
     loop->settings.stage = loop->stage;
     loop->settings.band_seconds = 0.01;
     exchange_open(loop);
-    loop->watch = watch_open(files_changed, loop);
+    loop->watch = watch_open(file_changed, loop);
     if (pthread_create(&loop->thread, NULL, loop_run, loop) != 0) fault("cannot start a thread");
     return loop;
 }

@@ -42,7 +42,9 @@ typedef struct {
     SceneUpdate update;
     uint32_t probe[2]; // the pixel of the last question
     char *facts;       // the answer
-    Text written;      // into the scene's file; the watch has not reported it yet
+    Text camera_text;  // of the camera's file, as the scene was read from it or as the window wrote it
+    bool is_written;   // by the window, since the scene was read
+    bool is_stale;     // others have changed the scene's files since they were read
     bool has_ready, has_update, has_probe, quits;
     bool reloads; // the scene's files have changed, or have not been read
 } SharedState;
@@ -93,7 +95,7 @@ void exchange_close(FrameLoop *loop);
 bool render_stops(void *context);
 
 // Records that a file of the scene changed. The thread that watches the files calls it with the loop.
-void files_changed(void *context);
+void file_changed(void *context, const char *path);
 
 // Waits for the next work and returns its state. LOOP_BEGIN has then read the request.
 LoopState work_wait(FrameLoop *loop);
@@ -115,11 +117,14 @@ void frame_publish(FrameLoop *loop, uint32_t samples);
 void scene_publish(FrameLoop *loop);
 // Publishes that the scene cannot be read or rendered.
 void refusal_publish(FrameLoop *loop);
-// Exchanges the text that is being written into the scene's file, and the camera that it has, for the shared
-// ones.
-void written_exchange(FrameLoop *loop, Text *written, Camera *camera);
-// Returns the text that was written into the scene's file since the last call. The caller frees it.
-Text written_acquire(FrameLoop *loop);
+// Takes ownership of the text of the camera's file. The scene's files are about to be read.
+void reading_begin(FrameLoop *loop, Text camera_text);
+// Exchanges the text that is being written into the camera's file, and the camera that it has, for the shared
+// ones. `old` is the text that it is derived from.
+void written_exchange(FrameLoop *loop, const Text *old, Text *written, Camera *camera);
+// Returns whether the window's write of this text into the camera's file is all that changed in the scene's
+// files since they were read.
+bool written_matches(FrameLoop *loop, const Text *camera_text);
 
 // frame_fill.c
 
@@ -149,7 +154,7 @@ double move_guess(const Renderer *renderer);
 
 // scene_reload.c
 
-// Returns whether the scene's file is what was written into it here.
+// Returns whether only the window has changed the scene's files since they were read.
 bool is_own_write(FrameLoop *loop);
 // Reads the scene at the current request's frame, for the first time or again. Returns false with a message
 // published if it has a mistake, and keeps the previous scene.

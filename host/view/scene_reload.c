@@ -1,11 +1,10 @@
 // Reads the scene initially and when its files change, and writes the camera into it.
 #include "host/view/frame_loop_state.h"
 
+#include "host/base/file.h"
 #include "host/base/memory.h"
 #include "host/base/output.h"
 #include "host/view/camera_file.h"
-#include <stdlib.h>
-#include <string.h>
 
 // Watches a file of the scene before it is read, so that no change is missed. Files stay watched if the
 // scene has a mistake, which may lie in any of them.
@@ -42,16 +41,24 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     return true;
 }
 
+// Returns the text of the camera's file, empty if the window cannot write it or if it cannot be read. The
+// caller frees it.
+static Text camera_text_read(const FrameLoop *loop)
+{
+    Text text = {0};
+    MessageList ignored = {0};
+    const char *path = camera_path(&loop->options);
+    if (scene_is_yaml(path) && !file_obstacle(path)) text_read_file(&text, path, &ignored);
+    message_list_free(&ignored);
+    return text;
+}
+
 bool is_own_write(FrameLoop *loop)
 {
-    Text written = written_acquire(loop), text = {0};
-    MessageList messages = {0};
-    bool same = written.count > 0 && text_read_file(&text, camera_path(&loop->options), &messages) &&
-                text.count == written.count && memcmp(text.items, written.items, text.count) == 0;
-    message_list_free(&messages);
+    Text text = camera_text_read(loop);
+    const bool is_own = written_matches(loop, &text);
     text_free(&text);
-    text_free(&written);
-    return same;
+    return is_own;
 }
 
 bool scene_reload(FrameLoop *loop)
@@ -66,6 +73,7 @@ bool scene_reload(FrameLoop *loop)
     options.frame = loop->scene_frame = loop->current.scene_frame;
     Scene scene;
     watch_only(loop->watch, loop->options.scene_path);
+    reading_begin(loop, camera_text_read(loop));
     bool loaded = scene_load(&scene, loop->options.scene_path, &options, &messages);
     if (loaded && !renderer_renew(loop, &scene, &messages)) {
         scene_free(&scene);
@@ -93,24 +101,20 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
     if (!text_read_file(&old, path, messages)) return false;
     const Source source = {.file = path, .bytes = text_c(&old), .length = old.count};
     OutputFile output;
-    bool done = camera_replace(&text, &source, camera, frame, messages);
-    text_free(&old);
-    if (!done || !output_open(&output, path, messages)) {
-        text_free(&text);
-        return false;
-    }
-    done = output_write(&output, text.items, text.count, messages) && output_finish(&output, messages);
-    if (!done) {
-        text_free(&text);
+    const bool is_open =
+        camera_replace(&text, &source, camera, frame, messages) && output_open(&output, path, messages);
+    bool done = is_open && output_write(&output, text.items, text.count, messages) &&
+                output_finish(&output, messages);
+    if (done) {
+        // before the change is visible, so that the loop recognizes it as the window's
+        Camera file_camera = *camera;
+        written_exchange(loop, &old, &text, &file_camera);
+        done = output_commit(&output, messages);
+        if (!done) written_exchange(loop, &old, &text, &file_camera);
+    } else if (is_open) {
         output_abandon(&output);
-        return false;
     }
-    // before the change is visible, so that the loop recognizes it as its own
-    Camera file_camera = *camera;
-    written_exchange(loop, &text, &file_camera);
-    text_free(&text);
-    done = output_commit(&output, messages);
-    if (!done) written_exchange(loop, &text, &file_camera);
+    text_free(&old);
     text_free(&text);
     return done;
 }

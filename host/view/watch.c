@@ -19,11 +19,11 @@
 
 typedef struct {
     int folder; // its watch
-    char *name;
+    char *path;
 } WatchedFile;
 
 struct Watch {
-    void (*changed)(void *context);
+    void (*changed)(void *context, const char *path);
     void *context;
     int notify, end; // inotify; an event that ends the thread
     pthread_t thread;
@@ -32,31 +32,28 @@ struct Watch {
     ARRAY_OF(WatchedFile) files;
 };
 
-static bool is_watched(Watch *watch, const struct inotify_event *event)
+static void event_report(const Watch *watch, const struct inotify_event *event)
 {
-    bool found = false;
-    pthread_mutex_lock(&watch->mutex);
+    if (event->mask & IN_Q_OVERFLOW) watch->changed(watch->context, NULL);
     for (size_t i = 0; i < watch->files.count && event->len > 0; i++) {
         const WatchedFile *file = &watch->files.items[i];
-        found |= file->folder == event->wd && strcmp(file->name, event->name) == 0;
+        if (file->folder == event->wd && strcmp(file_base_name(file->path), event->name) == 0)
+            watch->changed(watch->context, file->path);
     }
-    pthread_mutex_unlock(&watch->mutex);
-    return found;
 }
 
-// Reads pending events, up to 4096 bytes. Returns whether one is of a watched file.
-static bool events_read(Watch *watch)
+// Reads pending events, up to 4096 bytes, and reports those of watched files.
+static void events_report(Watch *watch)
 {
     _Alignas(struct inotify_event) char events[4096];
     ssize_t size = read(watch->notify, events, sizeof events);
-    bool found = false;
+    pthread_mutex_lock(&watch->mutex);
     for (ssize_t at = 0; at < size;) {
         const struct inotify_event *event = (const void *)(events + at);
-        // after an overflow of the queue any file may have changed
-        found |= event->mask & IN_Q_OVERFLOW || is_watched(watch, event);
+        event_report(watch, event);
         at += (ssize_t)(sizeof *event + event->len);
     }
-    return found;
+    pthread_mutex_unlock(&watch->mutex);
 }
 
 static void *watch_run(void *context)
@@ -66,14 +63,14 @@ static void *watch_run(void *context)
     for (;;) {
         poll(sources, 2, -1);
         if (sources[1].revents) return NULL;
-        if (sources[0].revents && events_read(watch)) watch->changed(watch->context);
+        if (sources[0].revents) events_report(watch);
     }
 }
 
 static void files_forget(Watch *watch)
 {
     for (size_t i = 0; i < watch->files.count; i++)
-        free(watch->files.items[i].name);
+        free(watch->files.items[i].path);
     watch->files.count = 0;
 }
 
@@ -92,7 +89,7 @@ static void failure_print(const char *files, const char *more, int error)
     fprintf(stderr, "glint: warning: changes of %s%s are not seen: %s\n", files, more, strerror(error));
 }
 
-Watch *watch_open(void (*changed)(void *context), void *context)
+Watch *watch_open(void (*changed)(void *context, const char *path), void *context)
 {
     Watch *watch = memory_allocate_zeroed(1, sizeof *watch);
     watch->changed = changed;
@@ -132,7 +129,7 @@ static void file_add(Watch *watch, const char *path)
         watch->has_failed |= error != ENOENT;
         return;
     }
-    WatchedFile file = {descriptor, memory_copy_text(file_base_name(path))};
+    WatchedFile file = {descriptor, memory_copy_text(path)};
     array_push(watch->files, file);
 }
 

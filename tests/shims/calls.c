@@ -1,4 +1,5 @@
-// Launches fail while a file `fails` exists. Files cannot be watched if there is one `unwatched`, folders if `folders`.
+// Launches fail while a file `fails` exists, and changes of files are reported late while `late` does. Files cannot be watched if
+// there is one `unwatched`, folders if `folders`.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -12,12 +13,20 @@ int clEnqueueNDRangeKernel(void *queue, void *kernel, unsigned dimensions, const
     if (access("fails", F_OK) == 0) return -5;
     return launch(queue, kernel, dimensions, offset, items, group, count, events, event);
 }
+static volatile int notify = -1;
 int inotify_init1(int flags)
 {
     int (*init)(int) = dlsym(RTLD_NEXT, "inotify_init1");
-    if (access("unwatched", F_OK) != 0) return init(flags);
+    if (access("unwatched", F_OK) != 0) return notify = init(flags);
     errno = EMFILE;
     return -1;
+}
+ssize_t read(int file, void *bytes, size_t size)
+{
+    ssize_t (*read_now)(int, void *, size_t) = dlsym(RTLD_NEXT, "read");
+    while (file == notify && access("late", F_OK) == 0)
+        usleep(10000);
+    return read_now(file, bytes, size);
 }
 int inotify_add_watch(int notify, const char *folder, unsigned events)
 {
