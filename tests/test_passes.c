@@ -130,6 +130,33 @@ static void check_moved_renderer(bool moves)
     scene_free(&scene);
 }
 
+// At `certified`, a scene that does not fit the device in double leaves the scene in float as it was.
+TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
+{
+    if (!probe_compute.device->fp64) skip();
+    Device small = *probe_compute.device;
+    Compute compute = probe_compute;
+    compute.device = &small;
+    Scene scene = scene_of_file("scenes/spheres16.yaml");
+    const RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_CERTIFIED);
+    MessageList messages = {0};
+    Renderer *renderer = renderer_open(&compute, &scene, &settings, &messages);
+    Film film, expected = film_render(&compute, &scene, &settings, AOVS);
+    small.memory_bytes = 1 << 28;
+    while (renderer_move(renderer, &scene, &settings, &messages))
+        small.memory_bytes -= small.memory_bytes / 16; // in double the scene needs more
+    scene.camera.position.x += 1;
+    assert_false(renderer_move(renderer, &scene, &settings, &messages));
+    small.memory_bytes = probe_compute.device->memory_bytes;
+    message_list_free(&messages);
+    assert_true(renderer_render_film(renderer, AOVS, &film));
+    film_assert_same(&film, &expected, "after a scene that does not fit");
+    film_free(&film);
+    film_free(&expected);
+    renderer_close(renderer);
+    scene_free(&scene);
+}
+
 TEST(moved_renderer_gives_the_bits_of_a_new_one)
 {
     check_moved_renderer(false);

@@ -152,32 +152,31 @@ void passes_receive_scene(Pass *const *passes, size_t count, CompiledScene *comp
     free(scenes);
 }
 
-// Recompiles the scene or moves it. Returns false with a message, and with nothing changed that kernels read,
-// if the scene cannot be compiled or does not fit the device.
-static bool scene_assign(Pass *pass, const Scene *scene, const RenderSettings *settings,
-                         MessageList *messages)
+bool pass_compile(Pass *pass, const Scene *scene, const RenderSettings *settings, CompiledScene *fresh,
+                  MessageList *messages)
 {
-    CompiledScene *compiled = &pass->scene.compiled, fresh;
+    CompiledScene *compiled = &pass->scene.compiled;
     CompileSettings compiling = settings_of_variant(settings, (SceneVariant){pass->type, pass->lanes});
     compiling.textures = compiled->textures;
     if (pass->scene.moves) return scene_move(compiled, scene, &compiling, messages);
-    if (!scene_compile(&fresh, scene, &compiling, messages)) return false;
-    const bool has_room = device_scene_has_room(&pass->scene, &fresh, messages);
-    compiled_scene_free(has_room ? compiled : &fresh);
-    if (has_room) *compiled = fresh;
+    if (!scene_compile(fresh, scene, &compiling, messages)) return false;
+    const bool has_room = device_scene_has_room(&pass->scene, fresh, messages);
+    if (!has_room) compiled_scene_free(fresh);
     return has_room;
 }
 
-bool pass_move(Pass *pass, const Scene *scene, const RenderSettings *settings, MessageList *messages)
+void pass_move(Pass *pass, CompiledScene *fresh, const RenderSettings *settings)
 {
     RenderReport *report = pass->report;
-    if (!scene_assign(pass, scene, settings, messages)) return false;
+    if (!pass->scene.moves) {
+        compiled_scene_free(&pass->scene.compiled);
+        pass->scene.compiled = *fresh;
+    }
     pass->settings = settings_of_pass(settings, pass->type);
     if (pass->type == PASS_ALL) report->upload_seconds = report->flatten_seconds = report->bvh_seconds = 0;
     stage_begin(settings->stage, "uploading the scene", NULL, 0);
     device_scenes_upload(&(DeviceScene *){&pass->scene}, 1, &pass->scene.compiled);
     scene_changed(pass);
-    return compute_ok(pass->compute);
 }
 
 void *pass_map(Pass *pass, cl_mem buffer, size_t begin, size_t size, cl_map_flags access)

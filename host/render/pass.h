@@ -31,8 +31,13 @@ void pass_close(Pass *pass);
 // Uploads the compiled scene to passes of its variant on devices that have room for it, and takes ownership
 // of it. A pass whose settings have `moves` is alone and keeps the arrays.
 void passes_receive_scene(Pass *const *passes, size_t count, CompiledScene *compiled);
-// Changes the scene and the settings, those of the image, as renderer_move does.
-bool pass_move(Pass *pass, const Scene *scene, const RenderSettings *settings, MessageList *messages);
+// Compiles another scene into *fresh or, if the settings have `moves`, moves the pass's arrays on the host.
+// Returns false with a message, and nothing to free, if the scene cannot be compiled or does not fit the
+// device. Kernels read the earlier scene until pass_move.
+bool pass_compile(Pass *pass, const Scene *scene, const RenderSettings *settings, CompiledScene *fresh,
+                  MessageList *messages);
+// Uploads the scene of pass_compile, takes ownership of it and changes the settings, those of the image.
+void pass_move(Pass *pass, CompiledScene *fresh, const RenderSettings *settings);
 
 // Returns the pass that re-renders this one's flagged pixels. The passes of a renderer are an array.
 static inline Pass *pass_next(Pass *pass)

@@ -56,10 +56,16 @@ bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings 
                    MessageList *messages)
 {
     Compute *compute = renderer->passes[PASS_ALL].compute;
-    bool is_done = compute_ok(compute) && settings_fit(settings, compute, messages);
-    for (PixelPass i = PASS_ALL; i < renderer->pass_count && is_done; i++)
-        is_done = pass_move(&renderer->passes[i], scene, settings, messages);
-    return is_done && compute_check_reference(compute);
+    CompiledScene fresh[PASS_COUNT] = {0};
+    bool fits = compute_ok(compute) && settings_fit(settings, compute, messages);
+    for (PixelPass i = PASS_ALL; i < renderer->pass_count && fits; i++)
+        fits = pass_compile(&renderer->passes[i], scene, settings, &fresh[i], messages);
+    for (PixelPass i = PASS_ALL; i < renderer->pass_count; i++)
+        if (fits)
+            pass_move(&renderer->passes[i], &fresh[i], settings);
+        else
+            compiled_scene_free(&fresh[i]);
+    return fits && compute_check_reference(compute);
 }
 
 uint64_t renderer_scene_hash(const Renderer *renderer)
