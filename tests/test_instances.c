@@ -391,12 +391,14 @@ TEST(an_uneven_transform_makes_a_copy)
     Scene scene =
         scene_with(1, (Vector3){0, 0, 0},
                    INSTANCE("flat", "[{rotate: [0, 0, 45]}, {scale: [1, 0.01, 1]}]")
-                       INSTANCE("flat", "{scale: [1, 0.01, 1]}") INSTANCE("flat", "{rotate: [0, 0, 45]}"));
+                       INSTANCE("flat", "{scale: [1, 0.01, 1]}") INSTANCE("flat", "{rotate: [0, 0, 45]}")
+                           INSTANCE("smooth", "[{rotate: [0, 0, 45]}, {scale: [1, 0.01, 1]}]"));
     CompileSettings settings = plain_settings;
     settings.instances = INSTANCES_SHARED;
     CompiledScene compiled = scene_compiled(&scene, &settings);
     assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_INSTANCES].count, 2);
-    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].count, 2 * TRIANGLES);
+    assert_int_equal(compiled.arrays[FLAT_SHARED_MESHES].count, 1);
+    assert_int_equal(compiled.arrays[FLAT_FIRST_SHAPE + TYPE_TRIANGLES].count, 3 * TRIANGLES);
     compiled_scene_free(&compiled);
     scene_free(&scene);
 }

@@ -8,7 +8,7 @@
 typedef struct {
     uint32_t mesh;     // of the scene
     uint32_t material; // 1 + the material of its texture coordinates, if that replaces the mesh's; else 0
-    uint32_t next;     // 1 + another one of the same mesh, or 0
+    uint32_t next;     // 1 + the index of another one of the same mesh, or 0
     uint32_t object_material; // of triangles without another one
     bool is_opaque_somewhere, is_transparent_somewhere;
     Vector3 center, extent; // of its box; extent is half its size
@@ -55,6 +55,8 @@ double instance_slack(const CompiledScene *compiled, const CompileSettings *sett
 
 // Returns the index of an id's ObjectEntry: of an instance's, if the id is in one.
 uint32_t entry_of_id(const CompiledScene *compiled, uint32_t id);
+
+// shared_meshes.c
 
 // Appends the shared meshes' triangles, entries and BVHs to the scene's, and sets FLAT_SHARED_MESHES and the
 // instances' places.
