@@ -1,6 +1,6 @@
 // Tests how long launches take if parts of an image have very different costs. Only the pace is tested,
 // without a device or a clock.
-#include "host/render/band.h"
+#include "host/render/place.h"
 #include "tests/check.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 // Renders the pixels of one launch, a band of rows or a list, into the device's buffers.
 #pragma once
 
-#include "host/render/pass.h"
+#include "host/render/place.h"
 
 typedef struct {
     uint32_t rows;
@@ -29,30 +29,6 @@ void band_buffers_close(BandBuffers *buffers, Pass *pass);
 // Maps a layer of the film, as pass_map does: always all of its rows, however many the band has, because
 // NVIDIA's driver takes 1 to 2 ms to map a range whose size differs from the last one's.
 void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags access);
-
-// The size of a work-item's or a work-group's tile in pixels.
-typedef struct {
-    uint32_t width, height;
-} TileShape;
-TileShape group_shape(const Pass *pass);
-
-// The pixels that a launch renders.
-typedef struct {
-    cl_uint4 band; // x, y, width and height; in a list, 0, 0, its length and 1
-    TileShape item;
-    size_t first[2], items[2], group[2];
-} Place;
-
-Place band_place(const Pass *pass, BandRows rows);
-// Steps through a place in parts that consist of whole work-groups: several rows of groups, or a part of one
-// row. Each part has at most `pixels_max` pixels, or one group if that has more. `part` is all zeros before
-// the first step. Returns false after the last part.
-bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
-uint64_t place_pixels(const Place *place);
-// Returns the number of words of a band's flags.
-size_t film_flag_words(const Pass *pass, const Film *film);
-// Returns the place of a list's first `count` pixels.
-Place list_place(const Pass *pass, uint32_t count);
 
 // Returns the description of the film of these rows, with no layers.
 Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count);

@@ -166,7 +166,8 @@ bool band_rerender(Pass *pass, KernelType type, unsigned layers, BandBuffers *bu
 {
     const RerenderedBand band = {pass, type,    layers,
                                  aovs, buffers, film_of_rows(pass, rows.first_row, rows.row_count)};
-    const size_t word_count = film_flag_words(pass, &band.film);
+    const Place place = band_place(pass, rows);
+    const size_t word_count = place_flag_words(&place);
     uint32_t *words = memory_allocate(word_count, sizeof *words);
     bool is_whole = pass_read(pass, type == KERNEL_RENDER ? buffers->flags : buffers->center_flags, 0,
                               word_count * sizeof *words, words);
