@@ -1,6 +1,9 @@
 // The file consists of a FileHeader, the key and, for each band, a RecordHeader and its layers. Numbers are
 // in native byte order, so a checkpoint can be resumed only on a machine with the byte order of the one that
 // wrote it.
+//
+// `bands` and `offsets` list the whole records, and `end` is where the last of them ends. After a `failure`
+// nothing is appended, because a reader stops at a torn record.
 #include "host/render/checkpoint.h"
 
 #include "host/base/array.h"

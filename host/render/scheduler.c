@@ -2,6 +2,18 @@
 // worker gets at most half of its share of the remaining rows, so that the last bands are short. A worker
 // whose pace is unknown gets one step, since it may be a thousand times slower than the others. A worker that
 // would end after another could have rendered all remaining rows gets nothing more.
+//
+// These invariants hold whenever the mutex is free:
+//
+//  1. The first `delivered_rows` rows have reached the sink. Until `has_ended`, each of the others is in
+//     `free_rows`, in the `rows` of one worker, in `waiting` or in the band that the sink has.
+//  2. `is_delivering` is set while the sink has a band, which starts at `delivered_rows`. So bands reach the
+//     sink one at a time and in order. The mutex is free meanwhile.
+//  3. `free_rows` are sorted, disjoint and not empty. With a checkpoint, `waiting` bands have no layers.
+//  4. A worker that acquires rows has none and is not dropped. A dropped worker has none.
+//  5. `has_ended` and `is_dropped` are never cleared.
+//  6. A change that may give a waiting worker rows, or end its wait, broadcasts `changed` before the function
+//     that makes it returns.
 #include "host/render/scheduler.h"
 
 #include "host/base/array.h"
@@ -333,12 +345,10 @@ void scheduler_drop(Scheduler *scheduler, size_t worker)
     dropped->is_dropped = true;
     if (dropped->rows.row_count > 0) rows_insert(scheduler, dropped->rows);
     dropped->rows = (BandRows){0};
-    bool is_last = true;
-    for (size_t i = 0; i < scheduler->settings.worker_count; i++)
-        is_last = is_last && scheduler->workers[i].is_dropped;
+    const bool others_continue = !is_alone(scheduler, worker);
     while (scheduler->is_delivering)
         pthread_cond_wait(&scheduler->changed, &scheduler->mutex);
-    if (!is_last && scheduler->settings.dropped)
+    if (others_continue && scheduler->settings.dropped)
         scheduler->settings.dropped(scheduler->settings.context, worker);
     pthread_cond_broadcast(&scheduler->changed);
     pthread_mutex_unlock(&scheduler->mutex);
