@@ -165,8 +165,7 @@ static double largest_coordinate(const Bounds *boxes, size_t count)
     Bounds all = {{0, 0, 0}, {0, 0, 0}};
     for (size_t i = 0; i < count; i++)
         all = bounds_join(all, boxes[i]);
-    Vector3 largest = vector_max(all.max, vector_scale(all.min, -1));
-    return fmax(largest.x, fmax(largest.y, largest.z));
+    return fmax(vector_largest(all.min), vector_largest(all.max));
 }
 
 static void references_make(void *context, size_t begin, size_t end)

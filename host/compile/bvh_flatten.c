@@ -66,8 +66,7 @@ static void bounded_collect(Bounded *bounded, const CompiledScene *compiled)
 
 static double box_size(const Bounds *box)
 {
-    const Vector3 extent = vector_subtract(box->max, box->min);
-    return fmax(extent.x, fmax(extent.y, extent.z));
+    return vector_largest(vector_subtract(box->max, box->min));
 }
 
 static void bounded_remove(Bounded *bounded, size_t index)

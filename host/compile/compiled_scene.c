@@ -46,7 +46,7 @@ static void range_zero(void *context, size_t begin, size_t end)
     memset(flat_array_at(array, begin), 0, (end - begin) * array->layout.size);
 }
 
-static void array_renew(CompiledScene *compiled, size_t type, FlatLayout layout, size_t count)
+void flat_array_renew_as(CompiledScene *compiled, size_t type, size_t count, FlatLayout layout)
 {
     FlatArray *array = &compiled->arrays[type];
     free(array->items);
@@ -55,14 +55,9 @@ static void array_renew(CompiledScene *compiled, size_t type, FlatLayout layout,
     compiled->changed[type] = true;
 }
 
-void flat_array_renew_as(CompiledScene *compiled, size_t type, size_t count, FlatLayout layout)
-{
-    array_renew(compiled, type, layout, count);
-}
-
 void flat_array_renew(CompiledScene *compiled, size_t type, size_t count)
 {
-    array_renew(compiled, type, layouts[type], count);
+    flat_array_renew_as(compiled, type, count, layouts[type]);
 }
 
 static size_t narrow_size(const FlatLayout *layout)
@@ -76,7 +71,8 @@ void flat_wide_array_renew(CompiledScene *compiled, size_t type, size_t count, u
     const unsigned parts = BVH_WIDTH_MAX / width;
     const FlatLayout layout = {widest.size / parts, widest.scalar4_count / parts, widest.uint4_count / parts};
     const size_t size = narrow_size(&layout);
-    array_renew(compiled, type, is_narrow ? (FlatLayout){size, 0, size / sizeof(uint4)} : layout, count);
+    flat_array_renew_as(compiled, type, count,
+                        is_narrow ? (FlatLayout){size, 0, size / sizeof(uint4)} : layout);
 }
 
 void *flat_array_at(const FlatArray *array, size_t index)

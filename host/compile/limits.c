@@ -47,7 +47,7 @@ static double box_width(const Bounds *bounds)
 {
     const Vector3 size = vector_subtract(bounds->max, bounds->min);
     const double middle = fmax(fmin(size.x, size.y), fmin(fmax(size.x, size.y), size.z));
-    return middle > 0 ? middle : fmax(size.x, fmax(size.y, size.z));
+    return middle > 0 ? middle : vector_largest(size);
 }
 
 // Returns the shape of an object and its line. The caller frees it.

@@ -27,8 +27,7 @@ double scene_smallest_size(const Scene *scene)
     Bounds bounds;
     for (size_t i = 0; i < scene->objects.count; i++) {
         if (!object_bounds(scene, i, &bounds)) continue;
-        Vector3 size = vector_subtract(bounds.max, bounds.min);
-        double largest_side = fmax(size.x, fmax(size.y, size.z));
+        double largest_side = vector_largest(vector_subtract(bounds.max, bounds.min));
         if (largest_side > 0) smallest = fmin(smallest, largest_side);
     }
     return isinf(smallest) ? 0 : smallest;

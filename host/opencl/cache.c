@@ -59,9 +59,7 @@ char *cache_folder_path(void)
     const char *cache = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
     bool has_cache = cache && cache[0] == '/', has_home = home && home[0] == '/';
     if (!has_cache && !has_home) return NULL;
-    Text path = {0};
-    text_appendf(&path, "%s%s/glint", has_cache ? cache : home, has_cache ? "" : "/.cache");
-    return path.items;
+    return text_format("%s%s/glint", has_cache ? cache : home, has_cache ? "" : "/.cache");
 }
 
 typedef struct {
@@ -78,11 +76,9 @@ static EntryName entry_name(const char *key)
 char *cache_entry_path(const char *key)
 {
     char *folder = cache_folder_path();
-    if (!folder) return NULL;
-    Text path = {0};
-    text_appendf(&path, "%s/%s", folder, entry_name(key).text);
+    char *path = folder ? text_format("%s/%s", folder, entry_name(key).text) : NULL;
     free(folder);
-    return path.items;
+    return path;
 }
 
 // Returns why a file or folder cannot be trusted, or NULL if it can.
@@ -287,8 +283,7 @@ static bool starts_with_entry_name(const char *name)
 static bool is_temporary(const char *name)
 {
     if (name[0] != '.' || !starts_with_entry_name(name + 1)) return false;
-    char *entry = memory_copy_text(name + 1);
-    entry[ENTRY_NAME_LENGTH] = '\0';
+    char *entry = memory_copy_part(name + 1, ENTRY_NAME_LENGTH);
     bool is_of_entry = output_is_temporary(name, entry);
     free(entry);
     return is_of_entry;
@@ -422,9 +417,7 @@ static void entry_describe(CacheEntry *entry, int folder)
     if (entry->fault == absent) {
         entry->fault = NULL;
     } else if (!entry->fault) {
-        char *key = memory_allocate(read.key_length + 1, 1);
-        memcpy(key, read.key, read.key_length);
-        key[read.key_length] = '\0';
+        char *key = memory_copy_part(read.key, read.key_length);
         static const char start[] = "\ndevice ";
         char *device = strstr(key, start);
         if (device) {

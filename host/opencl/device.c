@@ -27,36 +27,32 @@ static bool list_check(DeviceList *list, cl_int status, const char *call)
     return status == CL_SUCCESS;
 }
 
-static bool device_query(DeviceList *list, cl_device_id id, cl_device_info what, size_t size, void *value,
-                         size_t *needed)
+static bool device_query(DeviceList *list, void *id, cl_uint what, size_t size, void *value, size_t *needed)
 {
     fault_record_call("clGetDeviceInfo");
     return list_check(list, clGetDeviceInfo(id, what, size, value, needed), "clGetDeviceInfo");
 }
 
-static bool platform_query(DeviceList *list, cl_platform_id platform, cl_platform_info what, size_t size,
-                           void *value, size_t *needed)
+static bool platform_query(DeviceList *list, void *id, cl_uint what, size_t size, void *value, size_t *needed)
 {
     fault_record_call("clGetPlatformInfo");
-    return list_check(list, clGetPlatformInfo(platform, what, size, value, needed), "clGetPlatformInfo");
+    return list_check(list, clGetPlatformInfo(id, what, size, value, needed), "clGetPlatformInfo");
 }
 
-static char *platform_text(DeviceList *list, cl_platform_id platform, cl_platform_info what)
+typedef bool Query(DeviceList *list, void *id, cl_uint what, size_t size, void *value, size_t *needed);
+
+static char *text_query(Query *query, DeviceList *list, void *id, cl_uint what)
 {
     size_t size = 0;
-    if (!platform_query(list, platform, what, 0, NULL, &size)) size = 0;
+    if (!query(list, id, what, 0, NULL, &size)) size = 0;
     char *text = memory_allocate_zeroed(size + 1, 1);
-    if (size > 0 && !platform_query(list, platform, what, size, text, NULL)) text[0] = '\0';
+    if (size > 0 && !query(list, id, what, size, text, NULL)) text[0] = '\0';
     return text;
 }
 
 static char *device_text(DeviceList *list, cl_device_id id, cl_device_info what)
 {
-    size_t size = 0;
-    if (!device_query(list, id, what, 0, NULL, &size)) size = 0;
-    char *text = memory_allocate_zeroed(size + 1, 1);
-    if (size > 0 && !device_query(list, id, what, size, text, NULL)) text[0] = '\0';
-    return text;
+    return text_query(device_query, list, id, what);
 }
 
 // Queries a number. A failure sets `value` to 0.
@@ -173,8 +169,8 @@ static uint64_t addressable(uint64_t bytes)
 static void texts_query(DeviceList *list, Device *device)
 {
     cl_device_id id = device->id;
-    device->platform_name = platform_text(list, device->platform, CL_PLATFORM_NAME);
-    device->platform_version = platform_text(list, device->platform, CL_PLATFORM_VERSION);
+    device->platform_name = text_query(platform_query, list, device->platform, CL_PLATFORM_NAME);
+    device->platform_version = text_query(platform_query, list, device->platform, CL_PLATFORM_VERSION);
     device->name = device_text(list, id, CL_DEVICE_NAME);
     device->vendor = device_text(list, id, CL_DEVICE_VENDOR);
     device->version = device_text(list, id, CL_DEVICE_VERSION);

@@ -1,6 +1,7 @@
 #include "host/render/sample_pattern.h"
 
 #include "host/base/memory.h"
+#include "host/base/numbers.h"
 #include <math.h>
 #include <stddef.h>
 #include <stdlib.h>
@@ -27,8 +28,7 @@ void *sample_pattern(uint32_t count, bool is_double)
     }
     if (is_double) return offsets;
     float *narrow = memory_allocate(2 * (size_t)count, sizeof *narrow);
-    for (size_t i = 0; i < 2 * (size_t)count; i++)
-        narrow[i] = (float)offsets[i];
+    numbers_narrow(narrow, offsets, 2 * (size_t)count);
     free(offsets);
     return narrow;
 }
