@@ -1,5 +1,6 @@
 // Splits a range of primitives in two by the surface area heuristic on bins of their centers (Wald, On fast
-// construction of SAH-based bounding volume hierarchies, RT 2007).
+// construction of SAH-based bounding volume hierarchies, RT 2007). Unlike there, the bins are along all three
+// axes, and small ranges have fewer.
 #pragma once
 
 #include "host/compile/bvh.h"

@@ -23,6 +23,15 @@ static Rounding rounding_from(Vector3 eye, const CompileSettings *settings)
                       .certifies = settings->certifies};
 }
 
+// Returns the hash of the arrays that the BVH has not ordered yet.
+static uint64_t primitives_hash(const CompiledScene *compiled)
+{
+    uint64_t hash = HASH_START;
+    for (size_t type = 0; type < FLAT_COUNT; type++)
+        if (is_ordered_by_bvh(type)) hash = flat_array_hash(hash, &compiled->arrays[type]);
+    return hash;
+}
+
 // Runs the stages on a scene in the device's unit.
 static bool stages_run(CompiledScene *compiled, const Scene *scene, const CompileSettings *settings,
                        MessageList *messages)
@@ -43,13 +52,7 @@ static bool stages_run(CompiledScene *compiled, const Scene *scene, const Compil
     neighbors_find(compiled, scene, settings);
     compiled->features |= features_of(scene) | settings->extra_features;
     if (compiled->instances) compiled->features |= FEATURE_INSTANCES;
-    if (settings->hashes_primitives) {
-        compiled->primitives_hash = HASH_START;
-        for (size_t type = 0; type < FLAT_COUNT; type++)
-            if (is_ordered_by_bvh(type))
-                compiled->primitives_hash =
-                    flat_array_hash(compiled->primitives_hash, &compiled->arrays[type]);
-    }
+    if (settings->hashes_primitives) compiled->primitives_hash = primitives_hash(compiled);
     double start = clock_seconds();
     bvh_flatten(compiled, settings);
     compiled->bvh_seconds = clock_seconds() - start;
