@@ -33,11 +33,6 @@ void *band_map(Pass *pass, const BandBuffers *buffers, Layer layer, cl_map_flags
 // Returns the description of the film of these rows, with no layers.
 Film film_of_rows(const Pass *pass, uint32_t first_row, uint32_t row_count);
 
-static inline bool layer_in(unsigned layers, Layer layer)
-{
-    return layers >> layer & 1;
-}
-
 // Returns the pace of a kernel's launches, with the target of the settings.
 Pace *pass_pace(Pass *pass, KernelType type);
 

@@ -18,7 +18,7 @@ FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs)
     const Film film = film_of_rows(pass, 0, pass->settings.region_height);
     FilmHeader header = film_header(&film);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if ((aovs | AOV_COLOR) >> layer & 1 && film_layer_size(&film, layer) > 0)
+        if (layer_in(aovs | AOV_COLOR, layer) && film_layer_size(&film, layer) > 0)
             header.layers |= UINT64_C(1) << layer;
     return header;
 }

@@ -126,7 +126,7 @@ void device_scenes_upload(DeviceScene *const *scenes, size_t count, CompiledScen
         }
         if (compiled == &scenes[i]->compiled) continue;
         scenes[i]->compiled = *compiled;
-        compiled->textures = NULL; // only a scene that moves reads these two
+        compiled->textures = NULL; // scenes[0] has them; only a scene that is alone reads these two
         compiled->instances = NULL;
     }
     if (count == 0) compiled_scene_free(compiled);

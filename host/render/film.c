@@ -73,7 +73,7 @@ uint64_t film_header_size(const FilmHeader *header)
     const Film film = film_without_layers(header);
     uint64_t size = 0;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (header->layers >> layer & 1) size += film_layer_size(&film, layer);
+        if (layer_in(header->layers, layer)) size += film_layer_size(&film, layer);
     return size;
 }
 
@@ -81,7 +81,7 @@ Film film_of_header(const FilmHeader *header)
 {
     Film film = film_without_layers(header);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if (header->layers >> layer & 1)
+        if (layer_in(header->layers, layer))
             film.layers[layer] = memory_allocate(film_layer_size(&film, layer), 1);
     return film;
 }
@@ -90,7 +90,7 @@ Film film_allocate(uint32_t width, uint32_t height, uint32_t light_count, unsign
 {
     Film film = {.width = width, .height = height, .light_count = light_count, .real_size = sizeof(double)};
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        if ((aovs | AOV_COLOR) >> layer & 1)
+        if (layer_in(aovs | AOV_COLOR, layer))
             film.layers[layer] = memory_allocate_zeroed(film_layer_size(&film, layer), 1);
     return film;
 }

@@ -21,6 +21,12 @@ enum {
     AOVS_ALL = (1 << LAYER_COUNT) - 1
 };
 
+// Returns whether the set has the layer.
+static inline bool layer_in(uint64_t layers, Layer layer)
+{
+    return layers >> layer & 1;
+}
+
 extern const char *const layer_names[LAYER_COUNT]; // "t" and so on, as in file names and in --aov
 
 typedef enum { LAYER_TYPE_REAL, LAYER_TYPE_LENGTH, LAYER_TYPE_INTEGER } LayerType;
