@@ -11,9 +11,9 @@ enum { PADDING = 8 };
 struct Caption {
     SDL_Renderer *target;
     TTF_Font *font;
-    float scale;
-    int size;     // font size in pixels
-    int reserved; // rows at the bottom
+    int usual_size, least_size; // of the font, in pixels
+    int size;                   // now
+    int reserved;               // rows at the bottom
 };
 
 // Returns the file of the user's font for fixed-width text, or NULL. The caller frees it.
@@ -46,11 +46,15 @@ Caption *caption_open(SDL_Renderer *target, float scale)
 {
     char *path = font_path();
     const int size = (int)(FONT_SIZE * scale);
-    TTF_Font *font = path && TTF_Init() == 0 ? TTF_OpenFont(path, size) : NULL;
+    const bool has_library = path && TTF_Init() == 0;
+    TTF_Font *font = has_library ? TTF_OpenFont(path, size) : NULL;
     free(path);
-    if (!font) return NULL;
+    if (!font) {
+        if (has_library) TTF_Quit();
+        return NULL;
+    }
     Caption *caption = memory_allocate_zeroed(1, sizeof *caption);
-    *caption = (Caption){target, font, scale, size, 0};
+    *caption = (Caption){target, font, size, (int)(FONT_SIZE_MIN * scale), size, 0};
     return caption;
 }
 
@@ -100,20 +104,18 @@ static SDL_Point character_size(const Caption *caption)
 SDL_Point caption_character(Caption *caption)
 {
     if (!caption) return (SDL_Point){0, 0};
-    font_size_set(caption, (int)(FONT_SIZE * caption->scale));
+    font_size_set(caption, caption->usual_size);
     return character_size(caption);
 }
 
 // Sets the largest font in which the extent fits. Returns the text's width, at most `room.x`.
 static int font_size_fit(Caption *caption, SDL_Point extent, SDL_Point room)
 {
-    int size = (int)(FONT_SIZE * caption->scale);
-    const int least = (int)(FONT_SIZE_MIN * caption->scale);
-    for (;; size--) {
+    for (int size = caption->usual_size;; size--) {
         font_size_set(caption, size);
         const SDL_Point character = character_size(caption);
         const int width = extent.x * character.x;
-        if (size <= least || (width <= room.x && extent.y * character.y <= room.y))
+        if (size <= caption->least_size || (width <= room.x && extent.y * character.y <= room.y))
             return SDL_min(width, room.x);
     }
 }
@@ -155,7 +157,7 @@ void caption_draw(Caption *caption, CaptionPlace place, const char *text)
 void caption_draw_line(Caption *caption, int x, int y, const char *text)
 {
     if (!caption) return;
-    font_size_set(caption, (int)(FONT_SIZE * caption->scale));
+    font_size_set(caption, caption->usual_size);
     SDL_Surface *surface = TTF_RenderUTF8_Blended(caption->font, text, white);
     if (!surface) return;
     surface_draw(caption, surface, x, y, surface->w);

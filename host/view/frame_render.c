@@ -65,7 +65,7 @@ static void film_fit(FrameLoop *loop, unsigned aovs)
     bool fits = film->width == loop->settings.width && film->height == loop->settings.height &&
                 film->light_count == light_count;
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
-        fits = fits && (film->layers[layer] || !(aovs >> layer & 1));
+        fits = fits && (film->layers[layer] || !layer_in(aovs, layer));
     if (fits) return;
     film_free(film);
     *film = film_allocate(loop->settings.width, loop->settings.height, light_count, aovs);

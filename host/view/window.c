@@ -208,21 +208,21 @@ static void window_fault(const char *what)
 
 static void window_close(Window *window)
 {
-    if (window->screen.window)
-        SDL_HideWindow(window->screen.window); // a kernel may still be built for a while
+    const Screen *screen = &window->screen;
+    if (screen->window) SDL_HideWindow(screen->window); // a kernel may still be built for a while
     if (window->frames) frame_loop_close(window->frames);
     frame_free(&window->frame);
     free(window->message);
     free(window->facts.text);
     text_free(&window->stage);
-    caption_close(window->screen.caption);
-    if (window->screen.texture) SDL_DestroyTexture(window->screen.texture);
-    if (window->screen.renderer) SDL_DestroyRenderer(window->screen.renderer);
+    caption_close(screen->caption);
+    if (screen->texture) SDL_DestroyTexture(screen->texture);
+    if (screen->renderer) SDL_DestroyRenderer(screen->renderer);
     // X11's window stays until the process ends. The loop's last event to it may still be on its way, on a
     // separate connection, and Xlib ends the process with status 1 if it finds no window.
     const char *driver = SDL_GetCurrentVideoDriver();
     if (driver && strcmp(driver, "x11") == 0) return;
-    if (window->screen.window) SDL_DestroyWindow(window->screen.window);
+    if (screen->window) SDL_DestroyWindow(screen->window);
     SDL_Quit();
 }
 
@@ -262,16 +262,16 @@ static bool window_open(Window *window)
     // where SDL draws in software, OpenGL is software too, and slower; SDL would open the window a second
     // time for it
     SDL_SetHintWithPriority(SDL_HINT_FRAMEBUFFER_ACCELERATION, "0", SDL_HINT_DEFAULT);
-    window->screen.window =
+    Screen *screen = &window->screen;
+    screen->window =
         SDL_CreateWindow(scene_name(window), SDL_WINDOWPOS_UNDEFINED, SDL_WINDOWPOS_UNDEFINED,
                          (int)size.width, (int)size.height, SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
-    if (window->screen.window)
-        window->screen.renderer = SDL_CreateRenderer(window->screen.window, -1, SDL_RENDERER_PRESENTVSYNC);
-    if (!window->screen.renderer) return false;
+    if (screen->window) screen->renderer = SDL_CreateRenderer(screen->window, -1, SDL_RENDERER_PRESENTVSYNC);
+    if (!screen->renderer) return false;
     size_read(window);
-    window->screen.caption = caption_open(window->screen.renderer, text_scale(window, size));
+    screen->caption = caption_open(screen->renderer, text_scale(window, size));
     window->precision = options->frames.settings.precision;
-    window->screen.frame_event = SDL_RegisterEvents(1);
+    screen->frame_event = SDL_RegisterEvents(1);
     FrameLoopOptions frames = options->frames;
     frames.notify = frame_notify;
     frames.notify_context = window;

@@ -35,16 +35,16 @@ static void title_set(const Window *window)
 void frame_show(Window *window)
 {
     const Frame *frame = &window->frame;
-    int width = (int)frame->width, height = (int)frame->height;
-    if (!window->screen.texture || window->screen.texture_width != width ||
-        window->screen.texture_height != height) {
-        if (window->screen.texture) SDL_DestroyTexture(window->screen.texture);
-        window->screen.texture = SDL_CreateTexture(window->screen.renderer, SDL_PIXELFORMAT_RGB24,
-                                                   SDL_TEXTUREACCESS_STREAMING, width, height);
-        window->screen.texture_width = width;
-        window->screen.texture_height = height;
+    Screen *screen = &window->screen;
+    int width = 0, height = 0;
+    if (screen->texture) SDL_QueryTexture(screen->texture, NULL, NULL, &width, &height);
+    if (width != (int)frame->width || height != (int)frame->height) {
+        if (screen->texture) SDL_DestroyTexture(screen->texture);
+        screen->texture =
+            SDL_CreateTexture(screen->renderer, SDL_PIXELFORMAT_RGB24, SDL_TEXTUREACCESS_STREAMING,
+                              (int)frame->width, (int)frame->height);
     }
-    if (window->screen.texture) SDL_UpdateTexture(window->screen.texture, NULL, frame->pixels, 3 * width);
+    if (screen->texture) SDL_UpdateTexture(screen->texture, NULL, frame->pixels, 3 * (int)frame->width);
     window->redraws = true;
 }
 
@@ -97,19 +97,20 @@ static void message_draw(const Window *window)
 
 void window_draw(Window *window)
 {
-    SDL_SetRenderDrawColor(window->screen.renderer, 0, 0, 0, 255);
-    SDL_RenderClear(window->screen.renderer);
-    if (window->screen.texture) SDL_RenderCopy(window->screen.renderer, window->screen.texture, NULL, NULL);
-    caption_reserve(window->screen.caption, time_line_height(window));
+    const Screen *screen = &window->screen;
+    SDL_SetRenderDrawColor(screen->renderer, 0, 0, 0, 255);
+    SDL_RenderClear(screen->renderer);
+    if (screen->texture) SDL_RenderCopy(screen->renderer, screen->texture, NULL, NULL);
+    caption_reserve(screen->caption, time_line_height(window));
     if (window->frame.pixels && window->frame.largest_error >= 0)
-        legend_draw(window->screen.caption, window->screen.renderer, window->frame.largest_error);
+        legend_draw(screen->caption, screen->renderer, window->frame.largest_error);
     if (window->shows_help)
         help_draw(window);
     else
         facts_draw(window);
     message_draw(window);
     time_line_draw(window);
-    SDL_RenderPresent(window->screen.renderer);
+    SDL_RenderPresent(screen->renderer);
     title_set(window);
     window->redraws = false;
 }

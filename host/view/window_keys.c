@@ -21,21 +21,19 @@ static void arrow_turn(Window *window, double yaw, double pitch)
 static void camera_write(Window *window, const uint32_t *frame)
 {
     MessageList messages = {0};
-    char *text = NULL;
-    size_t size;
-    FILE *stream = open_memstream(&text, &size);
-    if (!stream) return;
+    Text text = {0};
     if (frame_loop_write_camera(window->frames, &window->camera, frame, &messages)) {
         window->scene.camera = window->camera;
-        fprintf(stream, "camera written to %s", camera_path(&window->options->frames));
-        if (frame) fprintf(stream, " at frame %u", *frame);
-        fprintf(stream, "\n");
+        text_appendf(&text, "camera written to %s", camera_path(&window->options->frames));
+        if (frame) text_appendf(&text, " at frame %u", *frame);
+        text_appendf(&text, "\n");
     }
-    message_list_print(&messages, stream);
+    char *reasons = message_list_text(&messages);
+    if (reasons) text_appendf(&text, "%s", reasons);
+    free(reasons);
     message_list_free(&messages);
-    fclose(stream);
-    fputs(text, stderr);
-    message_show(window, text);
+    fputs(text_c(&text), stderr);
+    message_show(window, text.items);
 }
 
 static void camera_print(Window *window)

@@ -12,7 +12,6 @@ typedef struct {
     SDL_Window *window;
     SDL_Renderer *renderer;
     SDL_Texture *texture; // the frame's pixels
-    int texture_width, texture_height;
     Caption *caption;
     Uint32 frame_event;
 } Screen;
