@@ -130,7 +130,7 @@ static void trial_run(Trial *trial, cl_program program, uint32_t common_origin)
     kernel_argument(&probe_compute, kernel, 2, sizeof common_origin, &common_origin);
     kernel_argument(&probe_compute, kernel, 3, sizeof(cl_mem), &buffers[2]);
     kernel_argument(&probe_compute, kernel, 4, sizeof(cl_mem), &buffers[3]);
-    kernel_launch(&probe_compute, kernel, 1, &count, NULL);
+    kernel_launch(&probe_compute, kernel, 1, NULL, &count, NULL);
     buffer_read(&probe_compute, buffers[2], missed_size, trial->missed);
     buffer_read(&probe_compute, buffers[3], missed_size, trial->missed_by_bounds);
     for (size_t i = 0; i < 4; i++)

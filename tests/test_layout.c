@@ -224,7 +224,7 @@ static void kernel_run(cl_program program, const char *name, void *first, size_t
     kernel_argument(&probe_compute, kernel, 1, sizeof(cl_mem), &buffers[1]);
     kernel_argument(&probe_compute, kernel, 2, sizeof number, &number);
     const size_t one = 1;
-    kernel_launch(&probe_compute, kernel, 1, &one, &one);
+    kernel_launch(&probe_compute, kernel, 1, NULL, &one, &one);
     buffer_read(&probe_compute, buffers[0], first_size, first);
     buffer_read(&probe_compute, buffers[1], second_size, second);
     buffer_release(buffers[0]);

@@ -88,7 +88,7 @@ static void run_triple(void *result)
     cl_kernel kernel = program_kernel(compute, &program, "triple");
     cl_mem buffer = buffer_create(compute, sizeof run->values, NULL, CL_MEM_READ_WRITE);
     kernel_argument(compute, kernel, 0, sizeof buffer, &buffer);
-    LaunchTime time = kernel_launch(compute, kernel, 1, (const size_t[]){16}, (const size_t[]){8});
+    LaunchTime time = kernel_launch(compute, kernel, 1, NULL, (const size_t[]){16}, (const size_t[]){8});
     run->times_sound = time.host_seconds > 0 && (!time.trusted || time.event_seconds > 0);
     run->compiled_after_launch = count_shared_objects();
     buffer_read(compute, buffer, sizeof run->values, run->values);

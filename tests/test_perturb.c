@@ -58,7 +58,7 @@ static void kernel_run(cl_program program, const char *name, size_t work_items, 
                                    is_input ? CL_MEM_READ_ONLY : CL_MEM_WRITE_ONLY);
         kernel_argument(&probe_compute, kernel, (cl_uint)i, sizeof(cl_mem), &buffers[i]);
     }
-    kernel_launch(&probe_compute, kernel, 1, &work_items, NULL);
+    kernel_launch(&probe_compute, kernel, 1, NULL, &work_items, NULL);
     for (size_t i = 0; i < count; i++) {
         if (i >= input_count) buffer_read(&probe_compute, buffers[i], size, numbers[i]);
         buffer_release(buffers[i]);

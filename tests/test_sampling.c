@@ -44,7 +44,7 @@ static Points *points_make(bool is_double, int32_t column, int32_t row, uint32_t
     kernel_argument(&probe_compute, kernel, 3, sizeof row, &row);
     kernel_argument(&probe_compute, kernel, 4, sizeof area, &area);
     const size_t one = 1;
-    kernel_launch(&probe_compute, kernel, 1, &one, &one);
+    kernel_launch(&probe_compute, kernel, 1, NULL, &one, &one);
     buffer_read(&probe_compute, square, sizeof points->square, points->square);
     buffer_read(&probe_compute, disc, sizeof points->disc, points->disc);
     buffer_release(square);

@@ -9,7 +9,7 @@ typedef struct {
     const ProgramRequest *request; // of the kernel's program
     bool is_out_of_line;           // whether the program was built with the out-of-line prelude
     cl_uint dimensions;
-    const size_t *first, *items, *group; // as for kernel_launch_from
+    const size_t *first, *items, *group; // as for kernel_launch
 } Launch;
 
 // Writes a launch and the current contents of its buffers to the device's capture folder, if it has one. Each

@@ -91,6 +91,7 @@ bool compute_check_object(Compute *compute, const void *object, cl_int status, c
 
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped)
 {
+    if (!mapped) return;
     fault_record_call("clEnqueueUnmapMemObject");
     cl_int status = clEnqueueUnmapMemObject(compute->queue, buffer, (void *)(uintptr_t)mapped, 0, NULL, NULL);
     fault_record_call(NULL);

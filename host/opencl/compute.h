@@ -67,7 +67,7 @@ bool compute_check(Compute *compute, cl_int status, const char *call);
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call);
 void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
     __attribute__((format(printf, 4, 5)));
-// Unmaps a buffer that was only read. A failure matters only if a launch follows, which could write to it.
+// Unmaps a buffer, unless `mapped` is NULL. A failure matters only if a launch follows.
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped);
 // Returns "CALL: STATUS (CODE) on DEVICE: detail" after a failure. The caller frees it.
 char *compute_failure_text(const Compute *compute);
@@ -161,14 +161,12 @@ const char *launch_clock_fault(const LaunchTime *time);
 // and no side exceeds its limit.
 void work_group_fit(size_t *sides, cl_uint dimensions, size_t largest, const size_t *longest_sides);
 
-// Launches the kernel over `items` and waits. Returns zeros on failure. Reduces `group`, the preferred
-// work-group, to fit the device and the kernel, and rounds the work-items up to whole groups, so a kernel
-// must not rely on either. If `group` is NULL, the runtime chooses and nothing is rounded.
-LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
-                         const size_t *group);
-// Launches the kernel like kernel_launch, with global ids from `first` on, or from 0 if `first` is NULL.
-LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
-                              const size_t *items, const size_t *group);
+// Launches the kernel over `items`, with global ids from `first` on, or from 0 if `first` is NULL, and waits.
+// Returns zeros on failure. Reduces `group`, the preferred work-group, to fit the device and the kernel, and
+// rounds the work-items up to whole groups, so a kernel must not rely on either. If `group` is NULL, the
+// runtime chooses and nothing is rounded.
+LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
+                         const size_t *items, const size_t *group);
 // Waits for the event of `command`, the OpenCL function that enqueued it, reads and releases it. `host_start`
 // is clock_seconds() before the enqueue. Returns zeros on failure.
 LaunchTime event_time(Compute *compute, cl_event event, const char *command, double host_start);

@@ -96,14 +96,8 @@ static void work_group_fit_kernel(const Device *device, cl_kernel kernel, cl_uin
     work_group_fit(sides, dimensions, largest, longest_sides);
 }
 
-LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *items,
-                         const size_t *group)
-{
-    return kernel_launch_from(compute, kernel, dimensions, NULL, items, group);
-}
-
-LaunchTime kernel_launch_from(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
-                              const size_t *items, const size_t *group)
+LaunchTime kernel_launch(Compute *compute, cl_kernel kernel, cl_uint dimensions, const size_t *first,
+                         const size_t *items, const size_t *group)
 {
     if (!compute_check(compute, compute->unmap_failure.status, compute->unmap_failure.call))
         return (LaunchTime){0};

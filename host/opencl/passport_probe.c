@@ -42,7 +42,7 @@ LaunchTime probe_launch(Measurement *measurement, cl_uint probe, cl_uint first, 
     kernel_argument(compute, measurement->kernel, 5, sizeof count, &count);
     kernel_buffer(compute, measurement->kernel, 6, measurement->results);
     const size_t items = count / measurement->passport->lanes;
-    const LaunchTime time = kernel_launch(compute, measurement->kernel, 1, &items, NULL);
+    const LaunchTime time = kernel_launch(compute, measurement->kernel, 1, NULL, &items, NULL);
     if (compute_ok(compute)) array_push(measurement->launches, time);
     return time;
 }

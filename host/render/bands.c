@@ -53,7 +53,7 @@ static bool band_deliver(Pass *pass, BandBuffers *buffers, unsigned layers, Band
     bool continues = compute_ok(pass->compute) && queue->deliver(queue->context, &band);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++) {
         if (band.layers[layer] != mapped[layer]) free(band.layers[layer]);
-        pass_unmap(pass, buffers->film, mapped[layer]);
+        compute_unmap(pass->compute, buffers->film, mapped[layer]);
     }
     return continues;
 }

@@ -121,7 +121,7 @@ double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, con
     fault_record_kernel(name);
     capture_launch(compute, &(Launch){slot->kernel, &slot->request, slot->program.is_out_of_line, dimensions,
                                       first, items, group});
-    LaunchTime time = kernel_launch_from(compute, slot->kernel, dimensions, first, items, group);
+    LaunchTime time = kernel_launch(compute, slot->kernel, dimensions, first, items, group);
     fault_record_kernel(NULL);
     const bool is_fixed = compute->device->work_group[0] > 0;
     if (is_fixed && memcmp(time.local, group, dimensions * sizeof *group) != 0)

@@ -52,7 +52,7 @@ void kernels_close(Kernels *kernels);
 // Returns the kernel with the scene's arguments set, and builds it when first requested. Returns NULL if the
 // device failed.
 cl_kernel kernels_get(Kernels *kernels, KernelType type);
-// Launches a kernel as kernel_launch_from does and adds the time to the report. Returns the launch's seconds
+// Launches a kernel as kernel_launch does and adds the time to the report. Returns the launch's seconds
 // by its event if that is trusted, else by the host's clock.
 double kernels_launch(Kernels *kernels, KernelType type, cl_uint dimensions, const size_t *first,
                       const size_t *items, const size_t *group);

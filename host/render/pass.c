@@ -198,11 +198,6 @@ void *pass_map(Pass *pass, cl_mem buffer, size_t begin, size_t size, cl_map_flag
     return mapped;
 }
 
-void pass_unmap(Pass *pass, cl_mem buffer, const void *mapped)
-{
-    if (mapped) compute_unmap(pass->compute, buffer, mapped);
-}
-
 bool pass_read(Pass *pass, cl_mem buffer, size_t begin, size_t size, void *bytes)
 {
     Compute *compute = pass->compute;

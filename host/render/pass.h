@@ -56,8 +56,7 @@ static inline uint32_t pass_light_count(const Pass *pass)
 }
 
 // Maps `size` bytes of a buffer, beginning at `begin`, for the host to read or write, and adds the time to
-// the report. Returns NULL if the device failed. pass_unmap releases the mapping and accepts NULL.
+// the report. Returns NULL if the device failed. compute_unmap unmaps them.
 void *pass_map(Pass *pass, cl_mem buffer, size_t begin, size_t size, cl_map_flags access);
-void pass_unmap(Pass *pass, cl_mem buffer, const void *mapped);
 // Reads a part of a buffer, waits, and adds the time to the report. Returns false if the device failed.
 bool pass_read(Pass *pass, cl_mem buffer, size_t begin, size_t size, void *bytes);

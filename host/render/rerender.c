@@ -66,7 +66,7 @@ static void layer_merge(const RerenderedBand *band, Layer layer, const PixelList
                 ((float *)values)[to] = (float)(((const double *)rerendered)[from] / unit);
         }
     free(rerendered);
-    pass_unmap(band->pass, band->buffers->film, values);
+    compute_unmap(band->pass->compute, band->buffers->film, values);
 }
 
 void band_clear_flags(Pass *pass, const BandBuffers *buffers, BandRows rows)
@@ -76,7 +76,7 @@ void band_clear_flags(Pass *pass, const BandBuffers *buffers, BandRows rows)
     const size_t size = film_layer_size(&band, LAYER_FLAG);
     void *values = band_map(pass, buffers, LAYER_FLAG, CL_MAP_READ | CL_MAP_WRITE);
     if (values) memset(values, 0, size);
-    pass_unmap(pass, buffers->film, values);
+    compute_unmap(pass->compute, buffers->film, values);
 }
 
 _Static_assert((int)FLAG_RERENDERED == PASS_FLAGGED && (int)FLAG_UNCERTIFIED == PASS_UNCERTIFIED,
@@ -92,7 +92,7 @@ static void flags_raise(const RerenderedBand *band, const PixelList *list, uint3
         uint32_t *value = &values[list->items[i].index];
         if (*value < flag) *value = flag;
     }
-    pass_unmap(band->pass, buffers->film, values);
+    compute_unmap(band->pass->compute, buffers->film, values);
 }
 
 // Writes a list's pixels and behind them their counts of uncertain samples, which kernels set at sample 0
