@@ -94,7 +94,7 @@ double move_guess(const Renderer *renderer)
 // Opens or moves the renderer for an image of the divisor. Returns false with a message if it cannot.
 static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples, bool is_preview)
 {
-    double start = clock_seconds();
+    const double start = clock_seconds();
     RenderSettings *settings = &loop->settings;
     const ImageSize size = loop->current.size;
     settings->width = settings->region_width = (size.width + divisor - 1) / divisor;
@@ -103,10 +103,11 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
     settings->is_preview = is_preview;
     loop->scene.camera = loop->current.camera;
     MessageList messages = {0};
-    bool prepared;
     if (loop->renderer && settings->precision != loop->current.precision) renderers_close(loop);
     settings->precision = loop->current.precision;
-    if (loop->renderer) {
+    const bool moves = loop->renderer != NULL;
+    bool prepared;
+    if (moves) {
         prepared = renderer_move(loop->renderer, &loop->scene, settings, &messages);
         renderer_report_restart(loop->renderer);
     } else {
@@ -114,11 +115,10 @@ static bool renderer_prepare(FrameLoop *loop, uint32_t divisor, uint32_t samples
         loop->renderer = renderer_open(&loop->compute, &loop->scene, settings, &messages);
         prepared = loop->renderer != NULL;
         if (prepared) loop->expected_move = move_guess(loop->renderer);
-        start = clock_seconds();
     }
     messages_publish(loop, &messages);
     loop->render_start = clock_seconds();
-    loop->move_seconds = loop->render_start - start;
+    loop->move_seconds = moves ? loop->render_start - start : 0;
     if (!is_preview) loop->expected_move = fmax(0.7 * loop->expected_move, loop->move_seconds);
     return prepared;
 }
@@ -181,12 +181,10 @@ bool errors_render(FrameLoop *loop)
     settings.precision = PRECISION_DOUBLE;
     settings.lanes = 0;
     MessageList messages = {0};
-    bool prepared;
-    if (loop->reference)
-        prepared = renderer_move(loop->reference, &loop->scene, &settings, &messages);
-    else
-        prepared =
-            (loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages)) != NULL;
+    const bool moves = loop->reference != NULL;
+    if (!moves) loop->reference = renderer_open(&loop->compute, &loop->scene, &settings, &messages);
+    const bool prepared =
+        moves ? renderer_move(loop->reference, &loop->scene, &settings, &messages) : loop->reference != NULL;
     messages_publish(loop, &messages);
     if (!prepared) return false;
     Reference reference = {loop, film_allocate(settings.width, settings.height, loop->film.light_count, 0)};

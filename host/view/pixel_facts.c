@@ -20,11 +20,6 @@ typedef struct {
     TraceRay ray;
 } Branch;
 
-static Vector3 vector_of(const double values[3])
-{
-    return (Vector3){values[0], values[1], values[2]};
-}
-
 static TraceRay ray_from(const double origin[3], const double direction[3])
 {
     return (TraceRay){.origin = {origin[0], origin[1], origin[2]},
@@ -74,9 +69,10 @@ static void branch_write(PathText *tree, const Branch *branch)
     }
     text_appendf(&tree->text, ", t %.6g\n", hit.t);
     if (branch->depth == 0) {
-        const Vector3 point = vector_add(vector_of(hit.position), view->scene->camera.position);
-        text_appendf(&tree->text, "  at %.6g %.6g %.6g, normal %.4g %.4g %.4g\n", point.x, point.y, point.z,
-                     hit.normal[0], hit.normal[1], hit.normal[2]);
+        const Vector3 eye = view->scene->camera.position;
+        text_appendf(&tree->text, "  at %.6g %.6g %.6g, normal %.4g %.4g %.4g\n", hit.position[0] + eye.x,
+                     hit.position[1] + eye.y, hit.position[2] + eye.z, hit.normal[0], hit.normal[1],
+                     hit.normal[2]);
     }
     const uint32_t material = object_material(view->scene, object, primitive);
     branches_write(tree, branch, &view->scene->materials.items[material], &hit);
@@ -87,9 +83,9 @@ char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y)
     PathText tree = {.view = view};
     const CameraRay ray = camera_ray(&view->scene->camera, view->size, x, y);
     const Vector3 origin = vector_subtract(ray.origin, view->scene->camera.position); // as seen from the eye
-    const double eye[3] = {origin.x, origin.y, origin.z},
-                 direction[3] = {ray.direction.x, ray.direction.y, ray.direction.z};
-    const Branch first = {NULL, 1, 0, ray_from(eye, direction)};
+    const Branch first = {NULL, 1, 0,
+                          ray_from((double[]){origin.x, origin.y, origin.z},
+                                   (double[]){ray.direction.x, ray.direction.y, ray.direction.z})};
     text_appendf(&tree.text, "pixel %u,%u: ", x, y);
     branch_write(&tree, &first);
     return tree.text.items;
