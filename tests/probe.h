@@ -21,7 +21,7 @@ static inline int probe_open(void **state)
 {
     (void)state;
     MessageList messages = {0};
-    device_list_open(&probe_devices);
+    device_list_open(&probe_devices, NULL);
     const Device *device = device_choose(&probe_devices, getenv("GLINT_DEVICE"), &messages);
     message_list_print(&messages, stderr);
     message_list_free(&messages);

@@ -144,6 +144,16 @@ class Commands(CliTestCase):
             self.assertIn("POCL_CACHE_DIR", process.stderr)
 
 
+    def test_untrusted_cache(self):
+        """A folder that others may access costs one warning, however many programs are built."""
+        os.mkdir("shared")
+        os.mkdir("shared/glint")
+        os.chmod("shared/glint", 0o770)
+        folder = os.path.abspath("shared")
+        process = self.glint(f"render sphere.yaml {SMALL} -o shared.npy", env={"XDG_CACHE_HOME": folder})
+        self.assertEqual(process.stderr, f"glint: warning: the kernel cache '{folder}/glint' is not used: others may access it\n")
+
+
 class WrongInput(CliTestCase):
     def test_rays(self):
         for pattern, rays in WRONG_RAYS:

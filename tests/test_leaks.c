@@ -35,7 +35,7 @@ static __attribute__((noinline)) void launch_and_forget(Forgotten forgotten)
 {
     DeviceList list;
     MessageList messages = {0};
-    device_list_open(&list);
+    device_list_open(&list, NULL);
     const Device *device = device_choose(&list, device_selector(NULL), &messages);
     if (!device) _exit(NO_DEVICE);
     message_list_free(&messages);

@@ -173,7 +173,7 @@ static void list_look(void *result)
 {
     ListFacts *facts = result;
     DeviceList list;
-    device_list_open(&list);
+    device_list_open(&list, NULL);
     facts->count = list.count;
     facts->sound = list.empty_platform_count <= list.platform_count;
     for (size_t i = 0; i < list.count; i++) {

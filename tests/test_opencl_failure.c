@@ -154,7 +154,7 @@ TEST(test_discovery)
             call_counts_clear();
             DeviceList list;
             MessageList messages = {0};
-            device_list_open(&list);
+            device_list_open(&list, NULL);
             const Device *chosen = device_choose(&list, NULL, &messages);
             assert_int_equal(messages.count, chosen == NULL);
             if (injected.call) assert_string_equal(list.failed_call, queries[i]);

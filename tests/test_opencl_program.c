@@ -25,10 +25,10 @@ typedef struct {
     Compute compute;
 } Opened;
 
-static void opened_open(Opened *opened)
+static void opened_open(Opened *opened, WarningReceiver *warnings)
 {
     MessageList messages = {0};
-    device_list_open(&opened->list);
+    device_list_open(&opened->list, warnings);
     const Device *device = device_choose(&opened->list, device_selector(NULL), &messages);
     message_list_print(&messages, stderr);
     if (!device) _exit(77);
@@ -76,7 +76,7 @@ static void run_triple(void *result)
 {
     Run *run = result;
     Opened opened;
-    opened_open(&opened);
+    opened_open(&opened, NULL);
     Compute *compute = &opened.compute;
     Program program;
     program_build(compute, &run->request, &program);
@@ -221,13 +221,45 @@ TEST_WITH(test_refused_binary_is_replaced, scratch_set_up, scratch_tear_down)
     Text entry = the_entry(&key), nonsense = {0};
     assert_string_equal(key + strlen(key) - strlen("#endif\n"), "#endif\n");
     text_appendf(&nonsense, "no binary of any driver");
-    cache_store(key, &nonsense);
+    cache_store(key, &nonsense, NULL);
     assert_false(run_in_child(triple_request()).from_cache);
     assert_true(run_in_child(triple_request()).from_cache);
     free(entry_path_found);
     free(key);
     text_free(&entry);
     text_free(&nonsense);
+}
+
+static void warning_keep(void *context, MessageList *warnings)
+{
+    snprintf(context, 256, "%s", warnings->items[0].text);
+}
+
+static void build_without_kernel_folder(void *result)
+{
+    WarningReceiver warnings = {.deliver = warning_keep, .context = result};
+    Opened opened;
+    opened_open(&opened, &warnings);
+    for (size_t i = 0; i < opened.list.count; i++)
+        opened.list.items[i].kernel_folder = "none";
+    ProgramRequest request = triple_request();
+    request.no_cache = true;
+    Program program;
+    program_build(&opened.compute, &request, &program);
+    program_close(&program);
+    opened_close(&opened);
+}
+
+// A warning reaches the receiver and not standard error.
+TEST_WITH(test_kernel_folder_is_missing, scratch_set_up, scratch_tear_down)
+{
+    char warning[256] = "";
+    const ChildEnd end = child_run(build_without_kernel_folder, warning, sizeof warning);
+    assert_int_equal(end.status, 0);
+    assert_string_equal(end.errors, "");
+    static const char start[] = "cannot write 'none/", ending[] = ".log': No such file or directory";
+    assert_memory_equal(warning, start, strlen(start));
+    assert_string_equal(warning + strlen(warning) - strlen(ending), ending);
 }
 
 TEST_WITH(test_two_processes_at_once, scratch_set_up, scratch_tear_down)
@@ -302,7 +334,7 @@ typedef struct {
 static void build_broken(void *result)
 {
     Opened opened;
-    opened_open(&opened);
+    opened_open(&opened, NULL);
     char *text = kernel_compose(broken_files, "root.cl", "");
     cl_int status;
     cl_program program =
@@ -330,7 +362,7 @@ static void ask_for_too_much(void *result)
 {
     (void)result;
     Opened opened;
-    opened_open(&opened);
+    opened_open(&opened, NULL);
     buffer_create(&opened.compute, SIZE_MAX / 2, NULL, CL_MEM_READ_WRITE);
     opened_close(&opened);
 }
@@ -339,7 +371,7 @@ static void use_an_absent_argument(void *result)
 {
     Run *run = result;
     Opened opened;
-    opened_open(&opened);
+    opened_open(&opened, NULL);
     Program program;
     program_build(&opened.compute, &run->request, &program);
     cl_kernel kernel = program_kernel(&opened.compute, &program, "triple");
@@ -353,7 +385,7 @@ static void make_empty_buffers(void *result)
 {
     (void)result;
     Opened opened;
-    opened_open(&opened);
+    opened_open(&opened, NULL);
     buffer_release(buffer_create(&opened.compute, 0, NULL, CL_MEM_READ_ONLY));
     buffer_release(buffer_create(&opened.compute, 0, "", CL_MEM_READ_ONLY));
     opened_close(&opened);

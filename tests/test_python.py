@@ -487,7 +487,29 @@ class Errors(unittest.TestCase):
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             glint.Scene({**SPHERE, "lights": []})
-        self.assertEqual([(w.category, "no lights" in str(w.message)) for w in caught], [(glint.GlintWarning, True)])
+            glint.Scene("camera: {position: [0, 0, 1], look_at: [0, 0, 0],\n focus: 2}\nlights: [directional: {direction: [0, 0, 1]}]\n"
+                        "objects: [sphere: {center: [0, 0, 0], radius: 1}]", name="lens.yaml")
+        self.assertEqual([(w.category, w.filename) for w in caught], [(glint.GlintWarning, __file__)] * 2)
+        self.assertIn("no lights", str(caught[0].message))
+        self.assertEqual(str(caught[1].message).splitlines()[0], "lens.yaml:2:9: warning: 'focus' has no effect without an 'aperture'")
+
+    def test_warnings_of_devices(self):
+        """A device warns once of a kernel cache that others may access, and nothing is printed."""
+        program = f"""if True:
+            import warnings, glint
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                for _ in range(2):
+                    glint.Scene({SPHERE!r}).render(8, 6)
+            for warning in caught:
+                print(warning.category.__name__, warning.filename, warning.message)"""
+        with tempfile.TemporaryDirectory() as folder:
+            Path(folder, "glint").mkdir(mode=0o700)
+            Path(folder, "glint").chmod(0o770)
+            process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False,
+                                     env={**os.environ, "XDG_CACHE_HOME": folder, "PYTHONPATH": str(ROOT / "host/python")})
+            self.assertEqual((process.stdout, process.stderr), (
+                f"GlintWarning <string> glint: warning: the kernel cache '{folder}/glint' is not used: others may access it\n", ""))
 
     def test_later_structs(self):
         """A caller of a later version may set only what this one knows."""

@@ -133,7 +133,7 @@ GlintStatus glint_trace_all(GlintTracer *tracer, const GlintRays *rays, size_t h
     pthread_mutex_lock(&tracer->device->mutex);
     is_sound = rays_trace_all(tracer, &given, hits_max, &found, &list);
     const GlintStatus status =
-        call_end(&list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+        call_end(&list, tracer->device, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     pthread_mutex_unlock(&tracer->device->mutex);
     if (status == GLINT_DONE)
         struct_write(hits, &found, sizeof found);

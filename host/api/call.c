@@ -41,10 +41,11 @@ bool real_is_known(GlintReal real, MessageList *messages)
            message_error(messages, "real is %d; expected GLINT_FLOAT32 or GLINT_FLOAT64", (int)real);
 }
 
-GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages)
+GlintStatus call_end(MessageList *list, GlintDevice *device, GlintStatus status, char **messages)
 {
-    if (compute && !compute_ok(compute)) {
-        char *failure = compute_failure_text(compute);
+    if (device) message_list_move(list, &device->warnings);
+    if (device && !compute_ok(&device->compute)) {
+        char *failure = compute_failure_text(&device->compute);
         message_error(list, "%s", failure);
         free(failure);
         status = GLINT_DEVICE_FAILED;

@@ -22,7 +22,7 @@ GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *
 {
     MessageList list = {0};
     DeviceList devices;
-    device_list_open(&devices);
+    device_list_open(&devices, NULL);
     *count = devices.count;
     const size_t stride = infos ? infos->size : 0;
     bool is_sound = capacity == 0 || stride >= sizeof(size_t);
@@ -40,15 +40,21 @@ GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *
     return call_end(&list, NULL, status, messages);
 }
 
+static void warnings_keep(void *context, MessageList *warnings)
+{
+    GlintDevice *device = context;
+    message_list_move(&device->warnings, warnings);
+}
+
 GlintStatus glint_device_open(const char *selector, GlintDevice **device, char **messages)
 {
     MessageList list = {0};
     GlintDevice *opened = memory_allocate_zeroed(1, sizeof *opened);
-    device_list_open(&opened->list);
+    opened->receiver = (WarningReceiver){.deliver = warnings_keep, .context = opened};
+    device_list_open(&opened->list, &opened->receiver);
     const Device *chosen = device_choose(&opened->list, device_selector(selector), &list);
     if (chosen) compute_open(&opened->compute, chosen);
-    const GlintStatus status =
-        call_end(&list, &opened->compute, chosen ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+    const GlintStatus status = call_end(&list, opened, chosen ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     // a progress function may trace and close tracers on the device that renders
     pthread_mutexattr_t recursive;
     pthread_mutexattr_init(&recursive);
@@ -65,6 +71,7 @@ void glint_device_close(GlintDevice *device)
     if (!device) return;
     compute_close(&device->compute);
     device_list_close(&device->list);
+    message_list_free(&device->warnings);
     pthread_mutex_destroy(&device->mutex);
     free(device);
 }

@@ -2,14 +2,16 @@
 //
 // Functions that can fail return a GlintStatus. Functions with a `messages` parameter, which may be NULL, set
 // *messages to their warnings and errors, one or more lines each, or to NULL if there are none. The caller
-// frees it with glint_text_free.
+// frees it with glint_text_free. Messages about a scene begin with FILE:LINE:COLUMN. A device warns once if
+// its kernel cache cannot be used. The library itself prints nothing, except when memory runs out.
 //
 // Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
 // can add members. Members beyond the caller's size are read as 0.
 //
 // Handles are independent of each other. A device serves one call at a time, and calls from other threads
 // wait. Calls only read a scene, so several threads may use it at once. Listing devices sets the environment
-// variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If memory runs out, the process exits.
+// variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If memory runs out, the process prints a message
+// to stderr and exits.
 #ifndef GLINT_H
 #define GLINT_H
 

@@ -9,7 +9,9 @@
 struct GlintDevice {
     DeviceList list;
     Compute compute;
-    pthread_mutex_t mutex; // held while a call uses the Compute
+    WarningReceiver receiver;
+    MessageList warnings;  // received and not yet passed to the caller
+    pthread_mutex_t mutex; // held while a call uses the Compute or the warnings
 };
 
 struct GlintScene {
@@ -30,9 +32,9 @@ bool struct_read(void *own, size_t own_size, const void *given, MessageList *mes
 // Members that this version does not know become 0.
 void struct_write(void *given, const void *own, size_t own_size);
 
-// Ends a call. Passes its messages to the caller, including the failure of the Compute, if it has one. The
-// Compute may be NULL. Returns `status`, or the status of the failure.
-GlintStatus call_end(MessageList *list, const Compute *compute, GlintStatus status, char **messages);
+// Ends a call. Passes its messages to the caller, including the warnings and the failure of the device, which
+// may be NULL. Returns `status`, or the status of the failure.
+GlintStatus call_end(MessageList *list, GlintDevice *device, GlintStatus status, char **messages);
 
 // Returns whether the caller's struct, which may be NULL, states a size of at least `size_min` bytes, and
 // adds a message if not.

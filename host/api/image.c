@@ -108,7 +108,7 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
                                : rendering.is_stopped ? GLINT_STOPPED
                                                       : GLINT_DONE;
     renderer_close(renderer);
-    const GlintStatus ended = call_end(&list, &device->compute, status, messages);
+    const GlintStatus ended = call_end(&list, device, status, messages);
     pthread_mutex_unlock(&device->mutex);
     return ended;
 }

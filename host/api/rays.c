@@ -20,8 +20,7 @@ GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
     own.lanes = given.lanes;
     pthread_mutex_lock(&device->mutex);
     Renderer *renderer = device_renderer(device, &scene->scene, &own, &list);
-    const GlintStatus status =
-        call_end(&list, &device->compute, renderer ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+    const GlintStatus status = call_end(&list, device, renderer ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     if (status == GLINT_DONE) {
         *tracer = memory_allocate_zeroed(1, sizeof **tracer);
         **tracer = (GlintTracer){device, renderer, precision};
@@ -184,7 +183,7 @@ static GlintStatus call_trace(GlintTracer *tracer, const GlintRays *rays, const 
     pthread_mutex_lock(&tracer->device->mutex);
     const bool is_sound = batches_trace(tracer, rays, arrays, list);
     const GlintStatus status =
-        call_end(list, &tracer->device->compute, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
+        call_end(list, tracer->device, is_sound ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     pthread_mutex_unlock(&tracer->device->mutex);
     return status;
 }

@@ -139,7 +139,7 @@ int command_devices(int argument_count, char **arguments)
     if (status != OPTIONS_READ) return status;
 
     DeviceList list;
-    device_list_open(&list);
+    device_list_open(&list, &device_warnings);
     for (size_t i = 0; i < list.count; i++)
         list.items[i].kernel_folder = options.common.kernel_folder;
     MessageList messages = {0};

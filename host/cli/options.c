@@ -216,9 +216,17 @@ RenderSettings settings_of_scene(const CommonOptions *common, const Scene *scene
     return settings;
 }
 
+static void warnings_print(void *context, MessageList *warnings)
+{
+    (void)context;
+    message_list_print(warnings, stderr);
+}
+
+WarningReceiver device_warnings = {.deliver = warnings_print};
+
 const Device *device_find(DeviceList *devices, const char *selector)
 {
-    device_list_open(devices);
+    device_list_open(devices, &device_warnings);
     MessageList messages = {0};
     const Device *device = device_choose(devices, device_selector(selector), &messages);
     messages_print(&messages, NULL);
@@ -331,7 +339,7 @@ static void computes_open(OpenDevices *open, const Device *const *devices, size_
 bool devices_open(OpenDevices *open, const char *selector)
 {
     *open = (OpenDevices){0};
-    device_list_open(&open->devices);
+    device_list_open(&open->devices, &device_warnings);
     MessageList messages = {0};
     const Device **devices;
     const char *listed = device_selector(selector);
@@ -355,7 +363,7 @@ bool devices_apply_options(OpenDevices *open, const CommonOptions *common)
 bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages)
 {
     *open = (OpenDevices){0};
-    device_list_open(&open->devices);
+    device_list_open(&open->devices, &device_warnings);
     const char *listed = device_selector(selector);
     const Device **devices;
     const Device *first = listed ? NULL : device_choose(&open->devices, NULL, messages);

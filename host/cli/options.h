@@ -93,6 +93,8 @@ typedef struct {
     Compute compute;
 } OpenDevice;
 
+extern WarningReceiver device_warnings; // prints them to stderr
+
 // Chooses a device. Returns NULL with a message if there is none. The list must be closed either way.
 const Device *device_find(DeviceList *devices, const char *selector);
 // Returns whether the device allows its work-group, and prints an error if not.

@@ -12,7 +12,6 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <sodium.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
@@ -231,15 +230,15 @@ static const char *entry_read(Entry *entry, int folder, const char *name)
     return memcmp(&header, &expected, sizeof header) == 0 ? NULL : damaged;
 }
 
-// Prints at most one warning per process.
-static void warnings_print(MessageList *messages)
+// Delivers and frees the messages, unless earlier ones were delivered.
+static void warnings_deliver(WarningReceiver *warnings, MessageList *messages)
 {
-    static atomic_flag is_printed = ATOMIC_FLAG_INIT; // each device's thread loads its programs
-    if (messages->count > 0 && !atomic_flag_test_and_set(&is_printed)) message_list_print(messages, stderr);
+    if (messages->count > 0 && warnings && !atomic_exchange(&warnings->cache_is_reported, true))
+        warnings->deliver(warnings->context, messages);
     message_list_free(messages);
 }
 
-bool cache_load(const char *key, Text *binary)
+bool cache_load(const char *key, Text *binary, WarningReceiver *warnings)
 {
     MessageList messages = {0};
     int folder = folder_open(false, &messages);
@@ -260,7 +259,7 @@ bool cache_load(const char *key, Text *binary)
         text_free(&entry.content);
         close(folder);
     }
-    warnings_print(&messages);
+    warnings_deliver(warnings, &messages);
     return found;
 }
 
@@ -368,7 +367,7 @@ static bool folder_trim(int folder, uint64_t bytes_max, MessageList *messages)
     return is_trimmed;
 }
 
-void cache_trim(uint64_t bytes_max)
+void cache_trim(uint64_t bytes_max, WarningReceiver *warnings)
 {
     MessageList messages = {0}, ignored = {0};
     int folder = folder_open(false, &messages);
@@ -377,7 +376,7 @@ void cache_trim(uint64_t bytes_max)
         message_list_free(&ignored);
         close(folder);
     }
-    warnings_print(&messages);
+    warnings_deliver(warnings, &messages);
 }
 
 static bool entry_write(OutputFile *output, const CacheHeader *header, const char *key, const Text *binary,
@@ -388,7 +387,7 @@ static bool entry_write(OutputFile *output, const CacheHeader *header, const cha
            output_write(output, binary->items, binary->count, messages) && output_commit(output, messages);
 }
 
-void cache_store(const char *key, const Text *binary)
+void cache_store(const char *key, const Text *binary, WarningReceiver *warnings)
 {
     CacheHeader header = header_of(strlen(key), binary->count);
     if (sizeof header + header.key_length + header.binary_length > CACHE_ENTRY_BYTES_MAX) return;
@@ -406,7 +405,7 @@ void cache_store(const char *key, const Text *binary)
     if (locked >= 0) close(locked);
     if (folder >= 0) close(folder);
     message_list_free(&ignored);
-    warnings_print(&messages);
+    warnings_deliver(warnings, &messages);
 }
 
 // Sets the entry's fault or its device.

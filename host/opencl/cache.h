@@ -5,22 +5,24 @@
 // Entries are machine code. The folder and its files are used only if they belong to the user and nobody
 // else may access them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a file of
 // the folder). No function fails because of an entry. An untrusted entry counts as absent, with one warning
-// per process, and is replaced if the folder can be trusted. An entry that cannot be written is discarded.
+// per receiver, and is replaced if the folder can be trusted. An entry that cannot be written is discarded.
 #pragma once
 
 #include "host/base/text.h"
+#include "host/opencl/device.h"
 #include <stdint.h>
 #include <time.h>
 
-// Loads the key's entry into `binary`, which must be empty. Returns false if no trusted entry exists.
-bool cache_load(const char *key, Text *binary);
+// Loads the key's entry into `binary`, which must be empty. Returns false if no trusted entry exists. Here
+// and below `warnings` may be NULL.
+bool cache_load(const char *key, Text *binary, WarningReceiver *warnings);
 // Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX. An entry above CACHE_ENTRY_BYTES_MAX is
 // discarded.
-void cache_store(const char *key, const Text *binary);
+void cache_store(const char *key, const Text *binary, WarningReceiver *warnings);
 
 enum { CACHE_BYTES_MAX = 128 << 20, CACHE_ENTRY_BYTES_MAX = 32 << 20 }; // several hundred programs
 // Removes the least recently used entries until at most `bytes_max` bytes are left.
-void cache_trim(uint64_t bytes_max);
+void cache_trim(uint64_t bytes_max, WarningReceiver *warnings);
 
 typedef struct {
     char *name;        // of the file

@@ -225,9 +225,10 @@ static void arithmetic_query(DeviceList *list, Device *device)
     if (device->fp64 && device->native_double_width == 0) device->native_double_width = 1;
 }
 
-static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device_id id)
+static void device_list_add(DeviceList *list, cl_platform_id platform, cl_device_id id,
+                            WarningReceiver *warnings)
 {
-    Device device = {.platform = platform, .id = id, .index = (unsigned)list->count};
+    Device device = {.platform = platform, .id = id, .index = (unsigned)list->count, .warnings = warnings};
     texts_query(list, &device);
     device_identify(list, &device);
     device_number(list, id, CL_DEVICE_TYPE, &device.type);
@@ -266,7 +267,7 @@ static cl_device_id *platform_devices(DeviceList *list, cl_platform_id platform,
     return ids;
 }
 
-void device_list_open(DeviceList *list)
+void device_list_open(DeviceList *list, WarningReceiver *warnings)
 {
     pocl_compile_once();
     *list = (DeviceList){0};
@@ -284,7 +285,7 @@ void device_list_open(DeviceList *list)
         cl_device_id *ids = platform_devices(list, platforms[i], &device_count);
         if (device_count == 0) list->empty_platform_count++;
         for (cl_uint j = 0; j < device_count; j++)
-            device_list_add(list, platforms[i], ids[j]);
+            device_list_add(list, platforms[i], ids[j], warnings);
         free(ids);
     }
     free(platforms);

@@ -4,9 +4,18 @@
 #define CL_TARGET_OPENCL_VERSION 120
 #include "host/base/message.h"
 #include <CL/cl.h>
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+
+// Receives the warnings about files of the kernel cache and of kernel folders, which affect no result.
+typedef struct {
+    // Called by each thread that builds programs, so perhaps by several at once. May move the messages away.
+    void (*deliver)(void *context, MessageList *warnings);
+    void *context;
+    atomic_bool cache_is_reported; // later warnings about the cache are dropped
+} WarningReceiver;
 
 typedef struct {
     cl_platform_id platform;
@@ -39,6 +48,7 @@ typedef struct {
     // or NULL.
     const char *kernel_folder;
     const char *capture_folder; // receives launches (host/opencl/capture.h); outlives the device; or NULL
+    WarningReceiver *warnings;  // outlives the device; or NULL
 } Device;
 
 typedef struct {
@@ -50,8 +60,9 @@ typedef struct {
 } DeviceList;
 
 // Queries all platforms. The list is empty if there are none, which is not a failure. Sets PoCL's
-// environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set.
-void device_list_open(DeviceList *list);
+// environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. The devices deliver their warnings to
+// `warnings`, which outlives the list, or drop them if it is NULL.
+void device_list_open(DeviceList *list, WarningReceiver *warnings);
 void device_list_close(DeviceList *list);
 // Returns "CALL: STATUS (CODE)", or NULL if no call failed. The caller frees it.
 char *device_list_failure_text(const DeviceList *list);

@@ -67,7 +67,7 @@ static bool passport_load(Passport *passport, const Device *device, PassportMode
 {
     char *key = passport_key(device, mode, lanes);
     Text bytes = {0};
-    const bool is_loaded = cache_load(key, &bytes) && bytes.count == sizeof *passport;
+    const bool is_loaded = cache_load(key, &bytes, device->warnings) && bytes.count == sizeof *passport;
     if (is_loaded) memcpy(passport, bytes.items, sizeof *passport);
     text_free(&bytes);
     free(key);
@@ -79,7 +79,7 @@ static void passport_store(const Passport *passport, const Device *device)
     char *key = passport_key(device, passport->mode, passport->lanes);
     Text bytes = {0};
     text_append(&bytes, (const char *)passport, sizeof *passport);
-    cache_store(key, &bytes);
+    cache_store(key, &bytes, device->warnings);
     text_free(&bytes);
     free(key);
 }

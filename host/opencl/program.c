@@ -175,7 +175,12 @@ static void kernel_file_write(const Device *device, const char *text, const char
     FILE *file = fopen(path, mode);
     bool written = file ? fputs(contents, file) >= 0 : errno == EEXIST;
     if (file && fclose(file) != 0) written = false;
-    if (!written) fprintf(stderr, "glint: warning: cannot write '%s': %s\n", path, strerror(errno));
+    if (!written && device->warnings) {
+        MessageList messages = {0};
+        message_warning(&messages, "cannot write '%s': %s", path, strerror(errno));
+        device->warnings->deliver(device->warnings->context, &messages);
+        message_list_free(&messages);
+    }
     free(path);
 }
 
@@ -255,7 +260,8 @@ static Build build_from_cache(const Compute *compute, const ProgramRequest *requ
     if (request->no_cache || !text) return build;
     char *key = request_key(compute->device, request, text);
     Text binary = {0};
-    if (cache_load(key, &binary)) build = build_from_binary(compute, &binary, request);
+    if (cache_load(key, &binary, compute->device->warnings))
+        build = build_from_binary(compute, &binary, request);
     text_free(&binary);
     free(key);
     return build;
@@ -338,7 +344,7 @@ void program_store(Compute *compute, const ProgramRequest *request, const Progra
     char *text = program_request_text(request, program->is_out_of_line),
          *key = request_key(compute->device, request, text);
     Text binary = {.items = bytes, .count = size, .capacity = size};
-    cache_store(key, &binary);
+    cache_store(key, &binary, compute->device->warnings);
     text_free(&binary);
     free(key);
     free(text);

@@ -77,7 +77,7 @@ int work_set_up(void **state)
     first_thread = pthread_self();
     setenv("TMPDIR", "/dev/null", 1); // no place for the text of programs that do not build
     MessageList messages = {0};
-    device_list_open(&devices);
+    device_list_open(&devices, NULL);
     work_device = device_choose(&devices, device_selector(NULL), &messages);
     message_list_print(&messages, stderr);
     message_list_free(&messages);

@@ -166,14 +166,14 @@ static void cache_fuzz(const char *path, const Source *source, MessageList *mess
     Text binary = {0};
     if (!entry) {
         text_append(&binary, stored, sizeof stored);
-        cache_store(key, &binary);
+        cache_store(key, &binary, NULL);
         text_free(&binary);
         entry = cache_entry_path(key);
         if (!entry) abort();
         input = open(entry, O_WRONLY | O_CLOEXEC);
     }
     input_write(source);
-    if (cache_load(key, &binary) &&
+    if (cache_load(key, &binary, NULL) &&
         (binary.count != sizeof stored || memcmp(binary.items, stored, sizeof stored) != 0))
         abort();
     text_free(&binary);

@@ -106,7 +106,7 @@ int main(int argument_count, char **arguments)
     DeviceList devices;
     Compute compute;
     MessageList messages = {0};
-    device_list_open(&devices);
+    device_list_open(&devices, NULL);
     const Device *device = device_choose(&devices, device_selector(NULL), &messages);
     bool loaded = scene_load(&scene, arguments[1], &(SceneOptions){0}, &messages);
     message_list_print(&messages, stderr);

@@ -376,7 +376,7 @@ int main(int argument_count, char **arguments)
     DeviceList devices;
     Compute compute;
     MessageList messages = {0};
-    device_list_open(&devices);
+    device_list_open(&devices, NULL);
     const Device *device = device_choose(&devices, getenv("GLINT_DEVICE"), &messages);
     message_list_print(&messages, stderr);
     message_list_free(&messages);

@@ -14,6 +14,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import sys
 import threading
 import warnings
 import weakref
@@ -52,7 +53,7 @@ class GlintWarning(UserWarning):
 
 
 def _check(status: int, messages: ctypes.c_void_p) -> None:
-    """Raises an exception or a warning for a call's status and messages."""
+    """Raises an exception for a call's status, or warns its first caller outside of the package, with the call's messages."""
     text = ctypes.string_at(messages).decode("utf-8", "replace").rstrip() if messages else ""
     if messages:
         _c.library.glint_text_free(messages)
@@ -63,7 +64,10 @@ def _check(status: int, messages: ctypes.c_void_p) -> None:
     if status == 3:
         raise Stopped()
     if text:
-        warnings.warn(text, GlintWarning, stacklevel=3)
+        frame, level = sys._getframe(), 1
+        while frame.f_back and frame.f_globals.get("__package__") == __package__:
+            frame, level = frame.f_back, level + 1
+        warnings.warn(text, GlintWarning, stacklevel=level)
 
 
 def version() -> str:
