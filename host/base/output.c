@@ -1,5 +1,4 @@
 #include "host/base/output.h"
-#include "host/base/array.h"
 #include "host/base/fault.h"
 #include "host/base/file.h"
 #include "host/base/memory.h"
@@ -16,55 +15,47 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-// Temporaries that are not yet renamed, for the exit handler.
-typedef struct {
-    int folder;
-    const char *name;
-} Pending;
-
-static ARRAY_OF(Pending) pending;
-
-// Guards `pending`, which threads share. It is recursive, because lack of memory in array_reserve or
-// array_push runs the exit handler in the thread that holds it.
-static pthread_mutex_t pending_mutex = PTHREAD_RECURSIVE_MUTEX_INITIALIZER_NP;
+// The files with a temporary, and their mutex. They are global, because temporaries are removed when any
+// thread calls exit(). The list allocates nothing, so no fault calls exit() while its mutex is locked.
+static OutputFile *pending;
+static pthread_mutex_t pending_mutex = PTHREAD_MUTEX_INITIALIZER;
 
 static void pending_remove_all(void)
 {
     pthread_mutex_lock(&pending_mutex);
-    for (size_t i = 0; i < pending.count; i++)
-        unlinkat(pending.items[i].folder, pending.items[i].name, 0);
-    free(pending.items);
-    pending.items = NULL;
-    pending.count = pending.capacity = 0;
+    for (; pending; pending = pending->next_pending)
+        unlinkat(pending->folder, pending->temporary, 0);
     pthread_mutex_unlock(&pending_mutex);
 }
 
-// Reserves an entry before a temporary gets its name, so that registering it fails only if memory runs out
-// after another thread used the entry. The temporary is then stale.
-static void pending_prepare(void)
+static void exit_handler_register(void)
 {
-    static bool is_registered;
+    if (atexit(pending_remove_all) != 0) fault("atexit failed");
+}
+
+// Gives a file its temporary, whose name it owns from then on.
+static void pending_add(OutputFile *output, char *temporary)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, exit_handler_register);
     pthread_mutex_lock(&pending_mutex);
-    if (!is_registered && atexit(pending_remove_all) != 0) fault("atexit failed");
-    is_registered = true;
-    array_reserve(pending, 1);
+    output->temporary = temporary;
+    output->next_pending = pending;
+    pending = output;
     pthread_mutex_unlock(&pending_mutex);
 }
 
-static void pending_add(int folder, const char *name)
+// Forgets the temporary of a file, which may have none.
+static void pending_drop(OutputFile *output)
 {
     pthread_mutex_lock(&pending_mutex);
-    array_push(pending, ((Pending){folder, name}));
+    OutputFile **at = &pending;
+    while (*at && *at != output)
+        at = &(*at)->next_pending;
+    if (*at) *at = output->next_pending;
     pthread_mutex_unlock(&pending_mutex);
-}
-
-static void pending_drop(const char *name)
-{
-    pthread_mutex_lock(&pending_mutex);
-    for (size_t i = 0; i < pending.count; i++) {
-        if (pending.items[i].name == name) pending.items[i--] = pending.items[--pending.count];
-    }
-    pthread_mutex_unlock(&pending_mutex);
+    free(output->temporary);
+    output->temporary = NULL;
 }
 
 static bool output_failed(OutputFile *output, const char *doing, MessageList *messages)
@@ -122,14 +113,12 @@ enum { TEMPORARY_TRIES = 1000 };
 static int named_open(OutputFile *output, mode_t mode)
 {
     stale_temporaries_remove(output);
-    pending_prepare();
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
         int descriptor = openat(output->folder, name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
         // a process that removes stale temporaries may have locked it first
         if (descriptor >= 0 && file_lock(descriptor) == FILE_LOCKED) {
-            output->temporary = name;
-            pending_add(output->folder, name);
+            pending_add(output, name);
             return descriptor;
         }
         free(name);
@@ -171,12 +160,10 @@ static bool unnamed_link(OutputFile *output)
     if (errno != EEXIST) return false;
     stale_temporaries_remove(output);
     flock(descriptor, LOCK_EX | LOCK_NB);
-    pending_prepare();
     for (unsigned i = 0; i < TEMPORARY_TRIES; i++) {
         char *name = temporary_name(output, i);
         if (linkat(AT_FDCWD, link.path, output->folder, name, AT_SYMLINK_FOLLOW) == 0) {
-            output->temporary = name;
-            pending_add(output->folder, name);
+            pending_add(output, name);
             return true;
         }
         free(name);
@@ -303,11 +290,7 @@ bool output_commit(OutputFile *output, MessageList *messages)
         bool is_named = output->temporary || unnamed_link(output);
         if (is_named && output->temporary) {
             is_named = renameat(output->folder, output->temporary, output->folder, output->name) == 0;
-            if (is_named) {
-                pending_drop(output->temporary);
-                free(output->temporary);
-                output->temporary = NULL;
-            }
+            if (is_named) pending_drop(output);
         }
         if (!is_named || (!output->is_private && !file_sync(output->folder)))
             return output_failed(output, "write", messages);
@@ -322,12 +305,9 @@ bool output_commit(OutputFile *output, MessageList *messages)
 void output_abandon(OutputFile *output)
 {
     if (output->file && output->file != stdout) fclose(output->file);
-    if (output->temporary) {
-        unlinkat(output->folder, output->temporary, 0);
-        pending_drop(output->temporary);
-    }
+    if (output->temporary) unlinkat(output->folder, output->temporary, 0);
+    pending_drop(output);
     if (output->has_folder) close(output->folder);
-    free(output->temporary);
     free(output->target);
     *output = (OutputFile){0};
 }

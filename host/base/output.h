@@ -7,13 +7,15 @@
 #include <stdbool.h>
 #include <stdio.h>
 
-typedef struct {
+// An open OutputFile must not be moved in memory, because the list of those with a temporary refers to it.
+typedef struct OutputFile {
     FILE *file;
     char *target;
     int folder; // of the target; undefined where the target is written directly, a device or a pipe
     bool has_folder, is_private, is_finished;
-    const char *name; // of the target in its folder
-    char *temporary;  // the name in the folder until the rename; NULL: none
+    const char *name;                // of the target in its folder
+    char *temporary;                 // the name in the folder until the rename; NULL: none
+    struct OutputFile *next_pending; // another file with a temporary
 } OutputFile;
 
 // Opens a file for `target` or, for `-`, standard output, which main flushes. On failure adds a message and
