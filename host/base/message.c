@@ -1,10 +1,8 @@
 #include "host/base/message.h"
 #include "host/base/array.h"
-#include "host/base/fault.h"
 #include "host/base/text.h"
 
 #include <ctype.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,10 +44,8 @@ static size_t character_count(const char *bytes, size_t length)
 
 static char *message_format(const char *format, va_list arguments)
 {
-    char *formatted;
-    int length = vasprintf(&formatted, format, arguments);
-    if (length < 0) fault("out of memory: message");
-    char *text = printable_copy(formatted, (size_t)length, SIZE_MAX, false);
+    char *formatted = text_format_list(format, arguments);
+    char *text = printable_copy(formatted, strlen(formatted), SIZE_MAX, false);
     free(formatted);
     return text;
 }

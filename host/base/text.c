@@ -5,7 +5,6 @@
 
 #include <errno.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,22 +22,25 @@ void text_appendf(Text *text, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
-    char *formatted;
-    int length = vasprintf(&formatted, format, arguments);
+    char *formatted = text_format_list(format, arguments);
     va_end(arguments);
-    if (length < 0) fault("out of memory: text");
-    text_append(text, formatted, (size_t)length);
+    text_append(text, formatted, strlen(formatted));
     free(formatted);
 }
 
 char *text_format(const char *format, ...)
 {
-    char *formatted;
     va_list arguments;
     va_start(arguments, format);
-    int length = vasprintf(&formatted, format, arguments);
+    char *formatted = text_format_list(format, arguments);
     va_end(arguments);
-    if (length < 0) fault("out of memory: text");
+    return formatted;
+}
+
+char *text_format_list(const char *format, va_list arguments)
+{
+    char *formatted;
+    if (vasprintf(&formatted, format, arguments) < 0) fault("out of memory: text");
     return formatted;
 }
 

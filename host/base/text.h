@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/base/message.h"
+#include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -14,9 +15,11 @@ typedef struct {
 
 void text_append(Text *text, const char *bytes, size_t length);
 void text_appendf(Text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
-char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2))); // never NULL; caller frees
-const char *text_c(const Text *text);                                             // never NULL
-void text_free(Text *text);                                                       // frees and zeroes
+// Return a formatted text, never NULL. The caller frees it.
+char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2)));
+char *text_format_list(const char *format, va_list arguments) __attribute__((format(printf, 1, 0)));
+const char *text_c(const Text *text); // never NULL
+void text_free(Text *text);           // frees and zeroes
 
 // A short text that is returned by value.
 typedef struct {

@@ -1,9 +1,8 @@
 #include "host/import/report.h"
 #include "host/base/array.h"
-#include "host/base/fault.h"
 #include "host/base/hash.h"
+#include "host/base/text.h"
 
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,8 +16,7 @@ Report report_open(const Source *source, MessageList *messages)
 static void report_add(Report *report, MessageSeverity severity, size_t offset, const char *format,
                        va_list arguments)
 {
-    char *text;
-    if (vasprintf(&text, format, arguments) < 0) fault("out of memory: message");
+    char *text = text_format_list(format, arguments);
     message_add_at(report->messages, severity, report->source, offset, "%s", text);
     free(text);
 }

@@ -5,7 +5,6 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/opencl/capture.h"
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,10 +48,9 @@ static void failure_keep(Compute *compute, const char *call, cl_int status, char
 
 void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
 {
-    char *text;
     va_list arguments;
     va_start(arguments, detail);
-    if (vasprintf(&text, detail, arguments) < 0) fault("out of memory: message");
+    char *text = text_format_list(detail, arguments);
     va_end(arguments);
     failure_keep(compute, call, status, text);
 }
