@@ -13,7 +13,7 @@ bool scene_read_text(Scene *scene, const char *name, const Text *text, bool leni
     if (!strcmp(ending, ".rt")) return scene_read_rt(scene, &source, &options, messages);
     if (!strcmp(ending, ".cfg")) return scene_read_cfg(scene, &source, messages);
     if (!strcmp(ending, ".nff")) return scene_read_nff(scene, &source, messages);
-    if (!strcmp(ending, ".dat")) return scene_read_dat(scene, &source, messages);
+    if (!strcmp(ending, ".dat")) return scene_read_dat(scene, &source, &options, messages);
     return scene_read_yaml(scene, &source, &options, messages);
 }
 

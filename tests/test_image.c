@@ -55,7 +55,7 @@ static Image image_read_file(const char *path)
 {
     MessageList messages = {0};
     Image image;
-    assert_true(image_read(&image, path, &messages));
+    assert_true(image_read(&image, path, NULL, &messages));
     check_no_messages(&messages);
     return image;
 }
@@ -308,7 +308,7 @@ TEST(test_finished_is_yet_to_be_renamed)
             assert_int_equal(folder_count(""), before);
         }
         Image image;
-        assert_true(image_read(&image, path, &messages));
+        assert_true(image_read(&image, path, NULL, &messages));
         assert_int_equal(image.height, 40);
         image_free(&image);
         check_no_messages(&messages);
@@ -350,7 +350,7 @@ static void check_warning(const char *path, const char *expected)
 {
     MessageList messages = {0};
     Image image;
-    assert_true(image_read(&image, path, &messages));
+    assert_true(image_read(&image, path, NULL, &messages));
     assert_int_equal(messages.count, expected ? 1 : 0);
     if (expected && !strstr(messages.items[0].text, expected)) fail_msg("%s", messages.items[0].text);
     image_free(&image);
@@ -361,7 +361,7 @@ static void check_layer(const char *layer, const void *expected, uint32_t channe
 {
     MessageList messages = {0};
     Image image;
-    assert_true(image_read_layer(&image, "layers.exr", layer, &messages));
+    assert_true(image_read(&image, "layers.exr", &(ImageReadOptions){.layer = layer}, &messages));
     check_no_messages(&messages);
     assert_int_equal(image.width, 4);
     assert_int_equal(image.height, 33);
@@ -409,7 +409,7 @@ TEST(test_exr_layers)
     check_layer("vector", vectors, 3, false);
     check_layer("number", numbers, 1, true);
     Image image;
-    assert_false(image_read_layer(&image, "layers.exr", "mask", &messages));
+    assert_false(image_read(&image, "layers.exr", &(ImageReadOptions){.layer = "mask"}, &messages));
     message_list_free(&messages);
     free(color);
     free(vectors);
@@ -473,7 +473,7 @@ TEST(test_jpeg_is_turned_upright)
         jpeg_write("turned.jpg", segment, sizeof segment - 1, TJPF_RGBX);
         MessageList messages = {0};
         Image image;
-        assert_true(image_read(&image, "turned.jpg", &messages));
+        assert_true(image_read(&image, "turned.jpg", NULL, &messages));
         check_no_messages(&messages);
         const bool is_upright = orientation < 5 || orientation > 8;
         assert_int_equal(image.width, is_upright ? 32 : 16);
@@ -501,7 +501,7 @@ TEST(test_jpeg_of_other_colors)
     jpeg_write("a.jpg", "", 0, TJPF_CMYK);
     MessageList messages = {0};
     Image image;
-    assert_false(image_read(&image, "a.jpg", &messages));
+    assert_false(image_read(&image, "a.jpg", NULL, &messages));
     check_only_message(&messages, "cannot read 'a.jpg': JPEG: CMYK colors are not supported; "
                                   "convert the image to RGB");
 }
@@ -529,7 +529,7 @@ static void check_refused(const char *bytes, size_t length, const char *reason)
     file_write_bytes("bad", bytes, length);
     MessageList messages = {0};
     Image image;
-    assert_false(image_read(&image, "bad", &messages));
+    assert_false(image_read(&image, "bad", NULL, &messages));
     assert_null(image.values);
     check_only_message(&messages, formatted("cannot read 'bad': %s", reason));
 }
@@ -596,16 +596,15 @@ TEST(test_png_with_a_large_note)
 // 2 x 2 pixels are fewer than 5, 3 x 2 are not.
 TEST(test_pixels_are_limited)
 {
-    image_limit_pixels(5);
+    const ImageReadOptions options = {.max_pixels = 5};
     file_write_bytes("small.ppm", "P6 2 2 255 123456789abc", 23);
-    Image image = image_read_file("small.ppm");
+    MessageList messages = {0};
+    Image image;
+    assert_true(image_read(&image, "small.ppm", &options, &messages));
     image_free(&image);
     file_write_bytes("large.ppm", "P6 3 2 255 123456789abcdefghi", 29);
-    MessageList messages = {0};
-    assert_false(image_read(&image, "large.ppm", &messages));
-    check_only_message(&messages, "cannot read 'large.ppm': 3 x 2 pixels are more than 5; "
-                                  "--max-pixels raises this limit");
-    image_limit_pixels(IMAGE_PIXELS_MAX);
+    assert_false(image_read(&image, "large.ppm", &options, &messages));
+    check_only_message(&messages, "cannot read 'large.ppm': 3 x 2 pixels are more than max-pixels, which is 5");
     image = image_read_file("large.ppm");
     image_free(&image);
     unlink("small.ppm");

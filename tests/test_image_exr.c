@@ -115,7 +115,7 @@ static void exr_write(const char *names, Type type)
 
 static bool layer_read(Image *image, const char *layer, MessageList *messages)
 {
-    const bool done = image_read_layer(image, path, layer, messages);
+    const bool done = image_read(image, path, &(ImageReadOptions){.layer = layer}, messages);
     assert_true(done == (message_count(messages, MESSAGE_ERROR) == 0));
     return done;
 }
@@ -364,7 +364,7 @@ TEST(test_blocks_as_large_as_compressed)
             assert_true(image_writer_rows(writer, values, 1, &messages));
             assert_true(image_writer_commit(writer, &messages));
             Image image;
-            assert_true(image_read(&image, path, &messages));
+            assert_true(image_read(&image, path, NULL, &messages));
             assert_memory_equal(image.values, values, width * sizeof *values);
             image_free(&image);
         }
@@ -411,7 +411,7 @@ TEST(test_rows_in_any_number)
     text_free(&whole);
     Image image;
     MessageList messages = {0};
-    assert_true(image_read(&image, path, &messages));
+    assert_true(image_read(&image, path, NULL, &messages));
     assert_memory_equal(image.values, values[0], sizeof values[0]);
     image_free(&image);
 }

@@ -511,6 +511,17 @@ class Errors(unittest.TestCase):
             self.assertEqual((process.stdout, process.stderr), (
                 f"GlintWarning <string> glint: warning: the kernel cache '{folder}/glint' is not used: others may access it\n", ""))
 
+    def test_max_pixels(self):
+        """An image of the scene may have as many pixels as the call permits."""
+        with tempfile.TemporaryDirectory() as folder:
+            image, path = Path(folder, "image.ppm"), Path(folder, "scene.yaml")
+            image.write_bytes(b"P6 3 2 255 " + bytes(18))
+            path.write_text(json.dumps({**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": 1, "material": {"image": "image.ppm"}}}]}))
+            for make in lambda most: glint.load(path, max_pixels=most), lambda most: glint.Scene(path.read_text(), name=str(path), max_pixels=most):
+                self.assertEqual([make(most).object_count for most in (0, 6)], [1, 1])
+                with self.assertRaisesRegex(glint.SceneError, rf"scene.yaml:1:\d+: error: cannot read '{image}': 3 x 2 pixels are more than max-pixels, which is 5"):
+                    make(5)
+
     def test_later_structs(self):
         """A caller of a later version may set only what this one knows."""
         library = glint._c.library

@@ -87,7 +87,8 @@ static Scene soak_scene(Random *random)
     textured.checker.is_on = false;
     textured.image.texture = scene_add_texture(&scene, image_path, NULL, false, 0);
     MessageList messages = {0};
-    assert_true(image_read(&scene.textures.items[textured.image.texture - 1].image, image_path, &messages));
+    assert_true(
+        image_read(&scene.textures.items[textured.image.texture - 1].image, image_path, NULL, &messages));
     textured.texture_size = random_between(random, 0.5, 4);
     array_push(scene.materials, textured);
     for (uint32_t i = 0; i < kept; i++)

@@ -499,7 +499,7 @@ TEST(jpeg_is_read)
     fclose(file);
     Image image;
     MessageList messages = {0};
-    assert_true(image_read(&image, texture_path, &messages));
+    assert_true(image_read(&image, texture_path, NULL, &messages));
     assert_int_equal(image.width, SIDE);
     assert_int_equal(image.height, SIDE);
     assert_true(image.display);
@@ -519,7 +519,7 @@ TEST(jpeg_is_read)
     scene_free(&scene);
 
     assert_int_equal(truncate(texture_path, 20), 0);
-    assert_false(image_read(&image, texture_path, &messages));
+    assert_false(image_read(&image, texture_path, NULL, &messages));
     message_list_free(&messages);
     tjFree(bytes);
     tjDestroy(encoder);

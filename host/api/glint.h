@@ -90,6 +90,7 @@ typedef struct {
     double frame; // the frame of an animated scene, which its shutter does not blur
     // The path of another scene, whose camera replaces the scene's, or NULL. Only glint_scene_load uses it.
     const char *camera;
+    uint32_t max_pixels; // images with more pixels are refused; 0 means 134217728
 } GlintSceneOptions;
 
 // Reads a scene, mesh or glTF file. `options` may be NULL. Sets *scene to NULL on failure. Formats that

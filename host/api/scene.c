@@ -33,6 +33,7 @@ static bool options_read(SceneOptions *options, const GlintSceneOptions *given, 
     options->override_count = own.override_count;
     options->frame = own.frame;
     options->camera = own.camera;
+    options->max_pixels = own.max_pixels;
     return true;
 }
 

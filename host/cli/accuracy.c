@@ -97,7 +97,8 @@ static bool reference_read(Accuracy *accuracy)
     const char *path = accuracy->options.reference_path;
     const RenderSettings *settings = &accuracy->set.variants[0].settings;
     Image image;
-    if (!image_read(&image, path, &accuracy->messages)) return false;
+    const ImageReadOptions reading = {.max_pixels = accuracy->options.variants.common.max_pixels};
+    if (!image_read(&image, path, &reading, &accuracy->messages)) return false;
     const char *fault = image.display ? "display values; linear light is needed, of an .exr or .npy"
                         : image.data || image.channels != 3 ? "no colors"
                                                             : NULL;

@@ -25,7 +25,7 @@ static const struct {
 };
 
 typedef struct {
-    uint32_t input_pixels_max;
+    uint32_t max_pixels;
     CommandOperands images;
     const char *reference_path, *test_path, *heatmap_path, *layer;
     ReportOptions report;
@@ -82,7 +82,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
              "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
              "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(max_pixels_option, DiffOptions, input_pixels_max),
+    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(max_pixels_option, DiffOptions, max_pixels),
                OPTIONS_WITHIN(report_options, DiffOptions, report)},
     OPERANDS(ANY, DiffOptions, images),
     .check = options_check};
@@ -324,7 +324,8 @@ static bool heatmap_make(const DiffOptions *options, const ComparedImages *compa
 static bool side_read(Image *image, const DiffOptions *options, const char *path, MessageList *messages)
 {
     const bool has_layers = image_format_of(path) == IMAGE_EXR;
-    return image_read_layer(image, path, has_layers ? options->layer : NULL, messages);
+    const ImageReadOptions reading = {has_layers ? options->layer : NULL, options->max_pixels};
+    return image_read(image, path, &reading, messages);
 }
 
 static bool images_compare(const DiffOptions *options, ComparedImages *comparison, MessageList *messages)

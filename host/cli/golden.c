@@ -104,7 +104,7 @@ static const CommandLine command_line = {
     .groups = {OPTIONS(options_own), OPTION_WITHIN(ray_options[RAY_BOUNCES], GoldenOptions, common),
                OPTIONS_WITHIN(device_option, GoldenOptions, common),
                OPTIONS_WITHIN(common_options, GoldenOptions, common),
-               OPTIONS_WITHIN(max_pixels_option, GoldenOptions, common.input_pixels_max),
+               OPTIONS_WITHIN(max_pixels_option, GoldenOptions, common.max_pixels),
                OPTIONS_WITHIN(driver_options, GoldenOptions, common),
                OPTIONS_WITHIN(report_options, GoldenOptions, report)},
     OPERANDS(ANY, GoldenOptions, scenes),

@@ -5,7 +5,6 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/progress.h"
-#include "host/image/image.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -44,12 +43,6 @@ static bool lanes_read(const Option *option, const char *value, void *options)
     uint32_t *lanes = &((CommonOptions *)options)->lanes;
     if (!option_choice(option, value, options)) return false;
     *lanes = lanes_choice_values[*lanes];
-    return true;
-}
-
-static bool input_pixels_limit(const Option *option, void *options)
-{
-    image_limit_pixels(*(const uint32_t *)option_field(option, options));
     return true;
 }
 
@@ -116,7 +109,7 @@ const Option common_options[] = {
     [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)}};
 const Option max_pixels_option[] = {{"max-pixels", "N",
                                      "refuse input images with more pixels (default: 134217728)",
-                                     option_count, 0, NUMBERS(1, UINT32_MAX), .effect = input_pixels_limit}};
+                                     option_count, 0, NUMBERS(1, UINT32_MAX)}};
 const Option ray_options[] = {
     [RAY_BOUNCES] = {"bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)",
                      option_count, FIELD(bounce_count), NUMBERS(0, BOUNCES_MAX)},
@@ -163,6 +156,7 @@ SceneOptions scene_options_of(const CommonOptions *common)
                           .override_name = "--set",
                           .override_count = common->override_count,
                           .frame = common->frame,
+                          .max_pixels = common->max_pixels,
                           .camera = common->camera,
                           .stage = common->stage};
 }

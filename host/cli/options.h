@@ -29,7 +29,7 @@ typedef struct {
     uint32_t work_group[2];               // 0 if not given
     const char *kernel_folder;            // NULL if not given
     const char *capture_folder;           // NULL if not given
-    uint32_t input_pixels_max;            // see max_pixels_option
+    uint32_t max_pixels;                  // see max_pixels_option
     const char *overrides[OVERRIDES_MAX]; // --set, in order
     size_t override_count;
     const char *camera; // the scene of --camera, NULL if not given
@@ -56,7 +56,7 @@ OptionReader option_precision;              // of CommonOptions
 #define SCENE_GROUPS(Type, common)                                                                           \
     OPTIONS_WITHIN(set_options, Type, common), OPTIONS_WITHIN(device_option, Type, common),                  \
         OPTIONS_WITHIN(common_options, Type, common),                                                        \
-        OPTIONS_WITHIN(max_pixels_option, Type, common.input_pixels_max)
+        OPTIONS_WITHIN(max_pixels_option, Type, common.max_pixels)
 
 enum { BOUNCES_DEFAULT = 5 };
 

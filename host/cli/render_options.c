@@ -268,7 +268,7 @@ static const CommandLine command_line = {
                OPTIONS_WITHIN(reference_option, RenderOptions, common),
                OPTIONS_WITHIN(precision_option, RenderOptions, common),
                OPTIONS_WITHIN(common_options, RenderOptions, common),
-               OPTIONS_WITHIN(max_pixels_option, RenderOptions, common.input_pixels_max),
+               OPTIONS_WITHIN(max_pixels_option, RenderOptions, common.max_pixels),
                OPTIONS_WITHIN(driver_options, RenderOptions, common),
                OPTIONS_WITHIN(perturb_option, RenderOptions, common)},
     OPERANDS(SCENES, RenderOptions, scenes),

@@ -35,7 +35,7 @@ enum { SECONDS_MAX = 1000000000 };
         OPTIONS_WITHIN(device_option, Type, variants.common),                                                \
         OPTIONS_WITHIN(reference_option, Type, variants.common),                                             \
         OPTION_WITHIN(common_options[COMMON_LENIENT], Type, variants.common),                                \
-        OPTIONS_WITHIN(max_pixels_option, Type, variants.common.input_pixels_max)
+        OPTIONS_WITHIN(max_pixels_option, Type, variants.common.max_pixels)
 
 typedef struct {
     Scene *scenes;

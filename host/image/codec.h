@@ -33,7 +33,7 @@ extern const Encoder png_encoder, ppm_encoder, exr_encoder, npy_encoder;
 // Decoders read a file's bytes from memory.
 typedef struct {
     const char *path;
-    const char *layer; // of an EXR file; NULL: the default
+    ImageReadOptions options;
     const uint8_t *bytes;
     size_t length;
     MessageList *messages;

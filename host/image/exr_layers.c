@@ -169,18 +169,19 @@ static bool layers_refuse(const CandidateList *list, const ImageFile *file, bool
 static bool named_layer_find(exr_const_context_t context, const CandidateList *list, const ImageFile *file,
                              ExrLayer *layer)
 {
-    const size_t length = strlen(file->layer);
+    const char *name = file->options.layer;
+    const size_t length = strlen(name);
     char problem[128];
     for (size_t i = 0; i < list->count; i++) {
         const Candidate *candidate = &list->items[i];
-        if (candidate->length != length || memcmp(candidate->name, file->layer, length) != 0) continue;
+        if (candidate->length != length || memcmp(candidate->name, name, length) != 0) continue;
         *layer = layer_of(candidate);
         if (layer->form != EXR_OTHER) return true;
         snprintf(problem, sizeof problem,
-                 "its layer '%.40s' has neither colors, luminance, X, Y and Z, nor one channel", file->layer);
+                 "its layer '%.40s' has neither colors, luminance, X, Y and Z, nor one channel", name);
         return channels_refuse(context, file, problem);
     }
-    snprintf(problem, sizeof problem, "it has no layer '%.40s'", file->layer);
+    snprintf(problem, sizeof problem, "it has no layer '%.40s'", name);
     return channels_refuse(context, file, problem);
 }
 
@@ -214,7 +215,7 @@ bool exr_layer_find(exr_const_context_t context, const ImageFile *file, ExrLayer
         image_refuse(file, "EXR: %s", exr_get_default_error_message(code));
     else if (list.count == 0 && part_count > 0)
         image_refuse(file, "EXR: deep images are not supported");
-    else if (file->layer)
+    else if (file->options.layer)
         found = named_layer_find(context, &list, file, layer);
     else
         found = unnamed_layer_find(context, &list, file, layer);

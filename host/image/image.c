@@ -170,13 +170,6 @@ void image_warn(const ImageFile *file, const char *format, ...)
     message_warning(file->messages, "'%s': %s", file->path, loss);
 }
 
-static uint32_t pixels_max = IMAGE_PIXELS_MAX;
-
-void image_limit_pixels(uint32_t largest)
-{
-    pixels_max = largest;
-}
-
 bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_t height, uint64_t channels,
                     uint64_t expansion)
 {
@@ -187,9 +180,10 @@ bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_
         __builtin_mul_overflow(width * height, channels, &values) ||
         __builtin_mul_overflow(values, sizeof *image->values, &bytes) || bytes > most)
         return image_refuse(file, "the file is too short for its image");
-    if (width * height > pixels_max)
-        return image_refuse(file, "%ju x %ju pixels are more than %u; --max-pixels raises this limit",
-                            (uintmax_t)width, (uintmax_t)height, pixels_max);
+    const uint32_t max_pixels = file->options.max_pixels ? file->options.max_pixels : IMAGE_PIXELS_MAX;
+    if (width * height > max_pixels)
+        return image_refuse(file, "%ju x %ju pixels are more than max-pixels, which is %u", (uintmax_t)width,
+                            (uintmax_t)height, max_pixels);
     size_t count;
     if (__builtin_add_overflow(values, 0, &count) || !(image->values = calloc(count, sizeof *image->values)))
         return image_refuse(file, "the image does not fit into memory");
@@ -222,8 +216,8 @@ static bool (*decoder_of(const void *bytes, size_t length))(Image *image, const 
 static bool image_decode(Image *image, const ImageFile *file)
 {
     bool (*decode)(Image *, const ImageFile *) = decoder_of(file->bytes, file->length);
-    if (file->layer && decode && decode != exr_decode)
-        return image_refuse(file, "it has no layer '%.40s': only EXR files have layers", file->layer);
+    if (file->options.layer && decode && decode != exr_decode)
+        return image_refuse(file, "it has no layer '%.40s': only EXR files have layers", file->options.layer);
     return decode ? decode(image, file) : image_refuse(file, "neither PNG, JPEG, PPM, EXR nor NPY");
 }
 
@@ -241,33 +235,25 @@ bool image_is_known(const char *path)
     return image_bytes_are_known(bytes, length);
 }
 
-static bool image_read_from(Image *image, const Source *source, const char *layer, MessageList *messages)
+bool image_read_bytes(Image *image, const Source *source, const ImageReadOptions *options,
+                      MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
-    const ImageFile file = {source->file, layer, (const uint8_t *)source->bytes, source->length, messages};
+    const ImageFile file = {source->file, options ? *options : (ImageReadOptions){0},
+                            (const uint8_t *)source->bytes, source->length, messages};
     const bool done = image_decode(image, &file);
     if (!done) image_free(image);
     return done;
 }
 
-bool image_read_bytes(Image *image, const Source *source, MessageList *messages)
-{
-    return image_read_from(image, source, NULL, messages);
-}
-
-bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages)
+bool image_read(Image *image, const char *path, const ImageReadOptions *options, MessageList *messages)
 {
     *image = (Image){.transfer = TRANSFER_NONE};
     Text text = {0};
     const bool done = text_read_file(&text, path, messages) &&
-                      image_read_from(image, &(Source){path, text_c(&text), text.count}, layer, messages);
+                      image_read_bytes(image, &(Source){path, text_c(&text), text.count}, options, messages);
     text_free(&text);
     return done;
-}
-
-bool image_read(Image *image, const char *path, MessageList *messages)
-{
-    return image_read_layer(image, path, NULL, messages);
 }
 
 double image_value(const Image *image, size_t i)

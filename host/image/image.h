@@ -90,18 +90,21 @@ typedef struct {
     bool integers;   // NPY of <u4 or |u1 and EXR of uint, such as numbers of objects
     double *doubles; // the values whose type floats cannot hold (NPY of <f8 or <u4, EXR of uint), or NULL
 } Image;
-// Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. On failure returns false with an error message
-// and an empty image that need not be freed. An image whose header declares more pixels than
-// image_limit_pixels permits is refused before anything is decoded, because a small file may expand to many.
-bool image_read(Image *image, const char *path, MessageList *messages);
-// Reads the named layer of an EXR file. NULL stands for the default layer or the only one with colors.
-bool image_read_layer(Image *image, const char *path, const char *layer, MessageList *messages);
+enum { IMAGE_PIXELS_MAX = 1 << 27 }; // 1.6 GB of floats
+typedef struct {
+    const char *layer; // of an EXR file; NULL stands for the default layer or the only one with colors
+    // An image whose header declares more pixels is refused before anything is decoded, because a small file
+    // may expand to many. 0 stands for IMAGE_PIXELS_MAX.
+    uint32_t max_pixels;
+} ImageReadOptions;
+// Reads PNG, JPEG, PPM, EXR or NPY, chosen by the first bytes. `options` may be NULL. On failure returns
+// false with an error message and an empty image that need not be freed.
+bool image_read(Image *image, const char *path, const ImageReadOptions *options, MessageList *messages);
 // Reads an image from memory; `source->file` names it in messages.
-bool image_read_bytes(Image *image, const Source *source, MessageList *messages);
+bool image_read_bytes(Image *image, const Source *source, const ImageReadOptions *options,
+                      MessageList *messages);
 // Return whether a file, or its bytes, start like one that image_read reads.
 bool image_is_known(const char *path);
 bool image_bytes_are_known(const void *bytes, size_t length);
-enum { IMAGE_PIXELS_MAX = 1 << 27 }; // the default: 1.6 GB of floats
-void image_limit_pixels(uint32_t largest);
 double image_value(const Image *image, size_t i); // values[i] at the precision of the file
 void image_free(Image *image);

@@ -257,5 +257,5 @@ bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages)
         if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a block =>camera");
     }
-    return scene_finish(scene, &reader.report, NULL);
+    return scene_finish(scene, &reader.report, &(SceneOptions){0});
 }

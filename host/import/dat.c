@@ -185,7 +185,7 @@ static void statement_read(void *context)
     statement_skip(reader);
 }
 
-bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
+bool scene_read_dat(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY, .ambient = {1, 1, 1}};
     DatReader reader = {.report = report_open(source, messages), .scene = scene};
@@ -198,5 +198,5 @@ bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages)
     }
     free(reader.textures.items);
     free(reader.slots);
-    return scene_finish(scene, &reader.report, NULL);
+    return scene_finish(scene, &reader.report, options);
 }

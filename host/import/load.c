@@ -11,9 +11,9 @@
 #include <string.h>
 #include <strings.h>
 
-bool scene_finish(Scene *scene, Report *report, Stage *stage)
+bool scene_finish(Scene *scene, Report *report, const SceneOptions *options)
 {
-    if (report->error_count == 0) textures_decode(scene, report, stage);
+    if (report->error_count == 0) textures_decode(scene, report, options);
     if (!report_close(report)) {
         scene_free(scene);
         return false;
@@ -41,7 +41,7 @@ static bool scene_read(Scene *scene, const Source *source, const SceneOptions *o
     if (ends_with(source->file, ".cfg")) return scene_read_cfg(scene, source, messages);
     if (ends_with(source->file, ".nff")) return scene_read_nff(scene, source, messages);
     if (scene_is_yaml(source->file)) return scene_read_yaml(scene, source, options, messages);
-    return scene_read_dat(scene, source, messages);
+    return scene_read_dat(scene, source, options, messages);
 }
 
 // Returns whether the first word after comments begins a Tachyon scene, whose file may have any name.
@@ -114,7 +114,8 @@ static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *
 {
     for (size_t i = 0; i < options->override_count; i++)
         if (strncmp(options->overrides[i], "camera", 6) == 0 && strchr(".[=", options->overrides[i][6]))
-            return message_error(messages, "--set %s: the camera is that of --camera", options->overrides[i]);
+            return message_error(messages, "%s %s: the camera is that of '%s'", options->override_name,
+                                 options->overrides[i], options->camera);
     SceneOptions own = *options;
     own.camera = NULL;
     own.override_count = 0;

@@ -13,6 +13,7 @@ typedef struct {
     size_t override_count;
     const char *override_name; // names their source in messages
     double frame;              // of an animated YAML scene
+    uint32_t max_pixels;       // of each image, see ImageReadOptions
     const char *camera;        // the path of another scene, whose camera replaces the scene's; NULL: none
     // Called with each mesh, image and scene that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);
@@ -39,7 +40,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 bool scene_read_cfg(Scene *scene, const Source *source, MessageList *messages);
 bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages);
-bool scene_read_dat(Scene *scene, const Source *source, MessageList *messages);
+bool scene_read_dat(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages);
 
 // Reads the triangles, materials, camera and lights of a file that mesh_is_known accepts. Adds a camera that
 // frames the mesh if the file has no camera, and two lights if it has no lights.
@@ -50,4 +51,4 @@ void scene_of_mesh(Scene *scene, Mesh *mesh);
 
 // Decodes the images of a scene without errors, closes its reader's report, warns of causes of a black
 // image, and frees the scene if there are errors.
-bool scene_finish(Scene *scene, Report *report, Stage *stage);
+bool scene_finish(Scene *scene, Report *report, const SceneOptions *options);

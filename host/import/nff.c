@@ -313,5 +313,5 @@ bool scene_read_nff(Scene *scene, const Source *source, MessageList *messages)
     free(reader.corners.items);
     free(reader.normals.items);
     free(reader.triangles.items);
-    return scene_finish(scene, &reader.report, NULL);
+    return scene_finish(scene, &reader.report, &(SceneOptions){0});
 }

@@ -298,8 +298,7 @@ static void element_read(void *context)
 bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *options, MessageList *messages)
 {
     *scene = (Scene){.color_meaning = COLORS_DISPLAY};
-    RtReader reader = {
-        .report = report_open(source, messages), .scene = scene, .lenient = options && options->lenient};
+    RtReader reader = {.report = report_open(source, messages), .scene = scene, .lenient = options->lenient};
     if (line_open(&reader.line, &reader.report, '#')) {
         reader.line.joins_blanks = reader.lenient;
         if (!line_elements(&reader.line, scene, line_next_filled, element_read, &reader))
@@ -307,5 +306,5 @@ bool scene_read_rt(Scene *scene, const Source *source, const SceneOptions *optio
         else if (!reader.has_camera && !report_is_full(&reader.report))
             report_error(&reader.report, source->length, "no camera: a line with C");
     }
-    return scene_finish(scene, &reader.report, NULL);
+    return scene_finish(scene, &reader.report, options);
 }

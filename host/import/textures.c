@@ -60,15 +60,16 @@ static void normals_of_heights(Image *image)
     image->channels = 3;
 }
 
-static bool texture_read(SceneTexture *texture, MessageList *messages)
+static bool texture_read(SceneTexture *texture, uint32_t max_pixels, MessageList *messages)
 {
+    const ImageReadOptions options = {.layer = texture->layer, .max_pixels = max_pixels};
     const Text *bytes = &texture->bytes;
     if (bytes->count > 0)
         return image_read_bytes(&texture->image, &(Source){texture->path, bytes->items, bytes->count},
-                                messages);
+                                &options, messages);
     const char *obstacle = file_obstacle(texture->path);
     if (obstacle) return message_error(messages, "cannot read '%s': %s", texture->path, obstacle);
-    return image_read_layer(&texture->image, texture->path, texture->layer, messages);
+    return image_read(&texture->image, texture->path, &options, messages);
 }
 
 static bool colors_are_finite(const Image *image)
@@ -93,11 +94,11 @@ static const char *image_problem(const Image *image, size_t texel_count)
 
 // Decodes an image and adds its texels to the count. Moves its reader's messages to its place in the scene.
 // Returns false if it cannot be used.
-static bool texture_decode(SceneTexture *texture, size_t *texel_count, Report *report)
+static bool texture_decode(SceneTexture *texture, size_t *texel_count, uint32_t max_pixels, Report *report)
 {
     MessageList problems = {0};
     const size_t offset = texture->offset;
-    bool is_usable = texture->image.values || texture_read(texture, &problems);
+    bool is_usable = texture->image.values || texture_read(texture, max_pixels, &problems);
     for (size_t i = 0; i < problems.count; i++) {
         const Message *message = &problems.items[i];
         if (message->severity == MESSAGE_ERROR)
@@ -171,14 +172,14 @@ static void cutouts_prune(Scene *scene)
     }
 }
 
-void textures_decode(Scene *scene, Report *report, Stage *stage)
+void textures_decode(Scene *scene, Report *report, const SceneOptions *options)
 {
     AlphaUse *uses = alpha_uses(scene);
     size_t texel_count = 0;
     for (size_t i = 0; i < scene->textures.count && !report_is_full(report); i++) {
         SceneTexture *texture = &scene->textures.items[i];
-        stage_begin(stage, "reading", texture->path, 0);
-        if (!texture_decode(texture, &texel_count, report)) continue;
+        stage_begin(options->stage, "reading", texture->path, 0);
+        if (!texture_decode(texture, &texel_count, options->max_pixels, report)) continue;
         const char *warning = alpha_warning(&texture->image, &uses[i + 1]);
         if (warning) report_warning(report, texture->offset, "the alpha of '%s' %s", texture->path, warning);
     }

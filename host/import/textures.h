@@ -1,11 +1,9 @@
 // Decodes the images of a scene's materials and sky.
 #pragma once
 
-#include "host/base/stage.h"
-#include "host/import/report.h"
-#include "host/scene/scene.h"
+#include "host/import/load.h"
 
 // Decodes the images, removes cutouts by opaque images, and sets up an ambient light that comes from the sky
 // and a sky that is a light. Reports images that cannot be read or used, and warns of alpha that is not
 // shown and of cutouts that are removed.
-void textures_decode(Scene *scene, Report *report, Stage *stage);
+void textures_decode(Scene *scene, Report *report, const SceneOptions *options);

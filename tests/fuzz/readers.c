@@ -21,6 +21,9 @@
 static char folder[PATH_MAX - 16]; // in TMPDIR
 static int input = -1; // the one that is read; it stays open, since disks are slow to create files
 
+enum { PIXELS_MAX = 1 << 16 }; // of an image
+static const SceneOptions scene_options = {.lenient = true, .max_pixels = PIXELS_MAX};
+
 static void input_write(const Source *source)
 {
     const ssize_t length = (ssize_t)source->length;
@@ -31,7 +34,7 @@ static void image_fuzz(const char *path, const Source *source, MessageList *mess
 {
     (void)source;
     Image image;
-    if (image_read(&image, path, messages)) image_free(&image);
+    if (image_read(&image, path, &(ImageReadOptions){.max_pixels = PIXELS_MAX}, messages)) image_free(&image);
 }
 
 // Checks that the errors and the verdict agree.
@@ -58,7 +61,7 @@ static void mesh_scene_fuzz(const char *path, const Source *source, MessageList 
 {
     (void)source;
     Scene scene;
-    if (scene_read_mesh(&scene, path, &(SceneOptions){0}, messages)) scene_free(&scene);
+    if (scene_read_mesh(&scene, path, &scene_options, messages)) scene_free(&scene);
 }
 
 // The path of the mesh's file. A material library that it names is in the same folder.
@@ -121,8 +124,6 @@ static void assimp_fuzz(const char *path, const Source *source, MessageList *mes
     draft_fuzz(path, assimp_read, messages);
 }
 
-static const SceneOptions scene_options = {.lenient = true};
-
 #define SCENE_READER(format, is_read)                                                                        \
     static void format##_fuzz(const char *path, const Source *source, MessageList *messages)                 \
     {                                                                                                        \
@@ -136,7 +137,7 @@ SCENE_READER(yaml, scene_read_yaml(&scene, source, &scene_options, messages))
 SCENE_READER(rt, scene_read_rt(&scene, source, &scene_options, messages))
 SCENE_READER(cfg, scene_read_cfg(&scene, source, messages))
 SCENE_READER(nff, scene_read_nff(&scene, source, messages))
-SCENE_READER(dat, scene_read_dat(&scene, source, messages))
+SCENE_READER(dat, scene_read_dat(&scene, source, &scene_options, messages))
 
 // Checks that each band can be read, or the checkpoint fails, and that no band has rows outside the image.
 static void checkpoint_fuzz(const char *path, const Source *source, MessageList *messages)
@@ -258,7 +259,6 @@ int LLVMFuzzerInitialize(int *argument_count, char ***arguments)
     if (readers[reader].file) input = open(path, O_CREAT | O_WRONLY | O_CLOEXEC, 0600);
     if (readers[reader].read == mtl_fuzz) obj_write();
     setenv("XDG_CACHE_HOME", folder, 1);
-    image_limit_pixels(1 << 16);
     atexit(scratch_remove);
     return 0;
 }

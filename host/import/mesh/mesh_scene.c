@@ -181,5 +181,5 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
         scene_show(scene, &view, path, &report);
     }
     free(view.lights.items);
-    return scene_finish(scene, &report, options->stage);
+    return scene_finish(scene, &report, options);
 }

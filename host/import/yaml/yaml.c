@@ -187,7 +187,7 @@ bool scene_read_yaml(Scene *scene, const Source *source, const SceneOptions *opt
         document_read(&reader);
     yaml_tree_free(&reader.tree);
     free(reader.names.items);
-    const bool is_read = scene_finish(scene, &reader.report, options->stage);
+    const bool is_read = scene_finish(scene, &reader.report, options);
     yaml_included_free(&reader);
     return is_read;
 }

@@ -202,21 +202,23 @@ def _yaml(value: Any) -> str:
     return json.dumps(value, default=lambda array: array.tolist())
 
 
-def _options(overrides: Optional[Mapping[str, Any]], frame: float, camera: Optional[bytes] = None) -> Any:
+def _options(overrides: Optional[Mapping[str, Any]], frame: float, max_pixels: int, camera: Optional[bytes] = None) -> Any:
     texts = [f"{path}={value if isinstance(value, str) else _yaml(value)}".encode() for path, value in (overrides or {}).items()]
-    return _c.SceneOptions(ctypes.sizeof(_c.SceneOptions), (ctypes.c_char_p * len(texts))(*texts), len(texts), frame, camera)
+    return _c.SceneOptions(ctypes.sizeof(_c.SceneOptions), (ctypes.c_char_p * len(texts))(*texts), len(texts), frame, camera,
+                           _count("max_pixels", max_pixels))
 
 
 class Scene:
     """A scene made from a dict or text in glint's YAML format. glint.load and glint.load_mesh make scenes from files and arrays."""
 
     def __init__(self, description: Union[str, Mapping[str, Any]], *, name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
-                 frame: float = 0):
+                 frame: float = 0, max_pixels: int = 0):
         """Reads the description. overrides: values to replace, such as {"camera.fov": 60}; a string is YAML, and an empty one
-        removes the key. frame: the frame of an animated scene. name: the prefix of the scene's messages."""
+        removes the key. frame: the frame of an animated scene. name: the prefix of the scene's messages. max_pixels: images of
+        the scene with more pixels are refused; 0 means 134217728."""
         text = description if isinstance(description, str) else _yaml(description)
         encoded = text.encode()
-        options = _options(overrides, frame)
+        options = _options(overrides, frame, max_pixels)
         self._take(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), ctypes.byref(options),
                                                                         scene, messages))
 
@@ -465,10 +467,10 @@ def compare(reference: Any, image: Any, *, color: Optional[bool] = None) -> Imag
 
 
 def load(path: Union[str, os.PathLike[str]], *, overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,
-         camera: Union[None, str, os.PathLike[str]] = None) -> Scene:
+         camera: Union[None, str, os.PathLike[str]] = None, max_pixels: int = 0) -> Scene:
     """Reads a scene, mesh or glTF file. overrides, frame: for YAML scenes, as in Scene. camera: the path of another scene,
-    whose camera replaces the scene's."""
-    options = _options(overrides, frame, None if camera is None else os.fsencode(camera))
+    whose camera replaces the scene's. max_pixels: as in Scene."""
+    options = _options(overrides, frame, max_pixels, None if camera is None else os.fsencode(camera))
     scene = Scene.__new__(Scene)
     scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
     return scene

@@ -16,7 +16,8 @@ def structure(name, *fields):
 DeviceInfo = structure("DeviceInfo", ("index", c_uint32), ("compute_units", c_uint32), ("memory_bytes", c_uint64), ("is_gpu", c_int),
                        ("is_cpu", c_int), ("has_double", c_int), ("is_usable", c_int), ("name", c_char * 128),
                        ("platform", c_char * 128), ("driver", c_char * 64))
-SceneOptions = structure("SceneOptions", ("overrides", POINTER(c_char_p)), ("override_count", c_size_t), ("frame", c_double), ("camera", c_char_p))
+SceneOptions = structure("SceneOptions", ("overrides", POINTER(c_char_p)), ("override_count", c_size_t), ("frame", c_double), ("camera", c_char_p),
+                         ("max_pixels", c_uint32))
 Mesh = structure("Mesh", ("real", c_int), ("vertices", c_void_p), ("normals", c_void_p), ("vertex_count", c_size_t),
                  ("triangles", c_void_p), ("triangle_count", c_size_t))
 RenderSettings = structure("RenderSettings", ("width", c_uint32), ("height", c_uint32), ("samples", c_uint32), ("bounces", c_uint32),
