@@ -14,8 +14,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-// What a crash's message needs is global, because a signal handler has no context. The next two are the
-// current call of this thread, and the latest of any thread, which stands in for drivers' threads.
+// What a crash's message needs is global, because a signal handler has no context. noted_call is the current
+// call of this thread, and last_call that of any thread, which stands in for drivers' threads.
 static _Thread_local const char *volatile noted_call;
 static const char *_Atomic last_call;
 static const char *_Atomic noted_kernel;

@@ -17,6 +17,7 @@ typedef struct {
     uint16_t *starts;  // [bucket - first]: the display value of the bucket's least float
 } Curve;
 
+// Computed once by the first thread that needs them, then constant.
 static Curve curve_8, curve_16;
 
 static uint32_t float_bits(float value)

@@ -16,6 +16,7 @@ const Range range_byte = {0, 255, false, "from 0 to 255"};
 const Range range_field_of_view = {0, 180, true, "greater than 0 and less than 180"};
 const Range range_pixels = {1, 65536, false, "from 1 to 65536"};
 
+// Made once by the first thread that needs it, then constant.
 static locale_t c_locale;
 static pthread_once_t c_locale_once = PTHREAD_ONCE_INIT;
 
