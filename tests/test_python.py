@@ -3,6 +3,7 @@
 and threads.
 
 run_tests: sanitize-long-only"""
+import contextlib
 import copy
 import ctypes
 import dataclasses
@@ -17,6 +18,7 @@ import unittest
 import warnings
 from fractions import Fraction
 from pathlib import Path
+from unittest import mock
 
 from glint import need_modules
 
@@ -528,15 +530,32 @@ class Errors(unittest.TestCase):
 
         class Later(glint._c.TraceSettings):
             _fields_ = [("later", ctypes.c_uint64)]
-        scene, device = glint.Scene(SPHERE), glint._OpenDevice.get(None)
+        scene = glint.Scene(SPHERE)
         for value, status in (0, 0), (1, 1):
             tracer, messages = ctypes.c_void_p(), ctypes.c_void_p()
             settings = Later(ctypes.sizeof(Later), 0, 0, value)
-            self.assertEqual(library.glint_tracer_open(device.handle, scene._handle, ctypes.cast(ctypes.byref(settings), ctypes.POINTER(glint._c.TraceSettings)),
-                                                       ctypes.byref(tracer), ctypes.byref(messages)), status)
+            with glint._h.device_opened(None) as device:
+                self.assertEqual(library.glint_tracer_open(device, scene._handle, ctypes.cast(ctypes.byref(settings), ctypes.POINTER(glint._c.TraceSettings)),
+                                                           ctypes.byref(tracer), ctypes.byref(messages)), status)
             self.assertEqual(bool(messages), status == 1)
             library.glint_text_free(messages)
             library.glint_tracer_close(tracer)
+
+    def test_failed_device(self):
+        """A device that fails is closed after its tracers, and its next use re-opens it."""
+        library, closed = glint._c.library, []
+        index = next(device.index for device in glint.devices() if device.is_usable)
+        with contextlib.ExitStack() as stack:
+            for name in "glint_tracer_close", "glint_device_close":
+                close = getattr(library, name)
+                stack.enter_context(mock.patch.object(library, name, lambda handle, name=name, close=close: (closed.append(name), close(handle))))
+            scene = glint.Scene(SPHERE)
+            for precision in "single", "double":
+                scene.trace([[0, 0, -4]], [[0, 0, 1]], device=index, precision=precision)
+            with mock.patch.object(library, "glint_trace", lambda *_: 2), self.assertRaises(glint.DeviceError):
+                scene.trace([[0, 0, -4]], [[0, 0, 1]], device=index)
+            self.assertEqual(closed, ["glint_tracer_close", "glint_tracer_close", "glint_device_close"])
+            self.assertEqual(scene.trace([[0, 0, -4]], [[0, 0, 1]], device=index).object.tolist(), [0])
 
     def test_pocl_of_pip(self):
         """PoCL's wheel is found where the system has no driver."""

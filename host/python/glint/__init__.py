@@ -6,68 +6,39 @@
     hits = scene.trace(origins, directions, precision="certified")
     hits.object[hits.certain]                   # proven equal to the result of exact arithmetic
 
-Settings are keyword arguments. Every call that computes releases Python's global lock. A wrong scene or argument raises SceneError, and a device failure raises
-DeviceError. Warnings have the category GlintWarning.
+Settings are keyword arguments. Every call that computes releases Python's global lock, so threads may share a scene; calls on one device
+run one after the other. A wrong scene or setting raises SceneError, another wrong argument ValueError, of which SceneError is a subclass, and
+a failing device DeviceError. Warnings have the category GlintWarning. Nothing is printed.
 """
 from __future__ import annotations
 
 import ctypes
 import json
 import os
-import sys
 import threading
-import warnings
-import weakref
 from dataclasses import dataclass, fields
 from typing import Any, Callable, Literal, Mapping, NamedTuple, Optional, Sequence, Union, overload
 
 import numpy as np
 
-from . import _library as _c
+from . import _handles as _h, _library as _c
+from ._handles import DeviceError, GlintWarning, SceneError, Selector, Stopped
+
+for _public in DeviceError, GlintWarning, SceneError, Stopped:
+    _public.__module__ = __name__
 
 __all__ = ["AllHits", "Device", "DeviceError", "GlintWarning", "Hits", "ImageMetrics", "LAYERS", "MISS", "PRECISIONS", "Scene", "SceneError",
-           "Stopped", "compare", "devices", "load", "load_mesh", "version"]
+           "Selector", "Stopped", "compare", "devices", "load", "load_mesh", "version"]
 
 MISS = 0xFFFFFFFF  #: the object of a miss
 PRECISIONS = {"single": 0, "strict": 1, "double": 2, "certified": 3}
-#: the layers of an image, with their values per pixel (0 means one per light) and their type
+#: The layers of an image, with their values per pixel (0 means one per light) and their type. color and backdrop are linear light; coverage is
+#: from 0 to 1. The others describe the ray through the pixel's center: t is the distance from the camera, normal is a unit vector, position is
+#: the hit point in the scene's coordinates, and shadow is 1 where a light is occluded. On a miss t is inf, normal and position are 0, and object
+#: is MISS. At "certified", flag is 1 where the pixel is re-rendered in double and 2 where it is uncertified, else 0.
 LAYERS = {"color": (3, np.float64), "t": (1, np.float64), "normal": (3, np.float64), "position": (3, np.float64),
           "object": (1, np.uint32), "shadow": (0, np.uint32), "flag": (1, np.uint32),
           "coverage": (1, np.float64), "backdrop": (3, np.float64)}
-
-
-class SceneError(ValueError):
-    """Raised if a scene, file, setting or selector is wrong, with the messages that `glint` prints."""
-
-
-class DeviceError(RuntimeError):
-    """Raised if an OpenCL call failed."""
-
-
-class Stopped(Exception):
-    """Raised if the progress function returned True."""
-
-
-class GlintWarning(UserWarning):
-    """A warning from glint."""
-
-
-def _check(status: int, messages: ctypes.c_void_p) -> None:
-    """Raises an exception for a call's status, or warns its first caller outside of the package, with the call's messages."""
-    text = ctypes.string_at(messages).decode("utf-8", "replace").rstrip() if messages else ""
-    if messages:
-        _c.library.glint_text_free(messages)
-    if status == 1:
-        raise SceneError(text)
-    if status == 2:
-        raise DeviceError(text)
-    if status == 3:
-        raise Stopped()
-    if text:
-        frame, level = sys._getframe(), 1
-        while frame.f_back and frame.f_globals.get("__package__") == __package__:
-            frame, level = frame.f_back, level + 1
-        warnings.warn(text, GlintWarning, stacklevel=level)
 
 
 def version() -> str:
@@ -76,8 +47,8 @@ def version() -> str:
 
 
 class Device(NamedTuple):
-    """An OpenCL device; `index` selects it."""
-    index: int
+    """An OpenCL device. memory_bytes is 0 if unknown. is_usable: whether glint can render with it."""
+    index: int  #: its Selector
     name: str
     platform: str
     driver: str
@@ -90,76 +61,40 @@ class Device(NamedTuple):
 
 
 def devices() -> list[Device]:
-    """Lists the devices of all platforms."""
-    infos, count, messages = (_c.DeviceInfo * 256)(), ctypes.c_size_t(), ctypes.c_void_p()
+    """Lists the devices of all platforms. Raises DeviceError if a platform fails."""
+    infos, count = (_c.DeviceInfo * 256)(), ctypes.c_size_t()
     for info in infos:
         info.size = ctypes.sizeof(_c.DeviceInfo)
-    status = _c.library.glint_devices_list(infos, len(infos), ctypes.byref(count), ctypes.byref(messages))
-    _check(status, messages)
+    _h.call(_c.library.glint_devices_list, infos, len(infos), ctypes.byref(count))
     return [Device(info.index, info.name.decode(), info.platform.decode(), info.driver.decode(), info.compute_units,
                    info.memory_bytes, bool(info.is_gpu), bool(info.is_cpu), bool(info.has_double), bool(info.is_usable))
             for info in infos[:min(count.value, len(infos))]]
 
 
-class _OpenDevice:
-    """A device that stays open until the process exits, because its compiler is slow to start."""
-    _opened: dict[Optional[str], "_OpenDevice"] = {}
-    _lock = threading.Lock()
-
-    def __init__(self, selector: Optional[str]):
-        self.handle, self.messages = ctypes.c_void_p(), ctypes.c_void_p()
-        encoded = None if selector is None else selector.encode()
-        self.status = _c.library.glint_device_open(encoded, ctypes.byref(self.handle), ctypes.byref(self.messages))
-
-    @classmethod
-    def get(cls, selector: Union[None, int, str]) -> "_OpenDevice":
-        key = None if selector is None else str(selector)
-        with cls._lock:
-            if key in cls._opened:
-                return cls._opened[key]
-            opened = cls(key)
-            if opened.handle:
-                cls._opened[key] = opened
-        _check(opened.status, opened.messages)
-        return opened
-
-    @classmethod
-    def forget(cls, selector: Union[None, int, str]) -> None:
-        """Forgets a device that failed, so that its next use re-opens it."""
-        with cls._lock:
-            cls._opened.pop(None if selector is None else str(selector), None)
-
-
 class Hits(NamedTuple):
-    """The nearest hits of rays: arrays with one row per ray.
-
-    object: the object's number, or MISS. For glint.load_mesh it is the index of the face.
-    t: in lengths of the direction, inf on a miss. low, high: bounds on the exact t where certain, otherwise t.
-    normal: geometric, unit, facing the ray; position: the hit point. Both are 0 on a miss.
-    certainty: 0 uncertain, 1 certain by float, 2 certain by double; always 0 below precision "certified".
-    """
-    object: np.ndarray
-    t: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-    normal: np.ndarray
-    position: np.ndarray
-    certainty: np.ndarray
+    """The nearest hits of n rays. On a miss object is MISS, t, low and high are inf, and normal and position are 0."""
+    object: np.ndarray  #: (n,) uint32: the object's number, for glint.load_mesh the index of the face
+    t: np.ndarray  #: (n,) float64: in lengths of the direction
+    low: np.ndarray  #: (n,) float64: the lower bound on the exact t where certain, otherwise t
+    high: np.ndarray  #: (n,) float64: the upper bound
+    normal: np.ndarray  #: (n, 3) float64: geometric, a unit vector that faces the ray
+    position: np.ndarray  #: (n, 3) float64: the hit point, moved onto the surface
+    certainty: np.ndarray  #: (n,) uint8: 0 uncertain, 1 proven in float, 2 proven in double; always 0 below precision "certified"
 
     @property
     def hit(self) -> np.ndarray:
-        """True where a ray hits something."""
+        """Whether each ray hits something, as n bools."""
         return self.object != MISS
 
     @property
     def certain(self) -> np.ndarray:
-        """True where the object (or miss) and the bounds on t are proven."""
+        """Whether the object or miss and the bounds on t are proven, as n bools."""
         return self.certainty != 0
 
 
 class AllHits(NamedTuple):
-    """All hits of rays: arrays with one row per hit, sorted by ray and then by t. Other members than `ray` are those of Hits."""
-    ray: np.ndarray  #: the index of each hit's ray
+    """All hits of rays: arrays with one row per hit, sorted by ray and then by t. Members other than `ray` are as in Hits."""
+    ray: np.ndarray  #: int64: the index of each hit's ray
     object: np.ndarray
     t: np.ndarray
     normal: np.ndarray
@@ -167,7 +102,7 @@ class AllHits(NamedTuple):
 
 
 def _reals(array: Any, columns: int, count: Optional[int], name: str, dtype: Any) -> np.ndarray:
-    """Returns a contiguous array of rows. A single row or number is repeated for all rays."""
+    """Returns a contiguous array of `count` rows, to which a single row or number is repeated, or of any number of rows if it is None."""
     array = np.asarray(array, dtype)
     shape = (count, columns) if columns > 1 else (count,)
     if count is not None:
@@ -178,17 +113,6 @@ def _reals(array: Any, columns: int, count: Optional[int], name: str, dtype: Any
     elif array.ndim != 2 or array.shape[1] != columns:
         raise ValueError(f"{name}: expected shape (n, {columns}), not {array.shape}")
     return np.ascontiguousarray(array)
-
-
-def _pointer(array: Optional[np.ndarray]) -> Optional[int]:
-    return None if array is None else array.ctypes.data
-
-
-def _count(name: str, value: int) -> int:
-    """Returns the value if it fits 32 bits, to which ctypes would truncate it."""
-    if not 0 <= value < 1 << 32:
-        raise ValueError(f"{name}: expected 0 to {(1 << 32) - 1}, not {value}")
-    return value
 
 
 def _precision(name: str) -> int:
@@ -205,7 +129,7 @@ def _yaml(value: Any) -> str:
 def _options(overrides: Optional[Mapping[str, Any]], frame: float, max_pixels: int, camera: Optional[bytes] = None) -> Any:
     texts = [f"{path}={value if isinstance(value, str) else _yaml(value)}".encode() for path, value in (overrides or {}).items()]
     return _c.SceneOptions(ctypes.sizeof(_c.SceneOptions), (ctypes.c_char_p * len(texts))(*texts), len(texts), frame, camera,
-                           _count("max_pixels", max_pixels))
+                           _h.uint32("max_pixels", max_pixels))
 
 
 class Scene:
@@ -213,33 +137,35 @@ class Scene:
 
     def __init__(self, description: Union[str, Mapping[str, Any]], *, name: str = "scene.yaml", overrides: Optional[Mapping[str, Any]] = None,
                  frame: float = 0, max_pixels: int = 0):
-        """Reads the description. overrides: values to replace, such as {"camera.fov": 60}; a string is YAML, and an empty one
-        removes the key. frame: the frame of an animated scene. name: the prefix of the scene's messages. max_pixels: images of
-        the scene with more pixels are refused; 0 means 134217728."""
+        """Reads the description. Raises SceneError with the place of each mistake.
+
+        name: the file name in messages; files that the scene names are relative to its folder. overrides: values to replace, such as
+        {"camera.fov": 60}; a string is YAML, and an empty one removes the key. frame: the frame of an animated scene. max_pixels: images
+        of the scene with more pixels are refused; 0 means 134217728.
+        """
         text = description if isinstance(description, str) else _yaml(description)
         encoded = text.encode()
         options = _options(overrides, frame, max_pixels)
-        self._take(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), ctypes.byref(options),
+        self._adopt(lambda scene, messages: _c.library.glint_scene_parse(encoded, len(encoded), os.fsencode(name), ctypes.byref(options),
                                                                         scene, messages))
 
-    def _take(self, make: Callable[[Any, Any], int]) -> None:
-        self._tracers: dict[tuple[Optional[str], str, int], ctypes.c_void_p] = {}
-        self._lock = threading.Lock()
-        self._handle, messages = ctypes.c_void_p(), ctypes.c_void_p()
-        # not at exit, while other threads may still trace
-        weakref.finalize(self, _scene_free, self._handle, self._tracers).atexit = False
-        _check(make(ctypes.byref(self._handle), ctypes.byref(messages)), messages)
+    def _adopt(self, make: Callable[[Any, Any], int]) -> None:
+        """Sets the handle by a function that sets it and the messages, and returns a status."""
+        self._handle = _h.Handle(make, _c.library.glint_scene_free)
+        self._tracers: dict[tuple[_h.Handle, int, int], _h.Handle] = {}  # by device, precision and lanes
+        self._lock = threading.RLock()  # of the tracers; a function that shows warnings may trace
 
     def __reduce__(self) -> Any:
         raise TypeError("a Scene cannot be copied or pickled")
 
     @property
     def object_count(self) -> int:
-        """The number of objects; each triangle of a mesh counts as one."""
+        """The number of objects, of which each triangle of a mesh is one."""
         return _c.library.glint_scene_object_count(self._handle)
 
     @property
     def light_count(self) -> int:
+        """The number of lights."""
         return _c.library.glint_scene_light_count(self._handle)
 
     @property
@@ -248,29 +174,30 @@ class Scene:
         return _c.library.glint_scene_frame_count(self._handle)
 
     def render(self, width: int = 0, height: int = 0, *, samples: int = 1, bounces: int = 5, precision: str = "single",
-               device: Union[None, int, str] = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None,
+               device: Selector = None, lanes: int = 0, progress: Optional[Callable[[float], Any]] = None,
                min_contribution: float = 0) -> np.ndarray:
-        """Returns the image, (height, width, 3), in linear light. The arguments are those of render_layers."""
+        """Returns the image, an array of (height, width, 3) float64 in linear light, from the top left. The arguments are those of
+        render_layers."""
         return self.render_layers(("color",), width, height, samples=samples, bounces=bounces, precision=precision, device=device,
                                   lanes=lanes, progress=progress, min_contribution=min_contribution)["color"]
 
     def render_layers(self, layers: Sequence[str], width: int = 0, height: int = 0, *, samples: int = 1, bounces: int = 5,
-                      precision: str = "single", device: Union[None, int, str] = None, lanes: int = 0,
+                      precision: str = "single", device: Selector = None, lanes: int = 0,
                       progress: Optional[Callable[[float], Any]] = None, min_contribution: float = 0) -> dict[str, np.ndarray]:
-        """Renders the named layers of glint.LAYERS and returns their arrays, of shape (height, width[, values]).
+        """Renders the named layers of glint.LAYERS and returns their arrays by name, of shape (height, width[, values]).
 
-        width, height: both 0 select the size in the scene's file, else 1280 wide. bounces: the maximum per ray.
-        precision: single, strict, double or certified. device: a selector as for `glint render --device`. lanes: rays per
-        work-item; 0 lets glint choose. progress: called with the fraction done; if it returns True, Stopped is raised.
-        min_contribution: rays whose weight in the pixel is lower are not traced.
+        width, height: in pixels; both 0 select the size in the scene's file, or one that is 1280 wide. samples: per pixel, 1 to 1048576.
+        bounces: the maximum per ray, 0 to 255. precision: a key of PRECISIONS. lanes: rays per work-item, 1, 4, 8 or 16; 0 lets glint
+        choose. progress: called with the fraction that is done, from this thread; if it returns a true value, Stopped is raised.
+        min_contribution: 0 to 1; rays whose weight in the pixel is lower are not traced.
         """
         if isinstance(layers, str):
             raise ValueError("layers: expected a sequence of names, not one text")
         unknown = set(layers) - set(LAYERS)
         if unknown:
             raise ValueError(f"layers: expected some of {', '.join(LAYERS)}, not {', '.join(sorted(unknown))}")
-        counts = (_count(name, value) for name, value in (("width", width), ("height", height), ("samples", samples), ("bounces", bounces)))
-        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), *counts, _precision(precision), _count("lanes", lanes),
+        counts = (_h.uint32(name, value) for name, value in (("width", width), ("height", height), ("samples", samples), ("bounces", bounces)))
+        settings = _c.RenderSettings(ctypes.sizeof(_c.RenderSettings), *counts, _precision(precision), _h.uint32("lanes", lanes),
                                      min_contribution=min_contribution)
         if not width and not height:
             sides = ctypes.c_uint32(), ctypes.c_uint32()
@@ -288,70 +215,66 @@ class Scene:
             settings.progress = _c.Progress(report)
         arrays = {}
         for name in {"color", *layers}:
-            values, kind = LAYERS[name]
-            values = values or self.light_count
-            arrays[name] = np.zeros((height, width, values)[:2 + (LAYERS[name][0] != 1)], kind)
-        image = _c.Image(ctypes.sizeof(_c.Image), **{name: _pointer(array) for name, array in arrays.items()})
-        messages = ctypes.c_void_p()
-        status = _c.library.glint_render(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings), ctypes.byref(image),
-                                         ctypes.byref(messages))
+            values, dtype = LAYERS[name]
+            arrays[name] = np.zeros((height, width) if values == 1 else (height, width, values or self.light_count), dtype)
+        image = _c.Image(ctypes.sizeof(_c.Image), **{name: _h.pointer(array) for name, array in arrays.items()})
+        try:
+            with _h.device_opened(device) as opened:
+                _h.call(_c.library.glint_render, opened, self._handle, ctypes.byref(settings), ctypes.byref(image))
+        except Stopped:
+            if not raised:
+                raise
         if raised:
-            _c.library.glint_text_free(messages)
             raise raised[0]
-        if status == 2:
-            _OpenDevice.forget(device)
-        _check(status, messages)
         return {name: arrays[name] for name in layers}
 
     def trace(self, origins: Any, directions: Any, *, precision: str = "single", tmin: Any = None, tmax: Any = None,
-              device: Union[None, int, str] = None, lanes: int = 0) -> Hits:
+              device: Selector = None, lanes: int = 0) -> Hits:
         """Finds the nearest hit of each ray strictly between tmin and tmax, in lengths of the direction.
 
-        origins, directions: (n, 3); directions may have any length but 0. Arrays are passed as float32 if all are float32,
-        else as float64. tmin, tmax: one number or n. At "certified" tmin must be 0.
+        origins, directions: (n, 3) finite numbers; one direction serves all rays. Directions have any length but 0. tmin, tmax: one
+        number or n; None means 0 and inf. At "certified" tmin must be 0. Arrays are passed as float32 if all are float32, else as
+        float64. Raises ValueError for other shapes, and SceneError with the index of an invalid ray.
         """
-        rays, keep = _rays(origins, directions, tmin, tmax)
+        rays = _rays(origins, directions, tmin, tmax)
         count = rays.count
         hits = Hits(np.empty(count, np.uint32), *(np.empty(count) for _ in range(3)), np.empty((count, 3)), np.empty((count, 3)),
                     np.empty(count, np.uint8))
-        found = _c.Hits(ctypes.sizeof(_c.Hits), *map(_pointer, hits))
-        self._call(_c.library.glint_trace, device, precision, lanes, ctypes.byref(rays), ctypes.byref(found))
-        del keep
+        found = _c.Hits(ctypes.sizeof(_c.Hits), *map(_h.pointer, hits))
+        self._trace(_c.library.glint_trace, device, precision, lanes, ctypes.byref(rays), ctypes.byref(found))
         return hits
 
     @overload
     def occluded(self, origins: Any, directions: Any, *, precision: str = ..., tmin: Any = ..., tmax: Any = ...,
-                 device: Union[None, int, str] = ..., lanes: int = ..., return_certain: Literal[False] = ...) -> np.ndarray: ...
+                 device: Selector = ..., lanes: int = ..., return_certain: Literal[False] = ...) -> np.ndarray: ...
 
     @overload
     def occluded(self, origins: Any, directions: Any, *, precision: str = ..., tmin: Any = ..., tmax: Any = ...,
-                 device: Union[None, int, str] = ..., lanes: int = ..., return_certain: Literal[True]) -> tuple[np.ndarray, np.ndarray]: ...
+                 device: Selector = ..., lanes: int = ..., return_certain: Literal[True]) -> tuple[np.ndarray, np.ndarray]: ...
 
     def occluded(self, origins: Any, directions: Any, *, precision: str = "single", tmin: Any = None, tmax: Any = None,
-                 device: Union[None, int, str] = None, lanes: int = 0, return_certain: bool = False) -> Any:
-        """Returns whether anything lies strictly between tmin and tmax of each ray, as an array of bool.
+                 device: Selector = None, lanes: int = 0, return_certain: bool = False) -> Any:
+        """Returns whether anything lies strictly between tmin and tmax of each ray, as n bools.
 
         For shadows, trace from the light, or from outside the scene if it is directional, to the points at "double" or
         "certified", with tmax=1 - 1e-6. A ray that starts at a hit point, which is rounded, may re-hit the same surface.
         return_certain: whether to return a second array, which is True where the first is proven, at "certified".
         This takes as long as `trace`, whose other arguments it shares, but returns 1 or 2 bytes per ray instead of 77.
         """
-        rays, keep = _rays(origins, directions, tmin, tmax)
+        rays = _rays(origins, directions, tmin, tmax)
         occluded, certainty = np.empty(rays.count, bool), np.empty(rays.count, np.uint8) if return_certain else None
-        found = _c.Occlusion(ctypes.sizeof(_c.Occlusion), _pointer(occluded), _pointer(certainty))
-        self._call(_c.library.glint_trace_occlusion, device, precision, lanes, ctypes.byref(rays), ctypes.byref(found))
-        del keep
+        found = _c.Occlusion(ctypes.sizeof(_c.Occlusion), _h.pointer(occluded), _h.pointer(certainty))
+        self._trace(_c.library.glint_trace_occlusion, device, precision, lanes, ctypes.byref(rays), ctypes.byref(found))
         return occluded if certainty is None else (occluded, certainty != 0)
 
     def trace_all(self, origins: Any, directions: Any, *, precision: str = "double", tmin: Any = None, tmax: Any = None,
-                  hits_max: Optional[int] = None, device: Union[None, int, str] = None, lanes: int = 0) -> AllHits:
-        """Finds all hits of each ray, or the nearest hits_max, sorted by ray and then by t. If several hits have the same t, it
-        finds one. The other arguments are those of `trace`, but precision must not be "certified"."""
-        rays, keep = _rays(origins, directions, tmin, tmax)
+                  hits_max: Optional[int] = None, device: Selector = None, lanes: int = 0) -> AllHits:
+        """Finds all hits of each ray, or the nearest hits_max. If several hits have the same t, it finds one. The other arguments are
+        those of `trace`, but precision must not be "certified"."""
+        rays = _rays(origins, directions, tmin, tmax)
         found = _c.AllHits(ctypes.sizeof(_c.AllHits))
-        most = ctypes.c_size_t(-1) if hits_max is None else _count("hits_max", hits_max)
-        self._call(_c.library.glint_trace_all, device, precision, lanes, ctypes.byref(rays), most, ctypes.byref(found))
-        del keep
+        most = ctypes.c_size_t(-1) if hits_max is None else _h.uint32("hits_max", hits_max)
+        self._trace(_c.library.glint_trace_all, device, precision, lanes, ctypes.byref(rays), most, ctypes.byref(found))
         count = found.count
         try:
             arrays = (_copied(found.ray, (count,), np.uintp), _copied(found.object, (count,), np.uint32),
@@ -361,35 +284,29 @@ class Scene:
             _c.library.glint_all_hits_free(ctypes.byref(found))
         return AllHits(arrays[0].astype(np.int64), *arrays[1:])
 
-    def _call(self, function: Any, device: Union[None, int, str], precision: str, lanes: int, *arguments: Any) -> None:
-        messages = ctypes.c_void_p()
-        key, tracer = self._tracer(device, precision, _count("lanes", lanes))
-        status = function(tracer, *arguments, ctypes.byref(messages))
-        if status == 2:
-            _OpenDevice.forget(device)
-            with self._lock:
-                self._tracers.pop(key, None)
-        _check(status, messages)
+    def _trace(self, function: Any, device: Selector, precision: str, lanes: int, *arguments: Any) -> None:
+        """Calls a function that traces. The tracer is kept for later calls with the same settings, unless the device fails."""
+        with _h.device_opened(device) as opened:
+            key = opened, _precision(precision), _h.uint32("lanes", lanes)
+            try:
+                with self._lock:
+                    if key not in self._tracers:
+                        self._tracers[key] = self._tracer(*key)
+                    tracer = self._tracers[key]
+                _h.call(function, tracer, *arguments)
+            except DeviceError:
+                with self._lock:
+                    self._tracers = {other: tracer for other, tracer in self._tracers.items() if other[0] is not opened}
+                raise
 
-    def _tracer(self, device: Union[None, int, str], precision: str, lanes: int) -> tuple[Any, ctypes.c_void_p]:
-        key = None if device is None else str(device), precision, lanes
-        with self._lock:
-            if key in self._tracers:
-                return key, self._tracers[key]
-            settings = _c.TraceSettings(ctypes.sizeof(_c.TraceSettings), _precision(precision), lanes)
-            tracer, messages = ctypes.c_void_p(), ctypes.c_void_p()
-            status = _c.library.glint_tracer_open(_OpenDevice.get(device).handle, self._handle, ctypes.byref(settings),
-                                                  ctypes.byref(tracer), ctypes.byref(messages))
-            if tracer:
-                self._tracers[key] = tracer
-        if status == 2:
-            _OpenDevice.forget(device)
-        _check(status, messages)
-        return key, tracer
+    def _tracer(self, device: _h.Handle, precision: int, lanes: int) -> _h.Handle:
+        settings = _c.TraceSettings(ctypes.sizeof(_c.TraceSettings), precision, lanes)
+        return _h.Handle(lambda handle, messages: _c.library.glint_tracer_open(device, self._handle, ctypes.byref(settings), handle, messages),
+                         _c.library.glint_tracer_close, device)
 
 
-def _rays(origins: Any, directions: Any, tmin: Any, tmax: Any) -> tuple[Any, Any]:
-    """Returns the rays and the arrays that they refer to, which must live as long."""
+def _rays(origins: Any, directions: Any, tmin: Any, tmax: Any) -> Any:
+    """Returns the rays as a struct that keeps its arrays alive."""
     given = [array for array in (origins, directions, tmin, tmax) if array is not None]
     is_float = all(getattr(array, "dtype", None) == np.float32 for array in given)
     dtype = np.float32 if is_float else np.float64
@@ -399,17 +316,14 @@ def _rays(origins: Any, directions: Any, tmin: Any, tmax: Any) -> tuple[Any, Any
     tmin = None if tmin is None else _reals(tmin, 1, count, "tmin", dtype)
     tmax = None if tmax is None else _reals(tmax, 1, count, "tmax", dtype)
     arrays = origins, directions, tmin, tmax
-    return _c.Rays(ctypes.sizeof(_c.Rays), count, 0 if is_float else 1, *map(_pointer, arrays)), arrays
+    rays = _c.Rays(ctypes.sizeof(_c.Rays), count, 0 if is_float else 1, *map(_h.pointer, arrays))
+    rays.arrays = arrays
+    return rays
 
 
 def _copied(pointer: Any, shape: tuple[int, ...], dtype: Any) -> np.ndarray:
+    """Returns a copy of an array of the library, which is NULL if the shape has no rows."""
     return np.ctypeslib.as_array(pointer, shape).astype(dtype, copy=True) if shape[0] else np.empty(shape, dtype)
-
-
-def _scene_free(handle: ctypes.c_void_p, tracers: dict[Any, ctypes.c_void_p]) -> None:
-    for tracer in tracers.values():
-        _c.library.glint_tracer_close(tracer)
-    _c.library.glint_scene_free(handle)
 
 
 @dataclass(frozen=True)
@@ -441,10 +355,11 @@ class ImageMetrics:
 
 
 def compare(reference: Any, image: Any, *, color: Optional[bool] = None) -> ImageMetrics:
-    """Compares an image with its reference. Both arrays have the same shape, (height, width, channels) or fewer dimensions.
+    """Compares an image with its reference. Both arrays have the same shape, (height, width, channels) or fewer dimensions, and at least one
+    value. Raises ValueError if they do not.
 
-    color: whether they are colors in linear light, by default if there are 3 channels. Set it to False for data, such as
-    normals. Arrays of other shapes, such as t, are data. Arrays are compared as float32 if both are, else as float64.
+    color: whether they are colors in linear light, of a floating-point type, by default if there are 3 channels. Set it to False for data,
+    such as normals. Arrays of other shapes, such as t, are data. Arrays are compared as float32 if both are, else as float64.
     """
     given = np.asarray(reference), np.asarray(image)
     shape = given[0].shape
@@ -459,26 +374,33 @@ def compare(reference: Any, image: Any, *, color: Optional[bool] = None) -> Imag
             raise ValueError(f"compare: expected {expected}, not {array.dtype} of shape {shape}")
     dtype = np.float32 if all(array.dtype == np.float32 for array in given) else np.float64
     arrays = [np.ascontiguousarray(array, dtype) for array in given]
-    height, width, channels = (_count("compare", side) for side in {1: (1, *shape, 1), 2: (*shape, 1), 3: shape}[len(shape)])
-    pair = _c.ImagePair(ctypes.sizeof(_c.ImagePair), 0 if dtype == np.float32 else 1, width, height, channels, *map(_pointer, arrays), not is_color)
-    found, messages = _c.ImageMetrics(ctypes.sizeof(_c.ImageMetrics)), ctypes.c_void_p()
-    _check(_c.library.glint_images_compare(ctypes.byref(pair), ctypes.byref(found), ctypes.byref(messages)), messages)
+    height, width, channels = (_h.uint32("compare", side) for side in {1: (1, *shape, 1), 2: (*shape, 1), 3: shape}[len(shape)])
+    pair = _c.ImagePair(ctypes.sizeof(_c.ImagePair), 0 if dtype == np.float32 else 1, width, height, channels, *map(_h.pointer, arrays), not is_color)
+    found = _c.ImageMetrics(ctypes.sizeof(_c.ImageMetrics))
+    _h.call(_c.library.glint_images_compare, ctypes.byref(pair), ctypes.byref(found))
     return ImageMetrics(*(getattr(found, field.name) for field in fields(ImageMetrics)))
 
 
 def load(path: Union[str, os.PathLike[str]], *, overrides: Optional[Mapping[str, Any]] = None, frame: float = 0,
          camera: Union[None, str, os.PathLike[str]] = None, max_pixels: int = 0) -> Scene:
-    """Reads a scene, mesh or glTF file. overrides, frame: for YAML scenes, as in Scene. camera: the path of another scene,
-    whose camera replaces the scene's. max_pixels: as in Scene."""
+    """Reads a scene, mesh or glTF file. Raises SceneError if it cannot be read. The formats that assimp reads, such as FBX, need the program
+    glint in PATH.
+
+    overrides, frame: for YAML scenes, as in Scene. camera: the path of another scene, whose camera replaces the scene's. max_pixels: as in
+    Scene.
+    """
     options = _options(overrides, frame, max_pixels, None if camera is None else os.fsencode(camera))
     scene = Scene.__new__(Scene)
-    scene._take(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
+    scene._adopt(lambda taken, messages: _c.library.glint_scene_load(os.fsencode(path), ctypes.byref(options), taken, messages))
     return scene
 
 
 def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
-    """Makes a scene of triangles from vertices (n, 3), faces (m, 3) and, for smooth shading, normals (n, 3). A face's index is
-    its object. A camera frames the mesh, and two lights illuminate it."""
+    """Makes a scene of gray triangles. A face's index is its object. A camera frames the mesh, and two lights illuminate it.
+
+    vertices: (n, 3) finite numbers. faces: (m, 3) indices of vertices, with m from 1 to 16777216. normals: (n, 3) for smooth shading, or
+    None; a normal of 0 means flat shading. Raises ValueError for other shapes, and SceneError for numbers and indices out of range.
+    """
     points = _reals(vertices, 3, None, "vertices", np.float32 if getattr(vertices, "dtype", None) == np.float32 else np.float64)
     directions = None if normals is None else _reals(normals, 3, len(points), "normals", points.dtype)
     indices = np.asarray(faces)
@@ -488,8 +410,8 @@ def load_mesh(vertices: Any, faces: Any, normals: Any = None) -> Scene:
         wrong = indices.min() if indices.min() < 0 else indices.max()
         raise SceneError(f"faces: there is no vertex {wrong} of {len(points)}")
     triangles = np.ascontiguousarray(indices, np.uint32)
-    mesh = _c.Mesh(ctypes.sizeof(_c.Mesh), 0 if points.dtype == np.float32 else 1, _pointer(points), _pointer(directions), len(points),
-                   _pointer(triangles), len(triangles))
+    mesh = _c.Mesh(ctypes.sizeof(_c.Mesh), 0 if points.dtype == np.float32 else 1, _h.pointer(points), _h.pointer(directions), len(points),
+                   _h.pointer(triangles), len(triangles))
     scene = Scene.__new__(Scene)
-    scene._take(lambda taken, messages: _c.library.glint_scene_of_mesh(ctypes.byref(mesh), taken, messages))
+    scene._adopt(lambda taken, messages: _c.library.glint_scene_of_mesh(ctypes.byref(mesh), taken, messages))
     return scene

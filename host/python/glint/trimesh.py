@@ -1,11 +1,11 @@
 """A drop-in for trimesh.ray: mesh.ray = glint.trimesh.RayMeshIntersector(mesh)."""
 from __future__ import annotations
 
-from typing import Any, Union
+from typing import Any
 
 import numpy as np
 
-from . import MISS, Hits, load_mesh
+from . import MISS, Hits, Selector, load_mesh
 
 
 class RayMeshIntersector:
@@ -15,7 +15,7 @@ class RayMeshIntersector:
     Queries for all hits are traced in double and are not certified. If the mesh changes, create a new intersector.
     """
 
-    def __init__(self, mesh: Any, *, precision: str = "certified", device: Union[None, int, str] = None):
+    def __init__(self, mesh: Any, *, precision: str = "certified", device: Selector = None):
         self.mesh = mesh
         self._precision, self._device = precision, device
         self._scene = load_mesh(np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces))
