@@ -18,7 +18,7 @@ check "so does the static one" diff <(nm -g --defined-only "$stage/lib/libglint.
 
 # Crashes, exit() and constants that are computed once need variables of the process. Only faults print.
 check "no other state is the process's" diff <(nm "$stage/lib/libglint.a" | sed -n 's/.* [bB] \([a-z_0-9]*\).*/\1/p' | sort -u) \
-    <(printf '%s\n' c_locale c_locale_once calling_threads complete_status crash_record curve_16 curve_8 is_complete last_call \
+    <(printf '%s\n' c_locale calling_threads complete_status crash_record curve_16 curve_8 is_complete last_call \
         limits noted_call noted_kernel once once_16 once_8 pending pending_mutex stack | sort)
 check "only faults print to stderr" test "$(cd host && grep -rlwE --include='*.c' 'stderr|perror' base image opencl scene import compile render api)" = base/fault.c
 

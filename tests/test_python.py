@@ -10,6 +10,7 @@ import dataclasses
 import json
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -512,6 +513,20 @@ class Errors(unittest.TestCase):
                                      env={**os.environ, "XDG_CACHE_HOME": folder, "PYTHONPATH": str(ROOT / "host/python")})
             self.assertEqual((process.stdout, process.stderr), (
                 f"GlintWarning <string> glint: warning: the kernel cache '{folder}/glint' is not used: others may access it\n", ""))
+
+    @unittest.skipUnless(shutil.which("localedef") and os.path.exists("/usr/share/i18n/locales/de_DE"), "localedef makes no de_DE")
+    def test_locale(self):
+        """A process whose numbers have a comma gets the same scene, with the number between two keys."""
+        program = f"""if True:
+            import glint, locale
+            locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
+            scene = glint.Scene({{**{SPHERE!r}, "frames": 3, "objects": [{{"sphere": {{"center": [0, 0, 0], "radius": {{"keys": {{"0": 1, "2": 2}}}}}}}}]}}, frame=0.5)
+            print(scene.trace([[0, 0, -4]], [[0, 0, 1]], precision="double").t.tolist(), locale.str(0.5))"""
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run(["localedef", "-f", "UTF-8", "-i", "de_DE", f"{folder}/de_DE.UTF-8"], check=True, stdout=subprocess.DEVNULL)
+            process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False,
+                                     env={**os.environ, "LOCPATH": folder, "PYTHONPATH": str(ROOT / "host/python")})
+        self.assertEqual((process.stdout, process.stderr), ("[2.75] 0,5\n", ""))
 
     def test_max_pixels(self):
         """An image of the scene may have as many pixels as the call permits."""

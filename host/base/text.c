@@ -4,7 +4,9 @@
 #include "host/base/memory.h"
 
 #include <errno.h>
+#include <locale.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -37,10 +39,28 @@ char *text_format(const char *format, ...)
     return formatted;
 }
 
+// Made once by the first thread that needs it, then constant.
+static locale_t c_locale;
+
+static void c_locale_make(void)
+{
+    c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (!c_locale) fault("out of memory: locale");
+}
+
+locale_t text_locale(void)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, c_locale_make);
+    return c_locale;
+}
+
 char *text_format_list(const char *format, va_list arguments)
 {
     char *formatted;
+    const locale_t callers = uselocale(text_locale());
     if (vasprintf(&formatted, format, arguments) < 0) fault("out of memory: text");
+    uselocale(callers);
     return formatted;
 }
 

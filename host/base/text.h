@@ -2,6 +2,7 @@
 #pragma once
 
 #include "host/base/message.h"
+#include <locale.h>
 #include <stdarg.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -15,9 +16,12 @@ typedef struct {
 
 void text_append(Text *text, const char *bytes, size_t length);
 void text_appendf(Text *text, const char *format, ...) __attribute__((format(printf, 2, 3)));
-// Return a formatted text, never NULL. The caller frees it.
+// Return a formatted text, never NULL. The caller frees it. A number has a point in every locale, here and in
+// text_appendf.
 char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2)));
 char *text_format_list(const char *format, va_list arguments) __attribute__((format(printf, 1, 0)));
+// Returns the locale C, whatever locale the process has set.
+locale_t text_locale(void);
 const char *text_c(const Text *text); // never NULL
 void text_free(Text *text);           // frees and zeroes
 

@@ -1,8 +1,8 @@
 #include "host/import/number.h"
 
-#include <locale.h>
+#include "host/base/text.h"
+
 #include <math.h>
-#include <pthread.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -16,22 +16,12 @@ const Range range_byte = {0, 255, false, "from 0 to 255"};
 const Range range_field_of_view = {0, 180, true, "greater than 0 and less than 180"};
 const Range range_pixels = {1, 65536, false, "from 1 to 65536"};
 
-// Made once by the first thread that needs it, then constant.
-static locale_t c_locale;
-static pthread_once_t c_locale_once = PTHREAD_ONCE_INIT;
-
-static void c_locale_make(void)
-{
-    c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-}
-
 static double decimal_by_library(const char *text, size_t length)
 {
     char copy[NUMBER_LENGTH_MAX + 1];
     memcpy(copy, text, length);
     copy[length] = '\0';
-    pthread_once(&c_locale_once, c_locale_make);
-    return strtod_l(copy, NULL, c_locale);
+    return strtod_l(copy, NULL, text_locale());
 }
 
 typedef struct {
