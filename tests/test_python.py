@@ -553,6 +553,8 @@ class Errors(unittest.TestCase):
                 self.assertEqual(library.glint_tracer_open(device, scene._handle, ctypes.cast(ctypes.byref(settings), ctypes.POINTER(glint._c.TraceSettings)),
                                                            ctypes.byref(tracer), ctypes.byref(messages)), status)
             self.assertEqual(bool(messages), status == 1)
+            if messages:
+                self.assertIn(b"a GlintTraceSettings sets a member that glint", ctypes.string_at(messages))
             library.glint_text_free(messages)
             library.glint_tracer_close(tracer)
 

@@ -4,17 +4,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool struct_read(void *own, size_t own_size, const void *given, MessageList *messages)
+bool struct_read(void *own, size_t own_size, const void *given, const char *type, MessageList *messages)
 {
-    size_t size = 0;
-    if (given) memcpy(&size, given, sizeof size);
-    bool is_known = size >= sizeof size;
-    for (size_t i = own_size; is_known && i < size; i++)
-        is_known = ((const char *)given)[i] == 0;
+    size_t size;
     memset(own, 0, own_size);
-    if (!is_known)
-        return message_error(messages, "a struct is of a later version than %s, or its size is not set",
-                             glint_version());
+    if (!struct_has_size(given, sizeof size, type, messages)) return false;
+    memcpy(&size, given, sizeof size);
+    for (size_t i = own_size; i < size; i++)
+        if (((const char *)given)[i] != 0)
+            return message_error(messages, "a %s sets a member that glint %s does not know", type,
+                                 glint_version());
     memcpy(own, given, size < own_size ? size : own_size);
     return true;
 }
@@ -28,11 +27,11 @@ void struct_write(void *given, const void *own, size_t own_size)
     memcpy(given, &size, sizeof size);
 }
 
-bool struct_has_size(const void *given, size_t size_min, const char *name, MessageList *messages)
+bool struct_has_size(const void *given, size_t size_min, const char *type, MessageList *messages)
 {
     size_t size = 0;
     if (given) memcpy(&size, given, sizeof size);
-    return size >= size_min || message_error(messages, "the size of a %s is not set", name);
+    return size >= size_min || message_error(messages, "the size of a %s is not set", type);
 }
 
 bool real_is_known(GlintReal real, MessageList *messages)

@@ -9,7 +9,7 @@
 // Copies a caller's pair, of any version of the interface. Returns false with a message if it is invalid.
 static bool pair_read(GlintImagePair *own, const GlintImagePair *given, MessageList *messages)
 {
-    if (!struct_read(own, sizeof *own, given, messages)) return false;
+    if (!struct_read(own, sizeof *own, given, "GlintImagePair", messages)) return false;
     if (!real_is_known(own->real, messages)) return false;
     const size_t row_max =
         SIZE_MAX / sizeof(double) / (own->width ? own->width : 1) / (own->height ? own->height : 1);

@@ -87,9 +87,9 @@ Renderer *device_renderer(GlintDevice *device, const Scene *scene, const RenderS
     Compute *compute = &device->compute;
     if (settings->precision == PRECISION_CERTIFIED && !compute->device->fp64 && !compute->reference &&
         compute_ok(compute)) {
-        MessageList unsaid = {0}; // renderer_open names what is missing
-        const Device *reference = device_choose_reference(&device->list, NULL, &unsaid);
-        message_list_free(&unsaid);
+        MessageList ignored = {0}; // renderer_open names what is missing
+        const Device *reference = device_choose_reference(&device->list, NULL, &ignored);
+        message_list_free(&ignored);
         if (reference) compute_open_reference(compute, reference);
     }
     return renderer_open(compute, scene, settings, messages);

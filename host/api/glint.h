@@ -6,7 +6,8 @@
 // its kernel cache cannot be used. The library itself prints nothing, except when memory runs out.
 //
 // Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
-// can add members. Members beyond the caller's size are read as 0.
+// can add members. Members beyond the caller's size are read as 0. Pointers must not be NULL unless a comment
+// permits it.
 //
 // Handles are independent of each other. A device serves one call at a time, and calls from other threads
 // wait. Calls only read a scene, so several threads may use it at once. Listing devices sets the environment

@@ -24,9 +24,9 @@ struct GlintTracer {
     Precision precision;
 };
 
-// Copies a caller's struct, which may be of another version of the interface. Returns false with a message if
-// its size is invalid or if a member that this version does not know is not 0.
-bool struct_read(void *own, size_t own_size, const void *given, MessageList *messages);
+// Copies a caller's struct, which may be of another version of the interface. Returns false with a message
+// that names its type if its size is not set or if a member that this version does not know is not 0.
+bool struct_read(void *own, size_t own_size, const void *given, const char *type, MessageList *messages);
 
 // Copies a struct over the caller's, which may be of another version of the interface and keeps its size.
 // Members that this version does not know become 0.
@@ -38,7 +38,7 @@ GlintStatus call_end(MessageList *list, GlintDevice *device, GlintStatus status,
 
 // Returns whether the caller's struct, which may be NULL, states a size of at least `size_min` bytes, and
 // adds a message if not.
-bool struct_has_size(const void *given, size_t size_min, const char *name, MessageList *messages);
+bool struct_has_size(const void *given, size_t size_min, const char *type, MessageList *messages);
 
 // Returns whether a type of numbers is known, and adds a message if not.
 bool real_is_known(GlintReal real, MessageList *messages);

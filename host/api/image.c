@@ -86,8 +86,8 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
     GlintRenderSettings given;
     GlintImage arrays;
     RenderSettings own;
-    if (!struct_read(&given, sizeof given, settings, &list) ||
-        !struct_read(&arrays, sizeof arrays, image, &list) ||
+    if (!struct_read(&given, sizeof given, settings, "GlintRenderSettings", &list) ||
+        !struct_read(&arrays, sizeof arrays, image, "GlintImage", &list) ||
         !settings_read(&own, &given, &scene->scene, &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     Rendering rendering = {

@@ -13,7 +13,7 @@ GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
     GlintTraceSettings given;
     Precision precision;
     *tracer = NULL;
-    if (!struct_read(&given, sizeof given, settings, &list) ||
+    if (!struct_read(&given, sizeof given, settings, "GlintTraceSettings", &list) ||
         !precision_read(&precision, given.precision, &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     RenderSettings own = settings_of_image(1, 1, precision);
@@ -170,7 +170,7 @@ static bool batches_trace(GlintTracer *tracer, const GlintRays *rays, const Trac
 
 bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages)
 {
-    if (!struct_read(own, sizeof *own, given, messages)) return false;
+    if (!struct_read(own, sizeof *own, given, "GlintRays", messages)) return false;
     if (!real_is_known(own->real, messages)) return false;
     if (own->count > 0 && (!own->origins || !own->directions))
         return message_error(messages, "rays need origins and directions");
@@ -193,7 +193,8 @@ GlintStatus glint_trace(GlintTracer *tracer, const GlintRays *rays, GlintHits *h
     MessageList list = {0};
     GlintRays given;
     TraceArrays arrays = {0};
-    if (!rays_read(&given, rays, &list) || !struct_read(&arrays.hits, sizeof arrays.hits, hits, &list))
+    if (!rays_read(&given, rays, &list) ||
+        !struct_read(&arrays.hits, sizeof arrays.hits, hits, "GlintHits", &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     return call_trace(tracer, &given, &arrays, &list, messages);
 }
@@ -204,7 +205,7 @@ GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, Gl
     MessageList list = {0};
     GlintRays given;
     GlintOcclusion own;
-    if (!rays_read(&given, rays, &list) || !struct_read(&own, sizeof own, occlusion, &list))
+    if (!rays_read(&given, rays, &list) || !struct_read(&own, sizeof own, occlusion, "GlintOcclusion", &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     const TraceArrays arrays = {.hits.certainty = own.certainty, .occluded = own.occluded};
     return call_trace(tracer, &given, &arrays, &list, messages);

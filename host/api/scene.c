@@ -22,7 +22,7 @@ static bool options_read(SceneOptions *options, const GlintSceneOptions *given, 
 {
     GlintSceneOptions own = {0};
     *options = (SceneOptions){.mesh_program = "glint"};
-    if (given && !struct_read(&own, sizeof own, given, messages)) return false;
+    if (given && !struct_read(&own, sizeof own, given, "GlintSceneOptions", messages)) return false;
     if (own.override_count > 0 && !own.overrides)
         return message_error(messages, "override_count is not 0, but overrides is NULL");
     for (size_t i = 0; i < own.override_count; i++)
@@ -95,7 +95,8 @@ GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char 
     MessageList list = {0};
     Scene read = {0};
     GlintMesh given;
-    bool is_read = struct_read(&given, sizeof given, mesh, &list) && mesh_is_sound(&given, &list);
+    bool is_read =
+        struct_read(&given, sizeof given, mesh, "GlintMesh", &list) && mesh_is_sound(&given, &list);
     if (is_read) {
         Mesh own = {.vertex_count = given.vertex_count, .triangle_count = given.triangle_count};
         own.vertices = memory_allocate(given.vertex_count, sizeof *own.vertices);

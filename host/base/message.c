@@ -141,44 +141,42 @@ size_t message_count(const MessageList *list, MessageSeverity severity)
     return count;
 }
 
-// Prints the line's tabs before the caret, which keep it under its character at any tab width.
-static void caret_print(const char *line, unsigned column, FILE *stream)
+// Appends the line's tabs before the caret, which keep it under its character at any tab width.
+static void caret_append(Text *text, const char *line, unsigned column)
 {
     const char *at = line;
     for (unsigned before = 1; before < column; before++) {
-        fputc(*at == '\t' ? '\t' : ' ', stream);
+        text_append(text, *at == '\t' ? "\t" : " ", 1);
         if (*at) at += text_character_size(at, strlen(at));
     }
-    fputs("^\n", stream);
+    text_append(text, "^\n", 2);
 }
 
-static void message_print(const Message *message, FILE *stream)
+static void message_append(Text *text, const Message *message)
 {
-    fputs(message->file ? message->file : "glint", stream);
-    if (message->line) fprintf(stream, ":%u", message->line);
-    if (message->column) fprintf(stream, ":%u", message->column);
-    fprintf(stream, ": %s: %s\n", message->severity == MESSAGE_ERROR ? "error" : "warning", message->text);
+    text_appendf(text, "%s", message->file ? message->file : "glint");
+    if (message->line) text_appendf(text, ":%u", message->line);
+    if (message->column) text_appendf(text, ":%u", message->column);
+    text_appendf(text, ": %s: %s\n", message->severity == MESSAGE_ERROR ? "error" : "warning", message->text);
     if (message->source_line && message->column) {
-        fprintf(stream, "%s\n", message->source_line);
-        caret_print(message->source_line, message->column, stream);
+        text_appendf(text, "%s\n", message->source_line);
+        caret_append(text, message->source_line, message->column);
     }
-}
-
-void message_list_print(const MessageList *list, FILE *stream)
-{
-    for (size_t i = 0; i < list->count; i++)
-        message_print(&list->items[i], stream);
 }
 
 char *message_list_text(const MessageList *list)
 {
-    char *text = NULL;
-    size_t size;
-    FILE *stream = list->count > 0 ? open_memstream(&text, &size) : NULL;
-    if (!stream) return NULL;
-    message_list_print(list, stream);
-    fclose(stream);
-    return text;
+    Text text = {0};
+    for (size_t i = 0; i < list->count; i++)
+        message_append(&text, &list->items[i]);
+    return text.items;
+}
+
+void message_list_print(const MessageList *list, FILE *stream)
+{
+    char *text = message_list_text(list);
+    if (text) fputs(text, stream);
+    free(text);
 }
 
 void message_list_free(MessageList *list)

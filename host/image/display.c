@@ -44,8 +44,8 @@ static uint8_t dithered(float value, Transfer transfer, uint32_t x, uint32_t y)
 static void row_convert(uint8_t *bytes, const float *values, const ImageHeader *header, uint32_t row)
 {
     const size_t count = (size_t)header->width * header->channels, value_size = header->bits / 8;
-    const double gain =
-        (float)exp2(header->exposure); // rounded, because hosts' exp2() differ in the last bits of a double
+    // rounded to float, because exp2() of different hosts differs in the last bits of a double
+    const double gain = (float)exp2(header->exposure);
     const bool is_toned = gain != 1 || header->tone != TONE_NONE;
     float toned[CHUNK];
     for (size_t start = 0, length; start < count; start += length) {

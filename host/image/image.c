@@ -5,7 +5,6 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -152,22 +151,23 @@ bool image_write(const char *path, const ImageHeader *header, const void *pixels
 
 bool image_refuse(const ImageFile *file, const char *format, ...)
 {
-    char reason[512];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(reason, sizeof reason, format, arguments);
+    char *reason = text_format_list(format, arguments);
     va_end(arguments);
-    return message_error(file->messages, "cannot read '%s': %s", file->path, reason);
+    message_error(file->messages, "cannot read '%s': %s", file->path, reason);
+    free(reason);
+    return false;
 }
 
 void image_warn(const ImageFile *file, const char *format, ...)
 {
-    char loss[512];
     va_list arguments;
     va_start(arguments, format);
-    vsnprintf(loss, sizeof loss, format, arguments);
+    char *loss = text_format_list(format, arguments);
     va_end(arguments);
     message_warning(file->messages, "'%s': %s", file->path, loss);
+    free(loss);
 }
 
 bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_t height, uint64_t channels,
