@@ -36,15 +36,21 @@ class Failure(Exception):
 
 
 class Launch:
-    """A captured launch: text, options, sizes and arguments."""
+    """A captured launch of a kernel.
+
+    text: the composed text. items, first, group: the work-items, their first global ids and the work-group, per dimension; group may be
+    None. arguments: by index, the bytes of a buffer, a tuple with the bytes of a value, or None for no buffer. lanes: rays per work-item.
+    pixel_words: the 32-bit words of a pixel's color in the film.
+    """
 
     def __init__(self, path):
+        """Reads the launch from its JSON file and the files that it names."""
         index = json.loads(path.read_text(encoding="utf-8"))
         self.kernel, self.options = index["kernel"], shlex.split(index["options"])
         self.text = (path.parent / index["text"]).read_text(encoding="utf-8")
         self.items, self.device = index["items"], index["device"]
         self.first, self.group = index.get("first") or [0] * len(self.items), index.get("group")
-        self.arguments = {}  # by index: the bytes of a buffer, or a tuple with those of a value
+        self.arguments = {}
         for argument in index["arguments"]:
             if "value" in argument:
                 value = (base64.b64decode(argument["value"]),)
@@ -67,7 +73,10 @@ class Launch:
 
 
 class Device:
-    """A device with its compiler, which tests replace."""
+    """An open device with the programs that it has built.
+
+    compiler: changes the text before it is built, by which tests make a faulty compiler. options: follow those of each launch.
+    """
 
     def __init__(self, device, compiler=lambda text: text, options=()):
         self.device, self.compiler, self.options = device, compiler, list(options)
@@ -77,16 +86,19 @@ class Device:
         self.name = f"{device.platform.name}, {device.name}".strip() + "".join(f" {each}" for each in options)
 
     def kernel(self, text, name, options):
+        """Returns a kernel of the text, which is built once. Raises cl.Error if it does not build."""
         key = text, tuple(options)
         if key not in self.programs:
             self.programs[key] = cl.Program(self.context, self.compiler(text)).build([*options, *self.options, "-w"], cache_dir=False)
         return cl.Kernel(self.programs[key], name)
 
     def buffer(self, data):
+        """Returns a buffer with the contents of an array or of bytes."""
         contents = data if isinstance(data, np.ndarray) else bytearray(data)
         return cl.Buffer(self.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=contents)
 
     def read(self, buffer):
+        """Returns a buffer as an array of uint32."""
         data = np.empty(buffer.size // 4, np.uint32)
         cl.enqueue_copy(self.queue, data, buffer)
         return data
@@ -101,7 +113,11 @@ class Device:
         return group
 
     def run(self, launch, text, item=None, extra=()):
-        """Runs the whole launch, or one item's work-group. Returns the film and the buffers among `extra`."""
+        """Runs the launch with the text instead of its own, for all work-items or for the work-group of one.
+
+        extra: arguments that follow those of the launch, arrays for buffers and scalars of NumPy for values. Returns the film and the
+        buffers among `extra`, as arrays of uint32.
+        """
         kernel = self.kernel(text, launch.kernel, launch.options)
         buffers = {index: self.buffer(value) for index, value in launch.arguments.items() if isinstance(value, bytes)}
         for index, value in launch.arguments.items():
@@ -119,14 +135,15 @@ class Device:
 
 
 class Pixel(NamedTuple):
+    """A pixel of a launch."""
     x: int  # in the image
     y: int
     at: int  # index in the film
     item: tuple  # the work-item that renders it
 
 
-def first_pixel(launch, film, other):
-    """Returns the first pixel whose bits differ, or None."""
+def pixel_find(launch, film, other):
+    """Returns the first pixel whose color differs between two films in any bit, or None."""
     left, top, width, height = map(int, launch.band)
     size = launch.pixel_words * width * height
     differing = np.nonzero(film[:size] != other[:size])[0]
@@ -138,16 +155,18 @@ def first_pixel(launch, film, other):
 
 
 class Record(NamedTuple):
+    """What a work-item recorded at a site once."""
     site: instrument.Site
-    values: list
+    values: list  # the operands, then the result unless the site is an entry; a pointer or a struct is None
 
     @property
     def operands(self):
+        """The operands, or the parameters of an entry."""
         return self.values if self.site.is_entry else self.values[:-1]
 
 
 def records(words, sites):
-    """Yields the records of a trace, each preceded by the position after it. Ends before a truncated record."""
+    """Yields pairs of the position after a record and the record, from the words of a trace. Ends before a truncated record."""
     words = words.tolist()
     at = 0
     try:
@@ -171,6 +190,7 @@ class Finding(NamedTuple):
 
     @property
     def site(self):
+        """The suspect's site."""
         return self.ours.site
 
     def first_lane(self):
@@ -185,17 +205,24 @@ class Finding(NamedTuple):
 
 
 class Search:
-    """The comparison of a suspect with a reference by one launch."""
+    """The comparison of a suspect with a reference by one launch.
+
+    pixel: the first Pixel that differs, or None. bits: its color by the suspect and by the reference, as words. sites: all sites of the
+    program. `find` sets them.
+    """
 
     def __init__(self, launch, suspect, reference, definitions=()):
+        """definitions: the macros that the suspect's compiler defines, as MACRO or MACRO=VALUE."""
         self.launch, self.suspect, self.reference = launch, suspect, reference
         self.program = launch.program(tuple(definitions))
+        self.pixel, self.bits, self.sites = None, [], []
 
     def color(self, film):
-        """Returns the bits of the pixel."""
+        """Returns the pixel's color in a film, as words."""
         return film[self.launch.pixel_words * self.pixel.at:][:self.launch.pixel_words].tolist()
 
     def trace_arguments(self, begin, size):
+        """Returns the arguments of an instrumented kernel, which records `size` words of the pixel's work-item from the word `begin` on."""
         return [np.concatenate([np.array([0, begin, size], np.uint32), np.zeros(size, np.uint32)]), *map(np.uint32, self.pixel.item)]
 
     def is_equal(self, selected, device=None):
@@ -205,9 +232,10 @@ class Search:
         return self.color((device or self.suspect).run(self.launch, text, self.pixel.item, extra)[0]) == self.bits[1]
 
     def find(self):
-        """Returns a Finding, or the smallest list of functions or sites whose recording makes the difference vanish."""
+        """Returns a Finding, a smallest list of indices of sites whose recording makes the difference vanish, or None if no pixel differs.
+        Raises Failure if neither can be found."""
         films = [device.run(self.launch, self.launch.text)[0] for device in (self.suspect, self.reference)]
-        self.pixel = first_pixel(self.launch, *films)
+        self.pixel = pixel_find(self.launch, *films)
         if self.pixel is None:
             return None
         self.bits = [self.color(film) for film in films]
@@ -253,7 +281,7 @@ class Search:
         return finding.right is not None and not is_of_nan and not is_repaired
 
     def vanished(self, traced):
-        """Returns a smallest list of sites whose recording makes the difference vanish, within a smallest list of functions."""
+        """Returns a smallest list of indices of sites whose recording makes the difference vanish, within a smallest list of functions."""
         if self.is_equal(None):
             raise Failure("the preprocessed text gives equal pixels, so the difference is in a part of it for certain compilers, such as "
                           "#ifdef __clang__; define the macros that the compiler has by --define")
@@ -261,10 +289,12 @@ class Search:
             raise Failure("the difference vanishes as soon as functions have another parameter")
         _, (words,) = self.reference.run(self.launch, traced.text, self.pixel.item, self.trace_arguments(0, TRACE_WORDS))
         used = {id(record.site) for _, record in records(words[instrument.HEAD:][:int(words[0])], self.sites)}
-        sites = [number for number, site in enumerate(self.sites) if id(site) in used]
-        functions = [*dict.fromkeys(self.sites[number].function for number in sites)]
-        kept = smallest(functions, lambda some: self.is_equal([number for number in sites if self.sites[number].function in some]))
-        return smallest([number for number in sites if self.sites[number].function in kept], self.is_equal)
+        indices = [index for index, site in enumerate(self.sites) if id(site) in used]
+        functions = [*dict.fromkeys(self.sites[index].function for index in indices)]
+
+        def within(some):
+            return [index for index in indices if self.sites[index].function in some]
+        return smallest(within(smallest(functions, lambda some: self.is_equal(within(some)))), self.is_equal)
 
 
 def smallest(units, holds):
@@ -283,12 +313,13 @@ def smallest(units, holds):
 
 
 def type_name(value):
+    """Returns the type of a value in OpenCL C. A bool is stored as an int."""
     name = "int" if value.type == "bool" else value.type
     return name if len(value.lanes) == 1 else f"{name}{len(value.lanes)}"
 
 
 def words_of(value):
-    """Returns the bits as 32-bit words."""
+    """Returns the bits of a value's lanes as 32-bit words, the lower half of 64 bits first."""
     return [word for bits in value.lanes for word in ([bits & 0xFFFFFFFF, bits >> 32] if value.type in ("long", "ulong", "double") else [bits])]
 
 
@@ -309,7 +340,8 @@ kernel void operation(global const uint *inputs, global uint *result)
 
 
 def program_write(path, finding, launch):
-    """Writes the operation as a separate program."""
+    """Writes the operation of a finding as a separate program, with the bits of its operands and of the right result or, if the standard allows
+    several, the reference's."""
     names = "abcdefgh"[:len(finding.ours.operands)]
     result, right = finding.ours.values[-1], finding.right
     inputs, loads = [], []
@@ -325,7 +357,7 @@ def program_write(path, finding, launch):
 
 
 def program_run(path, device):
-    """Runs a written operation. Returns its result and the expected one as words."""
+    """Runs a program that program_write wrote. Returns its result and the expected one as lists of words."""
     text = Path(path).read_text(encoding="utf-8")
     options, inputs, expected = (re.search(rf"(?m)^// {name}: ([^(\n]*)", text)[1] for name in ("options", "inputs", "expected"))
     kernel = device.kernel(text, "operation", shlex.split(options))
@@ -336,7 +368,7 @@ def program_run(path, device):
 
 
 def describe_ray(entries):
-    """Describes a work-item's sample, ray and hits after it has entered the functions."""
+    """Describes the sample, ray and hits of a work-item after the entries, which are those of functions since its camera ray."""
     names = [entry.site.function for entry in entries]
     value = {(at, name): number(value.type, value.lanes[0])
              for at, entry in enumerate(entries) for name, value in zip(entry.site.names, entry.values)}
@@ -359,7 +391,7 @@ def report(search, found, path):
     if isinstance(found, list):
         yield "No recorded operation differs, since recording it makes the difference vanish: the compiler gets it wrong in its surroundings."
         yield "The difference vanishes as soon as " + ("this is" if len(found) == 1 else "these are") + " recorded:"
-        for site in (search.sites[number] for number in found):
+        for site in (search.sites[index] for index in found):
             yield f"  {site.place}, {site.function}: {'its parameters' if site.is_entry else site.operation + ', ' + site.form}"
         return
     site = found.site
@@ -388,7 +420,7 @@ def report(search, found, path):
 
 
 def device_find(name):
-    """Returns the device that an index or a part of "PLATFORM, DEVICE" names."""
+    """Returns the first device that an index or a part of "PLATFORM, DEVICE" in any case names. Raises Failure with the devices if none does."""
     devices = [device for platform in cl.get_platforms() for device in platform.get_devices()]
     found = [device for index, device in enumerate(devices)
              if name == str(index) or not name.isdigit() and name.lower() in f"{device.platform.name}, {device.name}".lower()]
@@ -397,8 +429,43 @@ def device_find(name):
     return found[0]
 
 
+def launches_read(folder):
+    """Returns the launches of a folder that render all pixels, in the order in which they were captured. Raises Failure if there is none, or one
+    at a precision at which devices may differ."""
+    launches = [Launch(path) for path in sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)]
+    launches = [launch for launch in launches if launch.kernel == "render" and "#define IS_PIXEL_LIST 0" in launch.text]
+    if not launches:
+        raise Failure(f"{folder}: no launch of the kernel render for all pixels")
+    for launch in launches:
+        if "#define IS_STRICT 1" not in launch.text and "#define IS_DOUBLE 1" not in launch.text:
+            raise Failure(f"{folder}: captured at single, where devices may differ; use --precision strict or double")
+    return launches
+
+
+def command_run(options, compiler):
+    """Runs the command with its parsed options, prints the result and returns the exit status. compiler: the suspect's, see Device."""
+    suspect_options = shlex.split(options.device_options)
+    if options.run:
+        result, expected = program_run(options.run, Device(device_find(options.device or "0"), options=suspect_options))
+        for name, words in ("result", result), ("expected", expected):
+            print(f"{name}: {' '.join(f'{word:08x}' for word in words)}")
+        return 3 * (result != expected)
+    launches = launches_read(options.folder)
+    suspect = Device(device_find(options.device or launches[0].device), compiler, suspect_options)
+    reference = Device(device_find(options.reference), options=shlex.split(options.reference_options))
+    for launch in launches:
+        search = Search(launch, suspect, reference, options.define)
+        found = search.find()
+        if found is not None:
+            print(*report(search, found, options.output), sep="\n")
+            return 3
+    print(f"{len(launches)} launch{'es' if len(launches) > 1 else ''}: no pixel differs between {suspect.name} and {reference.name}")
+    return 0
+
+
 def main(arguments=None, compiler=lambda text: text):
-    """Runs the command. Tests replace the suspect's compiler."""
+    """Runs the command and returns its exit status: 0 if no pixel differs, 1 for a user's mistake, 2 if a device failed, 3 if a pixel or a
+    result differs. compiler: the suspect's, which tests replace."""
     parser = argparse.ArgumentParser(prog="glint locate", description="Finds the operation that an OpenCL device computes differently from another.")
     parser.add_argument("folder", nargs="?", type=Path, help="of glint render --capture")
     parser.add_argument("--device", help="index or part of the name of the suspect (default: the device of the capture)")
@@ -409,31 +476,10 @@ def main(arguments=None, compiler=lambda text: text):
     parser.add_argument("-o", "--output", type=Path, default=Path("operation.cl"), help="the program that is written (default: %(default)s)")
     parser.add_argument("--run", type=Path, metavar="FILE", help="run a program that was written")
     options = parser.parse_args(arguments)
+    if not options.run and not options.folder:
+        parser.error("no folder given")
     try:
-        if options.run:
-            result, expected = program_run(options.run, Device(device_find(options.device or "0"), options=shlex.split(options.device_options)))
-            for name, words in ("result", result), ("expected", expected):
-                print(f"{name}: {' '.join(f'{word:08x}' for word in words)}")
-            return 3 * (result != expected)
-        if not options.folder:
-            parser.error("no folder given")
-        launches = [Launch(path) for path in sorted(options.folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)]
-        launches = [launch for launch in launches if launch.kernel == "render" and "#define IS_PIXEL_LIST 0" in launch.text]
-        if not launches:
-            raise Failure(f"{options.folder}: no launch of the kernel render for all pixels")
-        for launch in launches:
-            if "#define IS_STRICT 1" not in launch.text and "#define IS_DOUBLE 1" not in launch.text:
-                raise Failure(f"{options.folder}: captured at single, where devices may differ; use --precision strict or double")
-        suspect = Device(device_find(options.device or launches[0].device), compiler, shlex.split(options.device_options))
-        reference = Device(device_find(options.reference), options=shlex.split(options.reference_options))
-        for launch in launches:
-            search = Search(launch, suspect, reference, options.define)
-            found = search.find()
-            if found is not None:
-                print(*report(search, found, options.output), sep="\n")
-                return 3
-        print(f"{len(launches)} launch{'es' if len(launches) > 1 else ''}: no pixel differs between {suspect.name} and {reference.name}")
-        return 0
+        return command_run(options, compiler)
     except subprocess.CalledProcessError as error:
         print(f"glint locate: the C preprocessor failed: {error.stderr or error}", file=sys.stderr)
         return 1
