@@ -157,9 +157,9 @@ bool option_list(const Option *option, const char *value, OptionReader *read, Op
     for (const char *at = value;; at++) {
         const size_t length = strcspn(at, ",");
         char *word = memory_copy_part(at, length);
-        const bool has_room = *list.count < list.most;
-        if (!has_room) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option->name, list.most);
-        const bool is_read = has_room && read(&item, word, (char *)list.items + *list.count * list.item_size);
+        const bool fits = *list.count < list.most;
+        if (!fits) fprintf(stderr, "glint: --%s: expected at most %zu values\n", option->name, list.most);
+        const bool is_read = fits && read(&item, word, (char *)list.items + *list.count * list.item_size);
         free(word);
         if (!is_read) return false;
         (*list.count)++;

@@ -61,7 +61,7 @@ static uint64_t bytes_min(const ImageHeader *header)
 }
 
 // Returns false with a message if the image does not fit on the disk, however well it is compressed.
-static bool disk_has_room(const ImageWriter *writer, MessageList *messages)
+static bool image_fits_on_disk(const ImageWriter *writer, MessageList *messages)
 {
     struct statvfs disk;
     uint64_t bytes = bytes_min(&writer->header);
@@ -77,7 +77,7 @@ ImageWriter *image_writer_open(const char *path, const ImageHeader *header, Mess
     ImageWriter *writer = memory_allocate_zeroed(1, sizeof *writer);
     writer->header = *header;
     writer->encoder = encoder_of(header->format);
-    if (output_open(&writer->output, path, messages) && disk_has_room(writer, messages) &&
+    if (output_open(&writer->output, path, messages) && image_fits_on_disk(writer, messages) &&
         writer->encoder->begin(writer, messages))
         return writer;
     image_writer_abandon(writer);

@@ -42,24 +42,24 @@ size_t band_film_size(const Film *film, unsigned aovs, BandBuffers *buffers)
 void band_buffers_open(BandBuffers *buffers, Pass *pass, unsigned aovs, Film film)
 {
     buffers->rows = film.height;
-    buffers->film = spare_buffer_acquire(&pass->spares, pass->compute, band_film_size(&film, aovs, buffers));
-    buffers->ray_counts = spare_buffer_acquire(&pass->spares, pass->compute, RAYS_COUNT * sizeof(uint32_t));
+    buffers->film = buffer_pool_acquire(&pass->pool, pass->compute, band_film_size(&film, aovs, buffers));
+    buffers->ray_counts = buffer_pool_acquire(&pass->pool, pass->compute, RAYS_COUNT * sizeof(uint32_t));
     const bool is_list = pass->type != PASS_ALL;
     const Place place = band_place(pass, (BandRows){0, film.height});
     const size_t words = is_list           ? 4 * film_pixel_count(&film)
                          : pass->certifies ? place_flag_words(&place)
                                            : 0;
-    buffers->flags = spare_buffer_acquire(&pass->spares, pass->compute, words * sizeof(uint32_t));
+    buffers->flags = buffer_pool_acquire(&pass->pool, pass->compute, words * sizeof(uint32_t));
     buffers->center_flags =
-        spare_buffer_acquire(&pass->spares, pass->compute, is_list ? 0 : words * sizeof(uint32_t));
+        buffer_pool_acquire(&pass->pool, pass->compute, is_list ? 0 : words * sizeof(uint32_t));
 }
 
 void band_buffers_close(BandBuffers *buffers, Pass *pass)
 {
-    spare_buffer_release(&pass->spares, buffers->film);
-    spare_buffer_release(&pass->spares, buffers->ray_counts);
-    spare_buffer_release(&pass->spares, buffers->flags);
-    spare_buffer_release(&pass->spares, buffers->center_flags);
+    buffer_pool_release(&pass->pool, buffers->film);
+    buffer_pool_release(&pass->pool, buffers->ray_counts);
+    buffer_pool_release(&pass->pool, buffers->flags);
+    buffer_pool_release(&pass->pool, buffers->center_flags);
     *buffers = (BandBuffers){0};
 }
 

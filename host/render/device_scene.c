@@ -29,7 +29,7 @@ static SceneLayout scene_layout(const DeviceScene *scene, const CompiledScene *c
 static const uint64_t BUFFER_BYTES_MAX =
     SIZE_MAX / ARENA_UNIT < UINT32_MAX ? SIZE_MAX : (uint64_t)UINT32_MAX * ARENA_UNIT;
 
-bool device_scene_has_room(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages)
+bool device_scene_fits(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages)
 {
     const Device *device = scene->compute->device;
     const SceneLayout layout = scene_layout(scene, compiled);

@@ -35,7 +35,7 @@ typedef struct {
 // Returns false with a message if a buffer for the compiled scene would be larger than the host and the
 // arena's offsets can address, or if its buffers would exceed the memory that the device reports. If the
 // device reports none, creating the buffers may fail.
-bool device_scene_has_room(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages);
+bool device_scene_fits(const DeviceScene *scene, const CompiledScene *compiled, MessageList *messages);
 // Uploads the arrays of the compiled scene that have changed to devices that read the same arrays and have
 // room for them. Frees each array once all have it, unless the scene moves, which is then alone, so that at
 // most one array is in memory twice. Takes ownership of the compiled scene, which may be scenes[0]->compiled.

@@ -36,7 +36,7 @@ void pass_release_scene(Pass *pass)
     device_scene_release(&pass->scene);
     buffer_release(pass->sample_offsets);
     pass->sample_offsets = NULL;
-    spare_buffers_free(&pass->spares);
+    buffer_pool_free(&pass->pool);
 }
 
 void pass_close(Pass *pass)
@@ -160,9 +160,9 @@ bool pass_compile(Pass *pass, const Scene *scene, const RenderSettings *settings
     compiling.textures = compiled->textures;
     if (pass->scene.moves) return scene_move(compiled, scene, &compiling, messages);
     if (!scene_compile(fresh, scene, &compiling, messages)) return false;
-    const bool has_room = device_scene_has_room(&pass->scene, fresh, messages);
-    if (!has_room) compiled_scene_free(fresh);
-    return has_room;
+    const bool fits = device_scene_fits(&pass->scene, fresh, messages);
+    if (!fits) compiled_scene_free(fresh);
+    return fits;
 }
 
 void pass_move(Pass *pass, CompiledScene *fresh, const RenderSettings *settings)

@@ -2,9 +2,9 @@
 #pragma once
 
 #include "host/opencl/passport.h"
+#include "host/render/buffer_pool.h"
 #include "host/render/kernels.h"
 #include "host/render/render_settings.h"
-#include "host/render/spare_buffers.h"
 #include "host/scene/scene.h"
 
 typedef struct {
@@ -18,7 +18,7 @@ typedef struct {
     DeviceScene scene;
     Kernels kernels;
     cl_mem sample_offsets; // positions in the pixel
-    SpareBuffers spares;
+    BufferPool pool;
 } Pass;
 
 // Opens a pass of an image with these settings on its device, with neither a scene nor kernels.

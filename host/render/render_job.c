@@ -18,7 +18,7 @@ static size_t receivers_find(Pass **receivers, const RendererSet *set, SceneVari
         Renderer **renderer = &set->renderers[i];
         if (renderer_lanes(*renderer, variant.pass) != variant.lanes) continue;
         receivers[count] = &(*renderer)->passes[variant.pass];
-        if (device_scene_has_room(&receivers[count]->scene, compiled, &set->messages[i])) {
+        if (device_scene_fits(&receivers[count]->scene, compiled, &set->messages[i])) {
             count++;
         } else {
             renderer_close(*renderer);

@@ -47,9 +47,9 @@ bool renderer_receive_scene(Renderer *renderer, PixelPass pass, CompiledScene *c
                             MessageList *messages)
 {
     Pass *receiver = &renderer->passes[pass];
-    const bool has_room = device_scene_has_room(&receiver->scene, compiled, messages);
-    passes_receive_scene(&receiver, has_room, compiled);
-    return has_room && compute_check_reference(renderer->passes[PASS_ALL].compute);
+    const bool fits = device_scene_fits(&receiver->scene, compiled, messages);
+    passes_receive_scene(&receiver, fits, compiled);
+    return fits && compute_check_reference(renderer->passes[PASS_ALL].compute);
 }
 
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,

@@ -119,9 +119,9 @@ static void trace_batch(Pass *pass, KernelType type, const TraceRay *rays, size_
     Compute *compute = pass->compute;
     const size_t scalar = pass_scalar_size(pass), ray_size = count * RAY_SCALARS * scalar,
                  result_size = count * result_scalars(type) * scalar, object_size = count * sizeof(uint32_t);
-    cl_mem ray_buffer = spare_buffer_acquire(&pass->spares, compute, ray_size),
-           results = spare_buffer_acquire(&pass->spares, compute, result_size),
-           objects = spare_buffer_acquire(&pass->spares, compute, object_size);
+    cl_mem ray_buffer = buffer_pool_acquire(&pass->pool, compute, ray_size),
+           results = buffer_pool_acquire(&pass->pool, compute, result_size),
+           objects = buffer_pool_acquire(&pass->pool, compute, object_size);
     TraceBatch batch = {pass, type, rays, hits};
     batch.ray_scalars = pass_map(pass, ray_buffer, 0, ray_size, CL_MAP_WRITE_INVALIDATE_REGION);
     if (compute_ok(compute)) parallel_run(count, RAYS_OF_THREAD_MIN, rays_write, &batch);
@@ -134,9 +134,9 @@ static void trace_batch(Pass *pass, KernelType type, const TraceRay *rays, size_
     compute_unmap(compute, results, batch.result_scalars);
     compute_unmap(compute, objects, batch.objects);
     compute_try(compute, clFinish(compute->queue));
-    spare_buffer_release(&pass->spares, ray_buffer);
-    spare_buffer_release(&pass->spares, results);
-    spare_buffer_release(&pass->spares, objects);
+    buffer_pool_release(&pass->pool, ray_buffer);
+    buffer_pool_release(&pass->pool, results);
+    buffer_pool_release(&pass->pool, objects);
 }
 
 static bool pass_trace(Pass *pass, KernelType type, const TraceRay *rays, size_t ray_count, TraceHit *hits)
