@@ -19,7 +19,6 @@ typedef struct {
     CommandOperands scenes;
     const char *reference_path, *folder, *page_path;
     AccuracyBudgets budgets;
-    ReportOptions report;
 } AccuracyOptions;
 
 static bool budgets_read(const Option *option, const char *value, void *options)
@@ -40,17 +39,15 @@ static const Option options_own[] = {
     {"save", "FOLDER", "write all compared arrays there, as .npy", option_text,
      offsetof(AccuracyOptions, folder), .effect = effect_folder},
     {"html", "FILE", "self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
-    {"precision", "LIST", "any of single, strict, double, certified (default: the first three)", option_set,
-     offsetof(AccuracyOptions, variants.precisions), NAMES(precision_names)}};
+    PRECISIONS_OPTION("the first three")};
 
-static bool options_check(void *accuracy_options)
+static const char *options_check(void *accuracy_options)
 {
-    AccuracyOptions *options = accuracy_options;
-    if (options->page_path && strcmp(options->page_path, "-") == 0)
-        return option_usage_fault("accuracy", "--html needs the name of a file");
+    const AccuracyOptions *options = accuracy_options;
+    if (options->page_path && strcmp(options->page_path, "-") == 0) return "--html needs the name of a file";
     if (options->reference_path && options->scenes.count > 1)
-        return option_usage_fault("accuracy", "--reference takes one scene, but several are given");
-    return report_options_check(&options->report, &accuracy_table);
+        return "--reference takes one scene, but several are given";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -58,9 +55,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint accuracy SCENE... [OPTIONS]\n\n"
              "Measures speed and error of scenes in every requested configuration. The reference takes the "
              "largest of --samples.\n",
-    .groups = {OPTIONS(options_own), VARIANT_GROUPS(AccuracyOptions, variants),
-               OPTIONS_WITHIN(perturb_option, AccuracyOptions, variants.common),
-               OPTIONS_WITHIN(report_options, AccuracyOptions, report)},
+    .groups = {OPTIONS(options_own), VARIANT_OPTIONS, OPTIONS(perturb_option), REPORT_OPTIONS},
     OPERANDS(SCENES, AccuracyOptions, scenes),
     .check = options_check};
 
@@ -270,7 +265,7 @@ static bool has_reference(Accuracy *accuracy)
 {
     const AccuracyOptions *options = &accuracy->options;
     const char *selector = options->variants.common.reference_device;
-    const bool is_certified = options->variants.precisions >> PRECISION_CERTIFIED & 1;
+    const bool is_certified = options->variants.common.precisions >> PRECISION_CERTIFIED & 1;
     if (options->reference_path && !is_certified) return true;
     if (reference_open(&accuracy->open.compute, &accuracy->open.devices, selector)) return true;
     if (selector) return false;
@@ -314,10 +309,9 @@ static int accuracy_run(Accuracy *accuracy)
         fputs("glint: interrupted\n", stderr);
     if (status != EXIT_DONE) return status;
     const AccuracyReport report = report_of(accuracy);
-    const ReportOptions *options = &accuracy->options.report;
+    const ReportOptions *options = &accuracy->options.variants.common.report;
     if (report_has_text(options)) accuracy_print_text(&report, stdout);
-    if (options->format != FORMAT_TEXT && !report_write(accuracy_json(&report), &accuracy_table, options))
-        return EXIT_USER;
+    if (options->format != FORMAT_TEXT && !report_write(accuracy_json(&report), options)) return EXIT_USER;
     if (!page_commit(accuracy, &report)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     fputs("glint accuracy: no variant could be rendered\n", stderr);
@@ -340,7 +334,8 @@ int command_accuracy(int argument_count, char **arguments)
     Accuracy accuracy = {.options = {.variants = variant_options_default,
                                      .budgets = {.limits = {1e-2, 1e-4, 1e-6}, .count = 3}}};
     const AccuracyOptions *options = &accuracy.options;
-    accuracy.options.variants.precisions = (1u << ARITHMETIC_COUNT) - 1;
+    accuracy.options.variants.common.precisions = (1u << ARITHMETIC_COUNT) - 1;
+    accuracy.options.variants.common.report.table = &accuracy_table;
     int status = command_line_read(&command_line, &accuracy.options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     status = EXIT_USER;

@@ -12,32 +12,17 @@
 #include <string.h>
 #include <sys/utsname.h>
 
-enum { VARIANTS_MAX = 32 };
-
 typedef struct {
     VariantOptions variants;
     CommandOperands scenes;
     double tolerance; // 0 if not given
     const char *baseline, *against;
-    ReportOptions report;
     bool launches, is_worker;
-    // Each --variant's text, the memory of its words and the options that they set.
-    const char *variant_texts[VARIANTS_MAX];
-    char *variant_words[VARIANTS_MAX];
-    VariantOptions variant_options[VARIANTS_MAX];
-    size_t variant_count;
+    OptionTexts variant_texts;
+    // The memory of each --variant's words, and the options that they set.
+    char *variant_words[OPTION_TEXTS_MAX];
+    VariantOptions variant_options[OPTION_TEXTS_MAX];
 } BenchOptions;
-
-static bool variant_keep(const Option *option, const char *value, void *options)
-{
-    BenchOptions *bench = options;
-    if (bench->variant_count == VARIANTS_MAX) {
-        fprintf(stderr, "glint: --%s: may be given at most %d times\n", option->name, VARIANTS_MAX);
-        return false;
-    }
-    bench->variant_texts[bench->variant_count++] = value;
-    return true;
-}
 
 static const Option options_own[] = {
     {"against", "GLINT", "compare with another build, run alternately; default of --seconds: 30 per row",
@@ -56,10 +41,8 @@ static const Option options_own[] = {
      "rows with these options, as in \"--lanes 8 --work-group 8x8\"; any of --precision, --lanes, --bvh, "
      "--samples, --bounces, --work-group and --build-options; may be repeated. A row is compared with the "
      "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
-     variant_keep, 0}};
-static const Option precisions_option[] = {
-    {"precision", "LIST", "any of single, strict, double, certified (default: single)", option_set,
-     offsetof(VariantOptions, precisions), NAMES(precision_names)}};
+     option_texts, offsetof(BenchOptions, variant_texts)}};
+static const Option precisions_option[] = {PRECISIONS_OPTION("single")};
 
 typedef struct {
     VariantOptions options;
@@ -68,10 +51,8 @@ typedef struct {
 
 // The options that --variant accepts.
 static const CommandLine variant_line = {
-    .groups = {OPTIONS_WITHIN(precisions_option, VariantLine, options),
-               OPTIONS_WITHIN(variant_choice_options, VariantLine, options),
-               OPTION_WITHIN(ray_options[RAY_BOUNCES], VariantLine, options.common),
-               OPTIONS_WITHIN(driver_options, VariantLine, options.common)},
+    .groups = {OPTIONS(precisions_option), OPTIONS(variant_choice_options), OPTION(ray_options[RAY_BOUNCES]),
+               OPTIONS(driver_options)},
     OPERANDS(ANY, VariantLine, operands)};
 
 // Splits a text in place at blanks outside of quotes and removes the quotes, ' or ". Adds each word to
@@ -111,7 +92,7 @@ static bool words_read(VariantOptions *variant, char **words, int count)
 static bool variant_read(BenchOptions *options, size_t index)
 {
     static char name[] = "glint bench --variant";
-    const char *text = options->variant_texts[index];
+    const char *text = options->variant_texts.items[index];
     VariantOptions *variant = &options->variant_options[index];
     *variant = options->variants;
     variant->name = text;
@@ -130,10 +111,10 @@ static bool variant_read(BenchOptions *options, size_t index)
 // Reads the variants, which start from the options of all rows.
 static bool variants_read(BenchOptions *options)
 {
-    for (size_t i = 0; i < options->variant_count; i++) {
+    for (size_t i = 0; i < options->variant_texts.count; i++) {
         for (size_t k = 0; k < i; k++)
-            if (strcmp(options->variant_texts[i], options->variant_texts[k]) == 0) {
-                fprintf(stderr, "glint: --variant \"%s\" is given twice\n", options->variant_texts[i]);
+            if (strcmp(options->variant_texts.items[i], options->variant_texts.items[k]) == 0) {
+                fprintf(stderr, "glint: --variant \"%s\" is given twice\n", options->variant_texts.items[i]);
                 return false;
             }
         if (!variant_read(options, i)) return false;
@@ -141,16 +122,14 @@ static bool variants_read(BenchOptions *options)
     return true;
 }
 
-static bool options_check(void *bench_options)
+static const char *options_check(void *bench_options)
 {
     BenchOptions *options = bench_options;
-    if (options->against && options->baseline)
-        return option_usage_fault("bench", "--against cannot be combined with --compare");
+    if (options->against && options->baseline) return "--against cannot be combined with --compare";
     for (size_t i = 0; options->against && i < options->scenes.count; i++)
         if (strcmp(options->scenes.items[i], "-") == 0)
-            return option_usage_fault("bench",
-                                      "--against reads each scene several times, so it cannot be '-'");
-    return variants_read(options) && report_options_check(&options->report, &bench_table);
+            return "--against reads each scene several times, so it cannot be '-'";
+    return variants_read(options) ? NULL : "";
 }
 
 static const CommandLine command_line = {
@@ -159,11 +138,8 @@ static const CommandLine command_line = {
         "usage: glint bench SCENE... [OPTIONS]\n\n"
         "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 "
         "same or faster,\n3 slower, 4 too noisy to decide.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precisions_option, BenchOptions, variants),
-               VARIANT_GROUPS(BenchOptions, variants),
-               OPTIONS_WITHIN(driver_options, BenchOptions, variants.common),
-               OPTIONS_WITHIN(keep_kernels_option, BenchOptions, variants.common),
-               OPTIONS_WITHIN(report_options, BenchOptions, report)},
+    .groups = {OPTIONS(options_own), OPTIONS(precisions_option), VARIANT_OPTIONS, OPTIONS(driver_options),
+               OPTIONS(keep_kernels_option), REPORT_OPTIONS},
     OPERANDS(SCENES, BenchOptions, scenes),
     .check = options_check};
 
@@ -223,9 +199,9 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         .lists_launches = options->launches,
         .comparisons = comparisons,
     };
-    if (report_has_text(&options->report)) bench_print_text(&report, stdout);
-    const bool is_written = options->report.format == FORMAT_TEXT ||
-                            report_write(bench_json(&report), &bench_table, &options->report);
+    const ReportOptions *format = &options->variants.common.report;
+    if (report_has_text(format)) bench_print_text(&report, stdout);
+    const bool is_written = format->format == FORMAT_TEXT || report_write(bench_json(&report), format);
     int status = is_written ? EXIT_DONE : EXIT_USER;
     if (!variant_set_any_measured(set)) {
         fputs("glint bench: no row could be measured\n", stderr);
@@ -254,7 +230,7 @@ static int bench_run(Bench *bench, const Baseline *baseline)
     if (bench->options.is_worker) return bench_work(&bench->set, compute);
     const VariantOptions *options = &bench->options.variants;
     Progress progress;
-    progress_open(&progress, !report_has_text(&bench->options.report));
+    progress_open(&progress, !report_has_text(&bench->options.variants.common.report));
     bool whole = variant_set_measure(&bench->set, options, compute, true, &progress);
     progress_close(&progress);
     if (!whole) {
@@ -272,7 +248,7 @@ static int against_run(Bench *bench, int argument_count, char **arguments)
         .other = options->against,
         .tolerance = options->tolerance > 0 ? options->tolerance : against_tolerance,
         .seconds = seconds > 0 ? seconds : against_seconds * (double)bench->set.count,
-        .report = options->report,
+        .report = options->variants.common.report,
         .argument_count = argument_count,
         .arguments = arguments,
     };
@@ -311,16 +287,17 @@ int command_bench(int argument_count, char **arguments)
 {
     Bench bench = {.options = {.variants = variant_options_default}};
     const BenchOptions *options = &bench.options;
+    bench.options.variants.common.report.table = &bench_table;
     int status = command_line_read(&command_line, &bench.options, argument_count, arguments);
     if (status == OPTIONS_READ) {
-        const size_t count = options->variant_count;
+        const size_t count = options->variant_texts.count;
         const VariantOptions *choices = count > 0 ? options->variant_options : &options->variants;
         const bool is_open = variant_set_open(&bench.set, choices, count > 0 ? count : 1,
                                               options->scenes.items, options->scenes.count);
         status = is_open ? scenes_bench(&bench, argument_count, arguments) : EXIT_USER;
         variant_set_close(&bench.set);
     }
-    for (size_t i = 0; i < options->variant_count; i++)
+    for (size_t i = 0; i < options->variant_texts.count; i++)
         free(options->variant_words[i]);
     return status;
 }

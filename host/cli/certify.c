@@ -42,22 +42,11 @@ typedef struct {
     CommonOptions common;
     const char *scene;
     uint32_t pixels;
-    unsigned precisions; // a set, empty if not given
-    ReportOptions report;
 } CertifyOptions;
 
-static const Option options_own[] = {
-    {"size", "WxH", "image size (default: as glint render)", option_size,
-     offsetof(CertifyOptions, common.size)},
-    {"pixels", "N", "compare about N pixels (default: 2000)", option_count, offsetof(CertifyOptions, pixels),
-     NUMBERS(1, PIXELS_MOST)},
-    {"precision", "LIST", "any of single, strict, double, certified (default: all that fit)", option_set,
-     offsetof(CertifyOptions, precisions), NAMES(precision_names)}};
-
-static bool options_check(void *certify_options)
-{
-    return report_options_check(&((CertifyOptions *)certify_options)->report, &certify_table);
-}
+static const Option options_own[] = {{"pixels", "N", "compare about N pixels (default: 2000)", option_count,
+                                      offsetof(CertifyOptions, pixels), NUMBERS(1, PIXELS_MOST)},
+                                     PRECISIONS_OPTION("all that fit")};
 
 static const CommandLine command_line = {
     .command = "certify",
@@ -67,12 +56,9 @@ static const CommandLine command_line = {
         "pixels: "
         "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not "
         "list as uncertified.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(ray_options, CertifyOptions, common),
-               SCENE_GROUPS(CertifyOptions, common), OPTIONS_WITHIN(reference_option, CertifyOptions, common),
-               OPTIONS_WITHIN(perturb_option, CertifyOptions, common),
-               OPTIONS_WITHIN(report_options, CertifyOptions, report)},
-    OPERANDS(SCENE, CertifyOptions, scene),
-    .check = options_check};
+    .groups = {OPTIONS(options_own), OPTIONS(size_option), OPTIONS(ray_options), SCENE_OPTIONS,
+               OPTIONS(reference_option), OPTIONS(perturb_option), REPORT_OPTIONS},
+    OPERANDS(SCENE, CertifyOptions, scene)};
 
 typedef struct {
     const CertifyOptions *options;
@@ -217,7 +203,7 @@ static int precision_compare(Certification *certification, RenderSettings settin
     MessageList messages = {0};
     Renderer *renderer = renderer_open(certification->compute, certification->scene, &settings, &messages);
     const bool is_unfit = !renderer && messages.count > 0;
-    if (is_unfit && !certification->options->precisions) {
+    if (is_unfit && !certification->options->common.precisions) {
         certification->rows[precision].failure = memory_copy_text(messages.items[0].text);
         message_list_free(&messages);
         return EXIT_DONE;
@@ -279,7 +265,8 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
         return EXIT_USER;
     }
     Compute *compute = &open->compute;
-    const bool is_certified = !options->precisions || options->precisions >> PRECISION_CERTIFIED & 1;
+    const bool is_certified =
+        !options->common.precisions || options->common.precisions >> PRECISION_CERTIFIED & 1;
     const char *selector = options->common.reference_device;
     if (is_certified && !reference_open(compute, &open->devices, selector) && selector) return EXIT_USER;
     Certification certification = {.options = options, .scene = scene, .compute = compute};
@@ -291,12 +278,12 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     certification.reference_seconds = clock_seconds() - start;
     int status = EXIT_DONE;
     for (unsigned i = 0; i < PRECISION_COUNT && status == EXIT_DONE; i++) {
-        if (!options->precisions || options->precisions >> i & 1)
+        if (!options->common.precisions || options->common.precisions >> i & 1)
             status = precision_compare(&certification, settings, (Precision)i);
     }
-    if (status == EXIT_DONE && report_has_text(&options->report)) text_print(&certification);
-    if (status == EXIT_DONE && options->report.format != FORMAT_TEXT &&
-        !report_write(certify_json(&certification), &certify_table, &options->report))
+    if (status == EXIT_DONE && report_has_text(&options->common.report)) text_print(&certification);
+    if (status == EXIT_DONE && options->common.report.format != FORMAT_TEXT &&
+        !report_write(certify_json(&certification), &options->common.report))
         status = EXIT_USER;
     if (status == EXIT_DONE) status = decided_check(&certification.rows[PRECISION_CERTIFIED].errors);
     for (unsigned i = 0; i < PRECISION_COUNT; i++)
@@ -307,7 +294,9 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
 
 int command_certify(int argument_count, char **arguments)
 {
-    CertifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT, .pixels = PIXELS_DEFAULT};
+    CertifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT,
+                              .common.report.table = &certify_table,
+                              .pixels = PIXELS_DEFAULT};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     Scene scene = {0};

@@ -29,14 +29,13 @@ static const Option options_own[] = {
      offsetof(CheckOptions, object), NUMBERS(0, UINT32_MAX - 1)},
     {"json", NULL, "print JSON", option_flag, offsetof(CheckOptions, as_json)}};
 
-static bool options_check(void *check_options)
+static const char *options_check(void *check_options)
 {
     const CheckOptions *options = check_options;
-    if (options->as_json && options->object != UINT32_MAX)
-        return option_usage_fault("check", "--object cannot be combined with --json");
+    if (options->as_json && options->object != UINT32_MAX) return "--object cannot be combined with --json";
     if (options->scenes.count > 1 && (options->as_json || options->object != UINT32_MAX))
-        return option_usage_fault("check", "--json and --object take one scene, but several are given");
-    return true;
+        return "--json and --object take one scene, but several are given";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -44,8 +43,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
              "ignored. For several scenes it prints one line each.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(set_options, CheckOptions, common),
-               OPTION_WITHIN(common_options[COMMON_LENIENT], CheckOptions, common)},
+    .groups = {OPTIONS(options_own), OPTIONS(set_options), OPTION(common_options[COMMON_LENIENT])},
     OPERANDS(SCENES, CheckOptions, scenes),
     .check = options_check};
 

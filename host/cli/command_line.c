@@ -50,6 +50,17 @@ bool option_text(const Option *option, const char *value, void *options)
     return true;
 }
 
+bool option_texts(const Option *option, const char *value, void *options)
+{
+    OptionTexts *texts = option_field(option, options);
+    if (texts->count == OPTION_TEXTS_MAX) {
+        fprintf(stderr, "glint: --%s: may be given at most %d times\n", option->name, OPTION_TEXTS_MAX);
+        return false;
+    }
+    texts->items[texts->count++] = value;
+    return true;
+}
+
 bool digits_read(const char *value, const char **end, uint64_t *result)
 {
     *result = 0;
@@ -135,17 +146,11 @@ static size_t name_find(const Option *option, const char *name)
     return i;
 }
 
-bool choice_read(const Option *option, const char *value, unsigned *index)
-{
-    *index = (unsigned)name_find(option, value);
-    return *index < option->name_count || names_fault(option, value, "");
-}
-
 bool option_choice(const Option *option, const char *value, void *options)
 {
-    unsigned index;
-    if (!choice_read(option, value, &index)) return false;
-    *(unsigned *)option_field(option, options) = index;
+    const size_t index = value ? name_find(option, value) : 0;
+    if (index == option->name_count) return names_fault(option, value, "");
+    *(unsigned *)option_field(option, options) = option->values ? option->values[index] : (unsigned)index;
     return true;
 }
 
@@ -298,21 +303,33 @@ static bool operands_read(const CommandLine *line, void *options, CommandOperand
     return true;
 }
 
+bool option_usage_fault(const char *command, const char *what)
+{
+    fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
+    return false;
+}
+
+// Returns whether the checks of the command and of its groups find nothing wrong.
+static bool checks_pass(const CommandLine *line, void *options)
+{
+    const char *what = line->check ? line->check(options) : NULL;
+    for (const OptionGroup *group = line->groups; group->items && !what; group++)
+        what = group->check ? group->check(options) : NULL;
+    if (what && *what) option_usage_fault(line->command, what);
+    return !what;
+}
+
 int command_line_read(const CommandLine *line, void *options, int argument_count, char **arguments)
 {
-    struct {
-        const Option *option;
-        void *fields;
-        bool is_given;
-    } listed[OPTIONS_MAX + 1] = {0}; // cppcheck does not see that fault never returns
+    const Option *listed[OPTIONS_MAX + 1] = {0}; // cppcheck does not see that fault never returns
+    bool are_given[OPTIONS_MAX + 1] = {0};
     struct option long_options[OPTIONS_MAX + 2] = {0};
     char letters[2 * OPTIONS_MAX + 2] = "", *letter = letters;
     size_t count = 0;
     for (const OptionGroup *group = line->groups; group->items; group++)
         for (size_t i = 0; i < group->count; i++, count++) {
             if (count == OPTIONS_MAX) fault("a command with more than %d options", OPTIONS_MAX);
-            const Option *option = listed[count].option = &group->items[i];
-            listed[count].fields = (char *)options + group->offset;
+            const Option *option = listed[count] = &group->items[i];
             const int has_argument = !option->argument          ? no_argument
                                      : *option->argument == '[' ? optional_argument
                                                                 : required_argument;
@@ -333,19 +350,14 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
         while (long_options[i].val != code)
             i++;
         assert(i < count); // getopt_long returns the listed codes
-        if (!listed[i].option->read(listed[i].option, optarg, listed[i].fields)) return EXIT_USER;
-        listed[i].is_given = true;
+        if (!listed[i]->read(listed[i], optarg, options)) return EXIT_USER;
+        if (listed[i]->given) *(bool *)((char *)options + listed[i]->given) = true;
+        are_given[i] = true;
     }
     const CommandOperands operands = {arguments + optind, (size_t)(argument_count - optind)};
-    bool is_accepted = operands_read(line, options, operands) && (!line->check || line->check(options));
-    for (size_t i = 0; i < count && is_accepted; i++)
-        if (listed[i].is_given && listed[i].option->effect)
-            is_accepted = listed[i].option->effect(listed[i].option, listed[i].fields);
+    bool is_accepted = operands_read(line, options, operands) && checks_pass(line, options);
+    for (size_t i = 0; i < count; i++)
+        if (are_given[i] && listed[i]->effect)
+            is_accepted = is_accepted && listed[i]->effect(listed[i], options);
     return is_accepted ? OPTIONS_READ : EXIT_USER;
-}
-
-bool option_usage_fault(const char *command, const char *what)
-{
-    fprintf(stderr, "glint %s: %s; see glint %s --help\n", command, what, command);
-    return false;
 }

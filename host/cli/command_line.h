@@ -15,17 +15,23 @@ typedef bool OptionReader(const Option *option, const char *value, void *options
 // with a message if that fails.
 typedef bool OptionEffect(const Option *option, void *options);
 
+// Checks options together. Returns what is wrong, which is printed as a usage error, "" if that was printed,
+// or NULL.
+typedef const char *OptionCheck(void *options);
+
 struct Option {
     const char *name;
     const char *argument; // as the help names it, [=STYLE] if it is optional; NULL for a flag
     const char *help;     // wrapped where it is printed; a line break starts an item of a list
     OptionReader *read;
-    size_t offset;        // of the field, within the struct that the reader and the effect get
+    size_t offset;        // of the field in the command's struct
+    size_t given;         // the offset of a bool that becomes true if the option is given, or 0
     OptionEffect *effect; // of an option that is given, once its command line was accepted; may be NULL
     // What the reader accepts, if it has a range or names. NUMBERS_ABOVE excludes `low`.
     double low, high;
     bool is_above;
     const char *const *names;
+    const unsigned *values; // what option_choice stores for each name, or NULL for its index
     size_t name_count;
     char letter; // of the short form, or '\0'
 };
@@ -34,25 +40,20 @@ struct Option {
 #define NUMBERS_ABOVE(bound, most) NUMBERS(bound, most), .is_above = true
 #define NAMES(array)               .names = (array), .name_count = COUNT_OF(array)
 
-// A table of options and the place, in the command's struct, of the struct with their fields.
 typedef struct {
     const Option *items;
-    size_t count, offset;
+    size_t count;
     const char *heading; // printed above them, or NULL
+    OptionCheck *check;  // of these options, after the command's check; may be NULL
 } OptionGroup;
 
 #define OPTIONS(array)                                                                                       \
     {                                                                                                        \
-        (array), COUNT_OF(array), 0, NULL                                                                    \
+        .items = (array), .count = COUNT_OF(array)                                                           \
     }
-#define OPTIONS_WITHIN(array, Type, member)                                                                  \
+#define OPTION(option)                                                                                       \
     {                                                                                                        \
-        (array), COUNT_OF(array), offsetof(Type, member), NULL                                               \
-    }
-
-#define OPTION_WITHIN(option, Type, member)                                                                  \
-    {                                                                                                        \
-        &(option), 1, offsetof(Type, member), NULL                                                           \
+        .items = &(option), .count = 1                                                                       \
     }
 
 #define OPERANDS(rule, Type, member) .operands = OPERANDS_##rule, .operands_offset = offsetof(Type, member)
@@ -68,8 +69,8 @@ typedef struct {
 typedef enum {
     OPERANDS_NONE,   // none, the default
     OPERANDS_SCENE,  // one, in a const char *
-    OPERANDS_SCENES, // at least one, in an CommandOperands
-    OPERANDS_ANY     // any number, in an CommandOperands
+    OPERANDS_SCENES, // at least one, in CommandOperands
+    OPERANDS_ANY     // any number, in CommandOperands
 } OperandRule;
 
 typedef struct {
@@ -79,8 +80,7 @@ typedef struct {
     OptionGroup groups[OPTION_GROUPS_MAX + 1]; // up to the first without items
     OperandRule operands;
     size_t operands_offset; // of their field in the command's struct
-    // Checks options and operands together. Returns false with a message if they do not fit. May be NULL.
-    bool (*check)(void *options);
+    OptionCheck *check;     // of all options and operands; may be NULL
 } CommandLine;
 
 // The result of reading a command line if the command must run. Any other result is the exit status.
@@ -94,20 +94,24 @@ int command_line_read(const CommandLine *line, void *options, int argument_count
 // Readers. The types are those of their fields.
 OptionReader option_flag;       // bool: set
 OptionReader option_text;       // const char *
+OptionReader option_texts;      // OptionTexts: each use of the option adds a text
 OptionReader option_count;      // uint32_t: an integer from `low` to `high`
 OptionReader option_number;     // double, from `low` to `high`
 OptionReader option_size;       // uint32_t[2]: WxH pixels
 OptionReader option_work_group; // uint32_t[2]: WxH work-items
-OptionReader option_choice;     // an enum: the index of the name
+OptionReader option_choice;     // an enum or uint32_t; the first name if an optional value is missing
 OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
+
+enum { OPTION_TEXTS_MAX = 64 };
+typedef struct {
+    const char *items[OPTION_TEXTS_MAX];
+    size_t count;
+} OptionTexts;
 
 // Effects that create the folder that the option's value names, unless it exists. It must be writable.
 OptionEffect effect_folder;
 OptionEffect effect_empty_folder; // which must also be empty
 
-// Reads the index of a name, as option_choice does, for readers that store it elsewhere. On a mistake prints
-// the names and returns false.
-bool choice_read(const Option *option, const char *value, unsigned *index);
 // Returns the field of the option.
 void *option_field(const Option *option, void *options);
 // An array that receives the values of an option.

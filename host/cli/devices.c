@@ -26,7 +26,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint devices [OPTIONS]\n\n"
              "Lists every OpenCL device of every platform; * marks the default. Then prints\n"
              "what the arithmetic of each device really does, if that was measured.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(keep_kernels_option, DevicesOptions, common)}};
+    .groups = {OPTIONS(options_own), OPTIONS(keep_kernels_option)}};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {

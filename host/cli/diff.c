@@ -25,10 +25,9 @@ static const struct {
 };
 
 typedef struct {
-    uint32_t max_pixels;
+    CommonOptions common;
     CommandOperands images;
     const char *reference_path, *test_path, *heatmap_path, *layer;
-    ReportOptions report;
     double limits[LIMIT_COUNT]; // below 0 if not given
 } DiffOptions;
 
@@ -66,15 +65,15 @@ static const ResultTable diff_table = {
     .failed = "false",
 };
 
-static bool options_check(void *diff_options)
+static const char *options_check(void *diff_options)
 {
     DiffOptions *options = diff_options;
-    if (options->images.count != 2) return option_usage_fault("diff", "takes two images");
+    if (options->images.count != 2) return "takes two images";
     options->reference_path = options->images.items[0];
     options->test_path = options->images.items[1];
     if (options->heatmap_path && image_format_of(options->heatmap_path) == IMAGE_UNKNOWN)
-        return option_usage_fault("diff", "the heat map's name must end in .png, .ppm, .exr or .npy");
-    return report_options_check(&options->report, &diff_table);
+        return "the heat map's name must end in .png, .ppm, .exr or .npy";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -82,8 +81,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
              "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
              "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(max_pixels_option, DiffOptions, max_pixels),
-               OPTIONS_WITHIN(report_options, DiffOptions, report)},
+    .groups = {OPTIONS(options_own), OPTIONS(max_pixels_option), REPORT_OPTIONS},
     OPERANDS(ANY, DiffOptions, images),
     .check = options_check};
 
@@ -324,7 +322,7 @@ static bool heatmap_make(const DiffOptions *options, const ComparedImages *compa
 static bool side_read(Image *image, const DiffOptions *options, const char *path, MessageList *messages)
 {
     const bool has_layers = image_format_of(path) == IMAGE_EXR;
-    const ImageReadOptions reading = {has_layers ? options->layer : NULL, options->max_pixels};
+    const ImageReadOptions reading = {has_layers ? options->layer : NULL, options->common.max_pixels};
     return image_read(image, path, &reading, messages);
 }
 
@@ -345,7 +343,7 @@ static bool images_compare(const DiffOptions *options, ComparedImages *compariso
 
 int command_diff(int argument_count, char **arguments)
 {
-    DiffOptions options = {.limits = {-1, -1, -1, -1}};
+    DiffOptions options = {.common.report.table = &diff_table, .limits = {-1, -1, -1, -1}};
     const int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
 
@@ -353,9 +351,9 @@ int command_diff(int argument_count, char **arguments)
     MessageList messages = {0};
     bool compared = images_compare(&options, &comparison, &messages);
     messages_print(&messages, NULL);
-    if (compared && report_has_text(&options.report)) text_print(&options, &comparison);
-    const bool is_written = !compared || options.report.format == FORMAT_TEXT ||
-                            report_write(diff_json(&options, &comparison), &diff_table, &options.report);
+    if (compared && report_has_text(&options.common.report)) text_print(&options, &comparison);
+    const bool is_written = !compared || options.common.report.format == FORMAT_TEXT ||
+                            report_write(diff_json(&options, &comparison), &options.common.report);
     image_free(&comparison.reference);
     image_free(&comparison.test);
     if (!compared || !is_written) return EXIT_USER;

@@ -4,6 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/output.h"
 #include "host/base/text.h"
+#include "host/cli/options.h"
 #include <inttypes.h>
 #include <jansson.h>
 #include <stdlib.h>
@@ -16,7 +17,7 @@ static const char *const format_names[FORMAT_COUNT] = {"text",     "json",  "csv
 static bool json_choose(const Option *option, const char *value, void *options)
 {
     (void)option, (void)value;
-    ((ReportOptions *)options)->format = FORMAT_JSON;
+    ((CommonOptions *)options)->report.format = FORMAT_JSON;
     return true;
 }
 
@@ -36,9 +37,10 @@ const Option report_options[] = {{"format", "F",
                                   "text, json, csv, markdown, junit or benchmark (default: text, with "
                                   "--output by the file's ending: .json "
                                   ".csv .md .xml)",
-                                  option_choice, offsetof(ReportOptions, format), NAMES(format_names)},
+                                  option_choice, offsetof(CommonOptions, report.format), NAMES(format_names)},
                                  {"output", "FILE", "write the report to a file and print the text",
-                                  option_text, offsetof(ReportOptions, output), .effect = report_file_open},
+                                  option_text, offsetof(CommonOptions, report.output),
+                                  .effect = report_file_open},
                                  {"json", NULL, "print JSON", json_choose, 0}};
 
 static ReportFormat format_of_ending(const char *path)
@@ -54,16 +56,16 @@ static ReportFormat format_of_ending(const char *path)
     return FORMAT_TEXT;
 }
 
-bool report_options_check(ReportOptions *options, const ResultTable *table)
+const char *report_options_check(void *common)
 {
+    ReportOptions *options = &((CommonOptions *)common)->report;
     if (options->output && options->format == FORMAT_TEXT)
         options->format = format_of_ending(options->output);
-    const char *what = options->output && options->format == FORMAT_TEXT
-                           ? "--output: the file's ending gives no format; use --format"
-                       : options->format == FORMAT_BENCHMARK && !table->times
-                           ? "--format benchmark is for times, which bench and accuracy measure"
-                           : NULL;
-    return !what || option_usage_fault(table->command, what);
+    if (options->output && options->format == FORMAT_TEXT)
+        return "--output: the file's ending gives no format; use --format";
+    if (options->format == FORMAT_BENCHMARK && !options->table->times)
+        return "--format benchmark is for times, which bench and accuracy measure";
+    return NULL;
 }
 
 // A row with the objects that its columns may come from.
@@ -382,13 +384,13 @@ static void document_write(Writing *writing, ReportFormat format, Text *text)
     text_append(text, writing->body.items, writing->body.count);
 }
 
-bool report_write(Json *json, const ResultTable *table, const ReportOptions *options)
+bool report_write(Json *json, const ReportOptions *options)
 {
     Text document = json_close(json), text = {0};
     if (options->format == FORMAT_JSON) {
         text = document;
     } else {
-        Writing writing = {.table = table,
+        Writing writing = {.table = options->table,
                            .document = json_loadb(text_c(&document), document.count, JSON_ALLOW_NUL, NULL)};
         if (!writing.document) fault("JSON: a report cannot be read back");
         document_write(&writing, options->format, &text);

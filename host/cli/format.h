@@ -3,7 +3,7 @@
 #pragma once
 
 #include "host/base/json.h"
-#include "host/cli/options.h"
+#include "host/cli/command_line.h"
 
 typedef enum {
     FORMAT_TEXT,
@@ -14,13 +14,6 @@ typedef enum {
     FORMAT_BENCHMARK, // google/benchmark's JSON
     FORMAT_COUNT
 } ReportFormat;
-
-typedef struct {
-    ReportFormat format;
-    // The file that receives the report while stdout receives the text. NULL prints the report instead of the
-    // text.
-    const char *output;
-} ReportOptions;
 
 // A column of a row's values. `path` names its member, with dots between members, such as "frame_ms.median".
 // It is looked up in the row, then in the object whose array has the row, then in the document.
@@ -48,13 +41,25 @@ typedef struct {
     const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL
 } ResultTable;
 
-// The options of ReportOptions, whose group must follow those of options that create folders, since the file
-// may be in one.
-extern const Option report_options[3];
+typedef struct {
+    const ResultTable *table; // describes the command's results
+    ReportFormat format;
+    // The file that receives the report while stdout receives the text. NULL prints the report instead of the
+    // text.
+    const char *output;
+} ReportOptions;
 
-// Checks the options together, and chooses the format by the file's ending if no other is given. Returns
-// false with a message if the command has no times or if the file's format is unknown.
-bool report_options_check(ReportOptions *options, const ResultTable *table);
+extern const Option report_options[3];
+// Chooses the format by the file's ending if no other is given. Finds an ending that gives none, and a format
+// for times if the command has no times.
+OptionCheck report_options_check;
+// The group of the options of CommonOptions.report, which must follow those of options that create folders,
+// since the file may be in one.
+#define REPORT_OPTIONS                                                                                       \
+    {                                                                                                        \
+        .items = report_options, .count = COUNT_OF(report_options), .check = report_options_check            \
+    }
+
 // Returns whether the command prints its text.
 static inline bool report_has_text(const ReportOptions *options)
 {
@@ -62,4 +67,4 @@ static inline bool report_has_text(const ReportOptions *options)
 }
 // Writes the report in the options' format, which must not be FORMAT_TEXT, and frees it. Returns false with a
 // message if the file cannot be written.
-bool report_write(Json *json, const ResultTable *table, const ReportOptions *options);
+bool report_write(Json *json, const ReportOptions *options);

@@ -21,7 +21,6 @@ enum { BOUNCES_UNSET = BOUNCES_MAX + 1 };
 
 typedef struct {
     CommonOptions common;
-    ReportOptions report;
     const char *file;
     CommandOperands scenes; // at first with the verb before them
     uint32_t samples;       // 0 if not given
@@ -66,30 +65,27 @@ static const ResultTable golden_table = {
     .failed = "false",
 };
 
-static bool options_check(void *golden_options)
+static const char *options_check(void *golden_options)
 {
     GoldenOptions *options = golden_options;
     const char *verb = options->scenes.count > 0 ? options->scenes.items[0] : "";
     options->writes = strcmp(verb, "write") == 0;
-    if (!options->writes && strcmp(verb, "check") != 0)
-        return option_usage_fault("golden", "expected write or check");
+    if (!options->writes && strcmp(verb, "check") != 0) return "expected write or check";
     options->scenes.items++;
     options->scenes.count--;
-    if (options->writes && options->scenes.count == 0) return option_usage_fault("golden", "no scene given");
+    if (options->writes && options->scenes.count == 0) return "no scene given";
     for (size_t i = 0; i < options->scenes.count; i++)
-        if (strpbrk(options->scenes.items[i], "\r\n"))
-            return option_usage_fault("golden", "a scene's name has a line break");
+        if (strpbrk(options->scenes.items[i], "\r\n")) return "a scene's name has a line break";
     uint32_t *size = options->common.size, *bounces = &options->common.bounce_count;
     const bool has_any = size[0] > 0 || options->samples > 0 || *bounces != BOUNCES_UNSET;
     if (!options->writes && has_any)
-        return option_usage_fault(
-            "golden", "--size, --samples and --bounces are for write; check takes those of the lines");
+        return "--size, --samples and --bounces are for write; check takes those of the lines";
     if (size[0] == 0) memcpy(size, (const uint32_t[2]){320, 180}, sizeof options->common.size);
     if (options->samples == 0) options->samples = 1;
     if (*bounces == BOUNCES_UNSET) *bounces = BOUNCES_DEFAULT;
-    if (options->writes && (options->report.format != FORMAT_TEXT || options->report.output))
-        return option_usage_fault("golden", "--format, --json and --output are for check");
-    return options->writes || report_options_check(&options->report, &golden_table);
+    if (options->writes && (options->common.report.format != FORMAT_TEXT || options->common.report.output))
+        return "--format, --json and --output are for check";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -101,12 +97,8 @@ static const CommandLine command_line = {
              "scenes with their lines, by default all scenes of the file. If an image differs, names the "
              "layer that differs first and\n"
              "the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
-    .groups = {OPTIONS(options_own), OPTION_WITHIN(ray_options[RAY_BOUNCES], GoldenOptions, common),
-               OPTIONS_WITHIN(device_option, GoldenOptions, common),
-               OPTIONS_WITHIN(common_options, GoldenOptions, common),
-               OPTIONS_WITHIN(max_pixels_option, GoldenOptions, common.max_pixels),
-               OPTIONS_WITHIN(driver_options, GoldenOptions, common),
-               OPTIONS_WITHIN(report_options, GoldenOptions, report)},
+    .groups = {OPTIONS(options_own), OPTION(ray_options[RAY_BOUNCES]), OPTIONS(device_option),
+               OPTIONS(common_options), OPTIONS(max_pixels_option), OPTIONS(driver_options), REPORT_OPTIONS},
     OPERANDS(ANY, GoldenOptions, scenes),
     .check = options_check};
 
@@ -325,10 +317,10 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
         checks[i].scene = options->scenes.count > 0 ? options->scenes.items[i] : file->items[i].scene;
         status = scene_check(&checks[i], file, options, compute);
         differing += checks[i].is_new || checks[i].first < HASHED_COUNT;
-        if (status == EXIT_DONE && report_has_text(&options->report)) check_print(&checks[i]);
+        if (status == EXIT_DONE && report_has_text(&options->common.report)) check_print(&checks[i]);
     }
-    if (status == EXIT_DONE && options->report.format != FORMAT_TEXT &&
-        !report_write(checks_json(compute->device, checks, checked), &golden_table, &options->report))
+    if (status == EXIT_DONE && options->common.report.format != FORMAT_TEXT &&
+        !report_write(checks_json(compute->device, checks, checked), &options->common.report))
         status = EXIT_USER;
     for (size_t i = 0; i < checked; i++)
         free(checks[i].crop);
@@ -338,8 +330,10 @@ static int scenes_check(const GoldenFile *file, const GoldenOptions *options, Co
 
 int command_golden(int argument_count, char **arguments)
 {
-    GoldenOptions options = {
-        .common.precision = PRECISION_STRICT, .common.bounce_count = BOUNCES_UNSET, .file = "golden.txt"};
+    GoldenOptions options = {.common = {.precision = PRECISION_STRICT,
+                                        .bounce_count = BOUNCES_UNSET,
+                                        .report.table = &golden_table},
+                             .file = "golden.txt"};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
     GoldenFile file = {0};

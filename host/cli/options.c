@@ -14,38 +14,6 @@
 const char *const lanes_choice_names[LANES_CHOICE_COUNT] = {"1", "4", "8", "16"};
 const uint32_t lanes_choice_values[LANES_CHOICE_COUNT] = {1, 4, 8, 16};
 
-bool option_error_budget(const Option *option, const char *value, void *options)
-{
-    char *end;
-    ErrorBudget *budget = option_field(option, options);
-    *budget = (ErrorBudget){.limit = strtod(value, &end), .metric = ERROR_RMSE};
-    if (end == value || !(budget->limit > 0 && isfinite(budget->limit)) || (*end != ':' && *end != '\0'))
-        return option_fault(option, value, "a number above 0, perhaps with a metric, such as 0.01:flip");
-    const Option metric = {option->name, NAMES(error_metric_names)};
-    unsigned index = ERROR_RMSE;
-    if (*end == ':' && !choice_read(&metric, end + 1, &index)) return false;
-    budget->metric = (ErrorMetric)index;
-    return true;
-}
-
-bool option_precision(const Option *option, const char *value, void *options)
-{
-    CommonOptions *common = options;
-    unsigned index;
-    if (!choice_read(option, value, &index)) return false;
-    common->precision = (Precision)index;
-    common->has_precision = true;
-    return true;
-}
-
-static bool lanes_read(const Option *option, const char *value, void *options)
-{
-    uint32_t *lanes = &((CommonOptions *)options)->lanes;
-    if (!option_choice(option, value, options)) return false;
-    *lanes = lanes_choice_values[*lanes];
-    return true;
-}
-
 static bool perturb_read(const Option *option, const char *value, void *options)
 {
     CommonOptions *common = options;
@@ -62,17 +30,6 @@ static bool perturb_read(const Option *option, const char *value, void *options)
     return true;
 }
 
-static bool override_add(const Option *option, const char *value, void *options)
-{
-    CommonOptions *common = options;
-    if (common->override_count == OVERRIDES_MAX) {
-        fprintf(stderr, "glint: --%s: may be given at most %d times\n", option->name, OVERRIDES_MAX);
-        return false;
-    }
-    common->overrides[common->override_count++] = value;
-    return true;
-}
-
 static bool camera_read(const Option *option, const char *value, void *options)
 {
     if (strcmp(value, "-") == 0) return option_fault(option, value, "the name of a file");
@@ -81,6 +38,9 @@ static bool camera_read(const Option *option, const char *value, void *options)
 
 #define FIELD(member) offsetof(CommonOptions, member)
 
+const Option size_option[] = {{"size", "WxH",
+                               "width and height in pixels (default: the scene's own, else 1280 wide)",
+                               option_size, FIELD(size)}};
 const Option device_option[] = {
     {"device", "D",
      "the device: its index, part of its name, its place on the PCI bus, cpu or gpu (default: "
@@ -96,12 +56,12 @@ const Option reference_option[] = {
      "the device that renders references and the pixels that certified re-renders (default: "
      "the device itself, else one with fp64)",
      option_text, FIELD(reference_device)}};
-const Option precision_option[] = {{"precision", "P", "single, strict, double or certified (default: single)",
-                                    option_precision, 0, NAMES(precision_names)}};
+const Option precision_option[] = {
+    PRECISION_OPTION("single, strict, double or certified (default: single)", PRECISION_COUNT)};
 const Option common_options[] = {
     [COMMON_LANES] = {"lanes", "N",
-                      "rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)", lanes_read,
-                      FIELD(lanes), NAMES(lanes_choice_names)},
+                      "rays per work-item: 1, 4, 8 or 16 (default and CPU maximum: vector width)",
+                      option_choice, FIELD(lanes), NAMES(lanes_choice_names), .values = lanes_choice_values},
     [COMMON_BVH] = {"bvh", "B",
                     "whether to use a BVH, which does not change the image: auto, on or off (default: auto)",
                     option_choice, FIELD(bvh), NAMES(bvh_choice_names)},
@@ -109,16 +69,16 @@ const Option common_options[] = {
     [COMMON_LENIENT] = {"lenient", NULL, "read dialects of .rt files", option_flag, FIELD(lenient)}};
 const Option max_pixels_option[] = {{"max-pixels", "N",
                                      "refuse input images with more pixels (default: 134217728)",
-                                     option_count, 0, NUMBERS(1, UINT32_MAX)}};
+                                     option_count, FIELD(max_pixels), NUMBERS(1, UINT32_MAX)}};
 const Option ray_options[] = {
     [RAY_BOUNCES] = {"bounces", "N", "reflections and refractions of a ray, up to 255 (default: 5)",
                      option_count, FIELD(bounce_count), NUMBERS(0, BOUNCES_MAX)},
     [RAY_MIN_CONTRIBUTION] = {"min-contribution", "W",
                               "trace no bounced ray whose weight in its pixel is below W (default: 0)",
                               option_number, FIELD(min_contribution), NUMBERS(0, 1)}};
-const Option set_options[] = {
-    {"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable", override_add, 0},
-    {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(camera)}};
+const Option set_options[] = {{"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable",
+                               option_texts, FIELD(overrides)},
+                              {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(camera)}};
 const Option perturb_option[] = {{"perturb", "SEED[:SCALE]",
                                   "inject the rounding error that OpenCL permits, times SCALE (default: 1)",
                                   perturb_read, 0}};
@@ -152,9 +112,9 @@ void messages_print(MessageList *messages, const char *path)
 SceneOptions scene_options_of(const CommonOptions *common)
 {
     return (SceneOptions){.lenient = common->lenient,
-                          .overrides = common->overrides,
+                          .overrides = common->overrides.items,
                           .override_name = "--set",
-                          .override_count = common->override_count,
+                          .override_count = common->overrides.count,
                           .frame = common->frame,
                           .max_pixels = common->max_pixels,
                           .camera = common->camera,

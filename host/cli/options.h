@@ -1,9 +1,8 @@
 // The options that commands share; opens devices and loads scenes for all commands.
 #pragma once
 
-#include "host/cli/command_line.h"
+#include "host/cli/format.h"
 #include "host/import/load.h"
-#include "host/measure/error_budget.h"
 #include "host/opencl/compute.h"
 #include "host/render/renderer.h"
 #include "host/scene/scene.h"
@@ -11,14 +10,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { OVERRIDES_MAX = 64 };
-
-// The options that several commands share, of which each command offers some.
+// The options that several commands share, of which each command offers some. They come first in the struct
+// of every command that offers any.
 typedef struct {
     const char *device, *reference_device;
     Precision precision;
-    bool has_precision; // whether --precision is given
-    uint32_t lanes;     // 0 for the device's default
+    bool has_precision;  // whether --precision is given
+    unsigned precisions; // a set, in commands that measure several
+    uint32_t lanes;      // 0 for the device's default
     BvhChoice bvh;
     bool no_cache, lenient;
     uint32_t size[2]; // of the image, 0 if not given
@@ -30,16 +29,16 @@ typedef struct {
     const char *kernel_folder;            // NULL if not given
     const char *capture_folder;           // NULL if not given
     uint32_t max_pixels;                  // see max_pixels_option
-    const char *overrides[OVERRIDES_MAX]; // --set, in order
-    size_t override_count;
-    const char *camera; // the scene of --camera, NULL if not given
-    double frame;       // of an animated scene
-    Stage *stage;       // records what takes time; may be NULL
+    OptionTexts overrides;                // --set, in order
+    const char *camera;                   // the scene of --camera, NULL if not given
+    double frame;                         // of an animated scene
+    Stage *stage;                         // records what takes time; may be NULL
+    ReportOptions report;
 } CommonOptions;
 
-// Options that several commands share, one table for each set that they share. Their fields are in
-// CommonOptions.
-extern const Option device_option[1], devices_option[1], reference_option[1], precision_option[1];
+// One table for each set of options that several commands share.
+extern const Option size_option[1], device_option[1], devices_option[1], reference_option[1];
+extern const Option precision_option[1];
 enum { COMMON_LANES, COMMON_BVH, COMMON_NO_CACHE, COMMON_LENIENT, COMMON_COUNT };
 extern const Option common_options[COMMON_COUNT];
 enum { RAY_BOUNCES, RAY_MIN_CONTRIBUTION, RAY_COUNT };
@@ -48,15 +47,24 @@ extern const Option set_options[2];         // of scenes whose values can be set
 extern const Option perturb_option[1];      // of commands that render or trace
 extern const Option driver_options[2];      // of commands that measure drivers
 extern const Option keep_kernels_option[1]; // of commands that examine drivers
-extern const Option max_pixels_option[1];   // of commands that read images, in a uint32_t
-OptionReader option_precision;              // of CommonOptions
+extern const Option max_pixels_option[1];   // of commands that read images
 
-// The groups of every command that reads a scene and opens one device. `common` is the CommonOptions in the
-// command's struct.
-#define SCENE_GROUPS(Type, common)                                                                           \
-    OPTIONS_WITHIN(set_options, Type, common), OPTIONS_WITHIN(device_option, Type, common),                  \
-        OPTIONS_WITHIN(common_options, Type, common),                                                        \
-        OPTIONS_WITHIN(max_pixels_option, Type, common.max_pixels)
+// The groups of every command that reads a scene and opens one device.
+#define SCENE_OPTIONS                                                                                        \
+    OPTIONS(set_options), OPTIONS(device_option), OPTIONS(common_options), OPTIONS(max_pixels_option)
+
+// The option of the first `count` precisions, one of which is chosen.
+#define PRECISION_OPTION(help_text, count)                                                                   \
+    {                                                                                                        \
+        "precision", "P", help_text, option_choice, offsetof(CommonOptions, precision),                      \
+            .given = offsetof(CommonOptions, has_precision), .names = precision_names, .name_count = count   \
+    }
+// The option of a set of precisions, with the default that its help names.
+#define PRECISIONS_OPTION(default_names)                                                                     \
+    {                                                                                                        \
+        "precision", "LIST", "any of single, strict, double, certified (default: " default_names ")",        \
+            option_set, offsetof(CommonOptions, precisions), NAMES(precision_names)                          \
+    }
 
 enum { BOUNCES_DEFAULT = 5 };
 
@@ -66,9 +74,6 @@ extern const uint32_t lanes_choice_values[LANES_CHOICE_COUNT];
 
 // Returns true with a message if writing `path` would overwrite a file that the scene was read from.
 bool output_overwrites_scene(const char *path, const Scene *scene, const char *scene_path);
-
-// Reads E or E:METRIC into an ErrorBudget. The default metric is the RMSE.
-OptionReader option_error_budget;
 
 // Returns the options that scenes are read with. They refer to `common`.
 SceneOptions scene_options_of(const CommonOptions *common);

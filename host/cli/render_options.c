@@ -8,11 +8,11 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#define FIELD(member) offsetof(RenderOptions, member)
+
 static bool region_read(const Option *option, const char *value, void *options)
 {
-    RenderOptions *render = options;
-    uint32_t *region = render->region;
-    render->has_region = true;
+    uint32_t *region = option_field(option, options);
     const char *at = value;
     for (int i = 0; i < 4; i++) {
         uint64_t number;
@@ -62,31 +62,15 @@ FramePlace frame_place_of(const char *pattern)
     return (FramePlace){0};
 }
 
-static bool transfer_read(const Option *option, const char *value, void *options)
+static bool budget_read(const Option *option, const char *value, void *options)
 {
-    RenderOptions *render = options;
-    render->has_transfer = true;
-    return option_choice(option, value, options);
-}
-
-static bool bits_read(const Option *option, const char *value, void *options)
-{
-    static const uint32_t bits[] = {8, 16};
-    uint32_t *field = &((RenderOptions *)options)->output.bits;
-    if (!option_choice(option, value, options)) return false;
-    *field = bits[*field];
-    return true;
-}
-
-static bool format_read(const Option *option, const char *value, void *options)
-{
-    static const ImageFormat formats[] = {IMAGE_PNG, IMAGE_PPM, IMAGE_NPY};
-    RenderOptions *render = options;
-    unsigned choice;
-    if (!choice_read(option, value, &choice)) return false;
-    render->output.stdout_format = formats[choice];
-    render->has_format = true;
-    return true;
+    char *end;
+    ErrorBudget *budget = &((RenderOptions *)options)->budget;
+    *budget = (ErrorBudget){.limit = strtod(value, &end), .metric = ERROR_RMSE};
+    if (end == value || !(budget->limit > 0 && isfinite(budget->limit)) || (*end != ':' && *end != '\0'))
+        return option_fault(option, value, "a number above 0, perhaps with a metric, such as 0.01:flip");
+    static const Option metric = {"max-error", .offset = FIELD(budget.metric), NAMES(error_metric_names)};
+    return *end == '\0' || option_choice(&metric, end + 1, options);
 }
 
 static bool is_to_stdout(const ImageOutputOptions *output)
@@ -94,28 +78,21 @@ static bool is_to_stdout(const ImageOutputOptions *output)
     return output->path && image_output_is_stdout(output->path);
 }
 
-// Returns false with a message if options do not suit standard output, or if --format is given without it.
-static bool stdout_fits(const RenderOptions *options)
+static const char *stdout_check(const RenderOptions *options)
 {
     const bool is_stdout = is_to_stdout(&options->output);
-    if (is_stdout && !options->has_format)
-        option_usage_fault("render", "--output - needs --format png, ppm or npy");
-    else if (!is_stdout && options->has_format)
-        option_usage_fault("render", "--format is for --output -; a file's name determines its format");
-    else if (is_stdout && options->skips_existing)
-        option_usage_fault("render", "--skip-existing is for files, but --output is -");
-    else if (is_stdout && options->output.aovs)
-        option_usage_fault("render", "--aov writes several files, which --output - cannot hold");
-    else if (is_stdout && timing_uses_stdout(options->timing))
-        option_usage_fault("render",
-                           "--timing=json and =trace print to standard output, which --output - takes");
-    else
-        return true;
-    return false;
+    if (!is_stdout)
+        return options->has_format ? "--format is for --output -; a file's name determines its format" : NULL;
+    if (!options->has_format) return "--output - needs --format png, ppm or npy";
+    if (options->skips_existing) return "--skip-existing is for files, but --output is -";
+    if (options->output.aovs) return "--aov writes several files, which --output - cannot hold";
+    if (timing_uses_stdout(options->timing))
+        return "--timing=json and =trace print to standard output, which --output - takes";
+    return NULL;
 }
 
-// Returns false with a message if an option does not suit the image's format.
-static bool display_fits(const ImageOutputOptions *output)
+// Checks the options that depend on the image's format.
+static const char *display_check(const ImageOutputOptions *output)
 {
     const bool is_changed = output->exposure != 0 || output->tone != TONE_NONE || output->dither;
     const ImageFormat format = is_to_stdout(output) ? output->stdout_format
@@ -123,16 +100,12 @@ static bool display_fits(const ImageOutputOptions *output)
                                    ? IMAGE_PNG
                                    : image_format_of(output->path);
     if (is_changed && image_format_holds_floats(format))
-        option_usage_fault(
-            "render", "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values");
-    else if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
-        option_usage_fault("render",
-                           "--alpha is for PNG and EXR; other formats need --aov coverage,backdrop");
-    else if (output->dither && output->bits != 8)
-        option_usage_fault("render", "--dither is for 8 bits; it cannot be combined with --bits 16");
-    else
-        return true;
-    return false;
+        return "--exposure, --tone and --dither are for PNG and PPM; EXR and NPY hold linear values";
+    if (output->alpha && format != IMAGE_PNG && format != IMAGE_EXR)
+        return "--alpha is for PNG and EXR; other formats need --aov coverage,backdrop";
+    if (output->dither && output->bits != 8)
+        return "--dither is for 8 bits; it cannot be combined with --bits 16";
+    return NULL;
 }
 
 bool output_is_folder(const char *path)
@@ -141,36 +114,29 @@ bool output_is_folder(const char *path)
     return stat(path, &status) == 0 && S_ISDIR(status.st_mode);
 }
 
-// Returns false with a message if an option works only with a single image and there are several.
-static bool several_fit(const RenderOptions *options)
+// Checks the options of several images.
+static const char *several_check(const RenderOptions *options)
 {
     const char *const path = is_to_stdout(&options->output) ? NULL : options->output.path;
     const bool has_scenes = options->scenes.count > 1;
     const FramePlace place = path ? frame_place_of(path) : (FramePlace){0};
-    if (options->frame_count > 0 && has_scenes)
-        option_usage_fault("render", "--frames takes one scene, but several are given");
-    else if (options->checkpoint && has_scenes)
-        option_usage_fault("render", "--checkpoint takes one scene, but several are given");
-    else if (options->checkpoint && !options->skips_existing)
-        option_usage_fault("render",
-                           "--checkpoint of several frames needs --skip-existing, which keeps finished ones");
-    else if (options->checkpoint && !frame_place_of(options->checkpoint).start)
-        option_usage_fault(
-            "render", "--checkpoint of several frames must have a place for the number, such as bands-%04d");
-    else if (options->timing == TIMING_TRACE)
-        option_usage_fault("render", "--timing=trace takes one image, but several are given");
-    else if (has_scenes && path && !output_is_folder(path))
-        option_usage_fault("render", "--output of several scenes must be a folder");
-    else if (!has_scenes && strcmp(options->scenes.items[0], "-") == 0)
-        option_usage_fault("render", "--frames reads its scene for each frame, but standard input only once");
-    else if (!has_scenes && path && !place.start && !output_is_folder(path))
-        option_usage_fault("render", "--output of several frames must be a folder, or have a place for the "
-                                     "number, such as image-%04d.png");
-    else if (!has_scenes && place.start && frame_place_of(place.end).start)
-        option_usage_fault("render", "--output has more than one place for the frame's number");
-    else
-        return true;
-    return false;
+    if (options->frame_count > 0 && has_scenes) return "--frames takes one scene, but several are given";
+    if (options->checkpoint && has_scenes) return "--checkpoint takes one scene, but several are given";
+    if (options->checkpoint && !options->skips_existing)
+        return "--checkpoint of several frames needs --skip-existing, which keeps finished ones";
+    if (options->checkpoint && !frame_place_of(options->checkpoint).start)
+        return "--checkpoint of several frames must have a place for the number, such as bands-%04d";
+    if (options->timing == TIMING_TRACE) return "--timing=trace takes one image, but several are given";
+    if (has_scenes)
+        return path && !output_is_folder(path) ? "--output of several scenes must be a folder" : NULL;
+    if (strcmp(options->scenes.items[0], "-") == 0)
+        return "--frames reads its scene for each frame, but standard input only once";
+    if (path && !place.start && !output_is_folder(path))
+        return "--output of several frames must be a folder, or have a place for the number, such as "
+               "image-%04d.png";
+    if (place.start && frame_place_of(place.end).start)
+        return "--output has more than one place for the frame's number";
+    return NULL;
 }
 
 // Sets the number of frames to that of the scene. Returns false with a message if it has none.
@@ -193,33 +159,33 @@ static bool frames_count(RenderOptions *options)
 }
 
 #define HELP_LAYER(NAME, name, type, components, note) "\n" #name ": " note
-#define FIELD(member)                                  offsetof(RenderOptions, member)
 
 static const char *const transfer_names[] = {"srgb", "none"}, *const bits_names[] = {"8", "16"},
-                         *const format_names[] = {"png", "ppm", "npy"};
+                         *const format_names[] = {"png", "ppm", "npy"},
+                         *const timing_names[] = {"text", "json", "trace"};
+static const unsigned bits_values[] = {8, 16}, format_values[] = {IMAGE_PNG, IMAGE_PPM, IMAGE_NPY},
+                      timing_styles[] = {TIMING_TEXT, TIMING_JSON, TIMING_TRACE};
 
 static const Option options_own[] = {
     {"output", "FILE",
      ".png, .ppm, .exr or .npy; a folder for several scenes; - with --format (default: the scene's name with "
      ".png)",
      option_text, FIELD(output.path), .letter = 'o'},
-    {"size", "WxH", "width and height in pixels (default: the scene's own, else 1280 wide)", option_size,
-     FIELD(common.size)},
     {"samples", "N", "samples per pixel (default: 1, at the center)", option_count, FIELD(sample_count),
      NUMBERS(1, SAMPLES_MAX)},
-    {"region", "X,Y,W,H", "render these pixels only", region_read, 0},
+    {"region", "X,Y,W,H", "render these pixels only", region_read, FIELD(region), .given = FIELD(has_region)},
     {"aov", "LIST", "also write IMAGE.NAME.npy for each NAME in the list:" LAYER_LIST(HELP_LAYER), option_set,
      FIELD(output.aovs), NAMES(layer_names)},
     {"max-error", "E[:METRIC]",
      "choose the fastest precision within this error in linear light; METRIC: rmse, max or flip (default: "
      "rmse)",
-     option_error_budget, FIELD(budget)},
-    {"timing", "[=STYLE]", "report times of stages and launches: text, json or trace", timing_style_read,
-     FIELD(timing)},
+     budget_read, FIELD(budget)},
+    {"timing", "[=STYLE]", "report times of stages and launches: text, json or trace", option_choice,
+     FIELD(timing), NAMES(timing_names), .values = timing_styles},
     {"transfer", "T", "transfer curve, srgb or none (default: srgb; none for .rt, .cfg, .nff and .dat)",
-     transfer_read, FIELD(output.transfer), NAMES(transfer_names)},
-    {"bits", "N", "8 or 16 per channel of a PNG or PPM (default: 8)", bits_read, FIELD(output.bits),
-     NAMES(bits_names)},
+     option_choice, FIELD(output.transfer), NAMES(transfer_names), .given = FIELD(has_transfer)},
+    {"bits", "N", "8 or 16 per channel of a PNG or PPM (default: 8)", option_choice, FIELD(output.bits),
+     NAMES(bits_names), .values = bits_values},
     {"exposure", "STOPS", "make a PNG or PPM twice as bright per stop (default: 0)", option_number,
      FIELD(output.exposure), NUMBERS(-64, 64)},
     {"tone", "T", "tone curve of a PNG or PPM: none or filmic (default: none, which clips at 1)",
@@ -234,43 +200,38 @@ static const Option options_own[] = {
     {"skip-existing", NULL, "leave out images that exist", option_flag, FIELD(skips_existing)},
     {"capture", "FOLDER", "write launches to an empty folder, for glint locate", option_text,
      FIELD(common.capture_folder), .effect = effect_empty_folder},
-    {"format", "F", "format of --output -: png, ppm or npy", format_read, 0, NAMES(format_names)},
+    {"format", "F", "format of --output -: png, ppm or npy", option_choice, FIELD(output.stdout_format),
+     NAMES(format_names), .values = format_values, .given = FIELD(has_format)},
     {"quiet", NULL, "print no progress", option_flag, FIELD(quiet)}};
 
-static bool options_check(void *render_options)
+static const char *options_check(void *render_options)
 {
     RenderOptions *options = render_options;
     if (options->budget.limit > 0 && options->common.has_precision)
-        return option_usage_fault(
-            "render", "--max-error chooses the precision; it cannot be combined with --precision");
+        return "--max-error chooses the precision; it cannot be combined with --precision";
     if (options->budget.limit > 0 && options->checkpoint)
-        return option_usage_fault("render",
-                                  "--max-error may choose another precision when a checkpoint is resumed; "
-                                  "name its choice with --precision");
+        return "--max-error may choose another precision when a checkpoint is resumed; name its choice with "
+               "--precision";
     if (options->checkpoint && options->skips_existing && options->output.path &&
         strcmp(options->checkpoint, options->output.path) == 0)
-        return option_usage_fault("render", "--skip-existing would keep a --checkpoint of the image's name");
-    if (!stdout_fits(options) || !display_fits(&options->output)) return false;
+        return "--skip-existing would keep a --checkpoint of the image's name";
+    const char *what = stdout_check(options);
+    if (!what) what = display_check(&options->output);
+    if (what) return what;
     options->has_several = options->scenes.count > 1 || options->frame_count > 1 || options->has_all_frames;
-    if (options->has_several && !several_fit(options)) return false;
-    if (!options->has_several && options->skips_existing && timing_uses_stdout(options->timing))
-        return option_usage_fault("render",
-                                  "--skip-existing may leave --timing=json or =trace nothing to report");
-    return true;
+    if (options->has_several) return several_check(options);
+    if (options->skips_existing && timing_uses_stdout(options->timing))
+        return "--skip-existing may leave --timing=json or =trace nothing to report";
+    return NULL;
 }
 
 static const CommandLine command_line = {
     .command = "render",
     .usage = "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(ray_options, RenderOptions, common),
-               OPTIONS_WITHIN(set_options, RenderOptions, common),
-               OPTIONS_WITHIN(devices_option, RenderOptions, common),
-               OPTIONS_WITHIN(reference_option, RenderOptions, common),
-               OPTIONS_WITHIN(precision_option, RenderOptions, common),
-               OPTIONS_WITHIN(common_options, RenderOptions, common),
-               OPTIONS_WITHIN(max_pixels_option, RenderOptions, common.max_pixels),
-               OPTIONS_WITHIN(driver_options, RenderOptions, common),
-               OPTIONS_WITHIN(perturb_option, RenderOptions, common)},
+    .groups = {OPTIONS(options_own), OPTIONS(size_option), OPTIONS(ray_options), OPTIONS(set_options),
+               OPTIONS(devices_option), OPTIONS(reference_option), OPTIONS(precision_option),
+               OPTIONS(common_options), OPTIONS(max_pixels_option), OPTIONS(driver_options),
+               OPTIONS(perturb_option)},
     OPERANDS(SCENES, RenderOptions, scenes),
     .check = options_check};
 

@@ -4,6 +4,7 @@
 #include "host/cli/image_output.h"
 #include "host/cli/options.h"
 #include "host/cli/timing.h"
+#include "host/measure/error_budget.h"
 
 typedef struct {
     CommonOptions common;

@@ -51,9 +51,8 @@ static const Option archive_options[] = {{"output", "FILE", "the archive (defaul
                                          {"seconds", "MAX", "time limit of each step (default: 1800)",
                                           option_number, offsetof(ReportChoice, seconds),
                                           NUMBERS_ABOVE(0, SECONDS_MAX)}};
-static const Option precision_own[] = {
-    {"precision", "P", "single, strict or double (default: all for verify, single for bench)",
-     option_precision, 0, .names = precision_names, .name_count = ARITHMETIC_COUNT}};
+static const Option precision_own[] = {PRECISION_OPTION(
+    "single, strict or double (default: all for verify, single for bench)", ARITHMETIC_COUNT)};
 static const Option page_option[] = {{"html", "FILE", "self-contained HTML page of this comparison",
                                       option_text, offsetof(ReportChoice, page)}};
 
@@ -72,7 +71,7 @@ static void passed_list(ReportChoice *choice)
 }
 
 // Checks the operands, which are cases, or reports of glint bench to compare.
-static bool options_check(void *report_choice)
+static const char *options_check(void *report_choice)
 {
     ReportChoice *choice = report_choice;
     const size_t operand_count = choice->operands.count;
@@ -83,15 +82,14 @@ static bool options_check(void *report_choice)
         count += ending && strcmp(ending, ".json") == 0;
     }
     choice->compares = count > 0 || choice->page;
-    if (!choice->compares) return true;
-    const bool is_for_archive = choice->output || choice->seconds > 0 || choice->passed_count > 0;
-    const char *what = count == 0 ? "--html needs reports of glint bench, whose names end in .json"
-                       : count < operand_count    ? "reports (.json) and cases cannot be combined"
-                       : is_for_archive           ? "--html is the only option for reports (.json)"
-                       : count > SIDE_REPORTS_MAX ? "at most 26 reports can be compared"
-                       : choice->page && strcmp(choice->page, "-") == 0 ? "--html needs the name of a file"
-                                                                        : NULL;
-    return !what || option_usage_fault("report", what);
+    if (!choice->compares) return NULL;
+    if (count == 0) return "--html needs reports of glint bench, whose names end in .json";
+    if (count < operand_count) return "reports (.json) and cases cannot be combined";
+    if (choice->output || choice->seconds > 0 || choice->passed_count > 0)
+        return "--html is the only option for reports (.json)";
+    if (count > SIDE_REPORTS_MAX) return "at most 26 reports can be compared";
+    if (choice->page && strcmp(choice->page, "-") == 0) return "--html needs the name of a file";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -104,11 +102,11 @@ static const CommandLine command_line = {
         "are built, which takes minutes. A step that\nfails or crashes is named in index.txt. Names of "
         "the user, the host and folders are left out. With CASE, glint verify\nruns only these cases.\n",
     .groups = {OPTIONS(archive_options),
-               OPTIONS_WITHIN(precision_own, ReportChoice, common),
-               OPTIONS_WITHIN(device_option, ReportChoice, common),
-               OPTION_WITHIN(common_options[COMMON_LANES], ReportChoice, common),
-               OPTIONS_WITHIN(driver_options, ReportChoice, common),
-               {page_option, 1, 0,
+               OPTIONS(precision_own),
+               OPTIONS(device_option),
+               OPTION(common_options[COMMON_LANES]),
+               OPTIONS(driver_options),
+               {page_option, 1,
                 "With reports of glint bench --json instead, shows their rows side by side: of several "
                 "devices, versions or days. A\nrow is faster or slower than in the first report only where "
                 "both are of the same device and host.\n"}},

@@ -7,16 +7,6 @@
 #include <math.h>
 #include <stdio.h>
 
-bool timing_style_read(const Option *option, const char *value, void *options)
-{
-    static const char *const names[] = {"text", "json", "trace"};
-    unsigned choice = 0;
-    const Option styles = {option->name, NAMES(names)};
-    if (value && !choice_read(&styles, value, &choice)) return false;
-    *(TimingStyle *)option_field(option, options) = TIMING_TEXT + choice;
-    return true;
-}
-
 // Sums over launches, by events where they are trusted, and by the host's clock.
 typedef struct {
     double event_seconds, host_seconds;

@@ -1,7 +1,6 @@
 // Reports the time of every stage and launch of a render, as text, JSON or a trace.
 #pragma once
 
-#include "host/cli/command_line.h"
 #include "host/cli/ranks.h"
 #include "host/measure/pilot.h"
 
@@ -12,8 +11,6 @@ static inline bool timing_uses_stdout(TimingStyle style)
 {
     return style == TIMING_JSON || style == TIMING_TRACE;
 }
-
-OptionReader timing_style_read; // reads a TimingStyle, which is text without a value
 
 typedef struct {
     const char *scene;

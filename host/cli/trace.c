@@ -27,13 +27,13 @@ static const Option options_own[] = {
     {"output", "FILE", "CSV file (default: standard output)", option_text, offsetof(TraceOptions, output),
      .letter = 'o'}};
 
-static bool options_check(void *trace_options)
+static const char *options_check(void *trace_options)
 {
     const TraceOptions *options = trace_options;
-    if (!options->rays) return option_usage_fault("trace", "no rays given; use --rays FILE");
+    if (!options->rays) return "no rays given; use --rays FILE";
     if (image_format_of(options->output) != IMAGE_UNKNOWN)
-        return option_usage_fault("trace", "writes CSV: the output's name must not be an image's or array's");
-    return true;
+        return "writes CSV: the output's name must not be an image's or array's";
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -45,9 +45,8 @@ static const CommandLine command_line = {
         "each number is rounded once to the precision. At certified, low,high,certainty follow: bounds of "
         "the exact t,\n"
         "and whether object and bounds are certain, certain in double, or uncertain.\n",
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(precision_option, TraceOptions, common),
-               SCENE_GROUPS(TraceOptions, common), OPTIONS_WITHIN(driver_options, TraceOptions, common),
-               OPTIONS_WITHIN(perturb_option, TraceOptions, common)},
+    .groups = {OPTIONS(options_own), OPTIONS(precision_option), SCENE_OPTIONS, OPTIONS(driver_options),
+               OPTIONS(perturb_option)},
     OPERANDS(SCENE, TraceOptions, scene),
     .check = options_check};
 

@@ -9,8 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-const VariantOptions variant_options_default = {
-    .common.bounce_count = BOUNCES_DEFAULT, .precisions = 1u << PRECISION_SINGLE, .bvhs = 1u << BVH_AUTO};
+const VariantOptions variant_options_default = {.common.bounce_count = BOUNCES_DEFAULT,
+                                                .common.precisions = 1u << PRECISION_SINGLE,
+                                                .bvhs = 1u << BVH_AUTO};
 
 const double variants_opened_fraction = 0.4, variants_measured_fraction = 0.9;
 
@@ -33,10 +34,9 @@ const Option variant_choice_options[] = {
      NAMES(lanes_choice_names)},
     {"bvh", "LIST", "any of auto, on, off (default: auto)", option_set, FIELD(bvhs),
      NAMES(bvh_choice_names)}};
-const Option variant_set_options[] = {
-    {"size", "WxH", "image size (default: as glint render)", option_size, FIELD(common.size)},
-    {"seconds", "MAX", "time limit of the measurement, converged or not (default: 5 per row)", option_number,
-     FIELD(seconds), NUMBERS_ABOVE(0, SECONDS_MAX)}};
+const Option variant_set_options[] = {{"seconds", "MAX",
+                                       "time limit of the measurement, converged or not (default: 5 per row)",
+                                       option_number, FIELD(seconds), NUMBERS_ABOVE(0, SECONDS_MAX)}};
 
 // Adds a variant. `key` has what its row shares with others of its scene and choice.
 static void variant_add(VariantSet *set, const VariantOptions *options, size_t choice, size_t scene_index,
@@ -93,7 +93,8 @@ static void scene_add_variants(VariantSet *set, const VariantOptions *choices, s
         for (unsigned lanes = 0; lanes < LANES_CHOICE_COUNT; lanes++)
             for (unsigned bvh = 0; bvh < BVH_CHOICE_COUNT; bvh++)
                 for (size_t i = 0; i < sample_choices; i++) {
-                    if (!(options->precisions >> precision & 1) || !(options->bvhs >> bvh & 1)) continue;
+                    if (!(options->common.precisions >> precision & 1) || !(options->bvhs >> bvh & 1))
+                        continue;
                     // without --lanes, once with the device's default
                     if (options->lanes ? !(options->lanes >> lanes & 1) : lanes > 0) continue;
                     settings.precision = (Precision)precision;

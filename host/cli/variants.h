@@ -11,7 +11,7 @@ enum { SAMPLE_CHOICES_MAX = 16 };
 
 typedef struct {
     CommonOptions common;
-    unsigned precisions, lanes, bvhs; // sets; empty lanes mean the device's default
+    unsigned lanes, bvhs; // sets; empty lanes mean the device's default
     uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0 for one sample
     double seconds;        // 0 for the default
@@ -21,21 +21,15 @@ typedef struct {
 
 extern const VariantOptions variant_options_default; // precision single, defaults for everything else
 
-// Their fields are in VariantOptions.
 extern const Option variant_choice_options[3]; // --variant accepts these and others
-extern const Option variant_set_options[2];    // shared by all rows
+extern const Option variant_set_options[1];    // shared by all rows
 enum { SECONDS_MAX = 1000000000 };
 
 // The groups of options of a command with VariantOptions, which follow the command's other groups.
-#define VARIANT_GROUPS(Type, variants)                                                                       \
-    OPTIONS_WITHIN(variant_choice_options, Type, variants),                                                  \
-        OPTION_WITHIN(ray_options[RAY_BOUNCES], Type, variants.common),                                      \
-        OPTIONS_WITHIN(variant_set_options, Type, variants),                                                 \
-        OPTIONS_WITHIN(set_options, Type, variants.common),                                                  \
-        OPTIONS_WITHIN(device_option, Type, variants.common),                                                \
-        OPTIONS_WITHIN(reference_option, Type, variants.common),                                             \
-        OPTION_WITHIN(common_options[COMMON_LENIENT], Type, variants.common),                                \
-        OPTIONS_WITHIN(max_pixels_option, Type, variants.common.max_pixels)
+#define VARIANT_OPTIONS                                                                                      \
+    OPTIONS(variant_choice_options), OPTION(ray_options[RAY_BOUNCES]), OPTIONS(size_option),                 \
+        OPTIONS(variant_set_options), OPTIONS(set_options), OPTIONS(device_option),                          \
+        OPTIONS(reference_option), OPTION(common_options[COMMON_LENIENT]), OPTIONS(max_pixels_option)
 
 typedef struct {
     Scene *scenes;

@@ -45,7 +45,6 @@ static const ResultTable verify_table = {
 
 typedef struct {
     CommonOptions common;
-    ReportOptions report;
     bool quick, lean;      // see VerifySettings
     CommandOperands names; // of the cases, all if none is named
 } VerifyOptions;
@@ -56,8 +55,7 @@ static const Option options_own[] = {
     {"lean", NULL, "build one small kernel per scene instead of one for all, for slow compilers", option_flag,
      offsetof(VerifyOptions, lean)}};
 static const Option precision_own[] = {
-    {"precision", "P", "single, strict or double (default: all that the device has)", option_precision, 0,
-     .names = precision_names, .name_count = ARITHMETIC_COUNT}};
+    PRECISION_OPTION("single, strict or double (default: all that the device has)", ARITHMETIC_COUNT)};
 
 static bool is_case(const char *name)
 {
@@ -67,21 +65,23 @@ static bool is_case(const char *name)
     return verify_case_name(i);
 }
 
-static bool case_fault(const char *name)
+static void case_fault(const char *name)
 {
     fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
     for (size_t i = 0; verify_case_name(i); i++)
         fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
     fprintf(stderr, " (docs/verify.md)\n");
-    return false;
 }
 
-static bool options_check(void *verify_options)
+static const char *options_check(void *verify_options)
 {
-    VerifyOptions *options = verify_options;
-    for (size_t i = 0; i < options->names.count; i++)
-        if (!is_case(options->names.items[i])) return case_fault(options->names.items[i]);
-    return report_options_check(&options->report, &verify_table);
+    const VerifyOptions *options = verify_options;
+    for (size_t i = 0; i < options->names.count; i++) {
+        if (is_case(options->names.items[i])) continue;
+        case_fault(options->names.items[i]);
+        return "";
+    }
+    return NULL;
 }
 
 static const CommandLine command_line = {
@@ -90,14 +90,10 @@ static const CommandLine command_line = {
         "usage: glint verify [CASE...] [OPTIONS]\n\n"
         "Runs the hard cases, or those named, on a device and checks each against its bound; exit status "
         "3 if any fails.\n",
-    .groups = {OPTIONS_WITHIN(precision_own, VerifyOptions, common), OPTIONS(options_own),
-               OPTIONS_WITHIN(device_option, VerifyOptions, common),
-               OPTION_WITHIN(common_options[COMMON_LANES], VerifyOptions, common),
-               OPTION_WITHIN(common_options[COMMON_NO_CACHE], VerifyOptions, common),
-               OPTIONS_WITHIN(driver_options, VerifyOptions, common),
-               OPTIONS_WITHIN(keep_kernels_option, VerifyOptions, common),
-               OPTIONS_WITHIN(perturb_option, VerifyOptions, common),
-               OPTIONS_WITHIN(report_options, VerifyOptions, report)},
+    .groups = {OPTIONS(precision_own), OPTIONS(options_own), OPTIONS(device_option),
+               OPTION(common_options[COMMON_LANES]), OPTION(common_options[COMMON_NO_CACHE]),
+               OPTIONS(driver_options), OPTIONS(keep_kernels_option), OPTIONS(perturb_option),
+               REPORT_OPTIONS},
     OPERANDS(ANY, VerifyOptions, names),
     .check = options_check};
 
@@ -384,8 +380,8 @@ static int device_verify(Verification *verification, Compute *compute)
     }
     progress_close(&verification->progress);
     if (verification->has_text) passports_remark(compute->device, stdout);
-    if (options->report.format != FORMAT_TEXT &&
-        !report_write(journal_json(verification), &verify_table, &options->report))
+    if (options->common.report.format != FORMAT_TEXT &&
+        !report_write(journal_json(verification), &options->common.report))
         return EXIT_USER;
     return failed > 0 ? EXIT_CHECK : EXIT_DONE;
 }
@@ -434,11 +430,12 @@ static void builder_start(const VerifyOptions *options)
 
 int command_verify(int argument_count, char **arguments)
 {
-    VerifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT};
+    VerifyOptions options = {.common.bounce_count = BOUNCES_DEFAULT, .common.report.table = &verify_table};
     int status = command_line_read(&command_line, &options, argument_count, arguments);
     if (status != OPTIONS_READ) return status;
-    Verification verification = {
-        .options = &options, .journal = verify_journal_open(), .has_text = report_has_text(&options.report)};
+    Verification verification = {.options = &options,
+                                 .journal = verify_journal_open(),
+                                 .has_text = report_has_text(&options.common.report)};
     for (size_t i = 0; verify_case_name(i); i++)
         verification.case_count += is_chosen(&options, verify_case_name(i));
     const CommonOptions *common = &options.common;

@@ -33,27 +33,24 @@ static void keys_print(void)
     putchar('\n');
 }
 
-static bool options_check(void *view_options)
+static const char *options_check(void *view_options)
 {
     const ViewOptions *options = view_options;
     const char *camera = options->common.camera ? options->common.camera : options->scene;
-    if (options->writes_camera && strcmp(camera, "-") == 0) {
+    const bool is_stdin = strcmp(camera, "-") == 0;
+    if (!options->writes_camera || (!is_stdin && scene_is_yaml(camera))) return NULL;
+    if (is_stdin)
         fprintf(stderr, "glint: --write-camera: standard input cannot be written; name a YAML file\n");
-        return false;
-    }
-    if (options->writes_camera && !scene_is_yaml(camera)) {
+    else
         fprintf(stderr, "glint: --write-camera: '%s' is not in YAML\n", camera);
-        return false;
-    }
-    return true;
+    return "";
 }
 
 static const CommandLine command_line = {
     .command = "view",
     .usage = "usage: glint view SCENE [OPTIONS]\n",
     .usage_print = keys_print,
-    .groups = {OPTIONS(options_own), OPTIONS_WITHIN(ray_options, ViewOptions, common),
-               OPTIONS_WITHIN(precision_option, ViewOptions, common), SCENE_GROUPS(ViewOptions, common)},
+    .groups = {OPTIONS(options_own), OPTIONS(ray_options), OPTIONS(precision_option), SCENE_OPTIONS},
     OPERANDS(SCENE, ViewOptions, scene),
     .check = options_check};
 

@@ -26,7 +26,7 @@ int main(int argument_count, char **arguments)
     CommonOptions options = {.lanes = 1};
     Scene scene;
     OpenDevice open;
-    if (!option_precision(precision_option, arguments[2], &options) ||
+    if (!precision_option->read(precision_option, arguments[2], &options) ||
         !scene_open(&scene, arguments[1], &options))
         return EXIT_FAILURE;
     int status = EXIT_FAILURE;
