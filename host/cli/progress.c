@@ -108,16 +108,18 @@ void progress_close(Progress *progress)
     if (progress->visible) fputs("\r\033[K", stderr);
 }
 
-static bool (*other_interrupts)(void);
+static bool (*other_interrupts)(void *context);
+static void *other_context;
 
-void progress_ask(bool (*ask)(void))
+void progress_set_interrupt(bool (*interrupts)(void *context), void *context)
 {
-    other_interrupts = ask;
+    other_interrupts = interrupts;
+    other_context = context;
 }
 
 bool progress_interrupted(void)
 {
-    return interrupted != 0 || (other_interrupts && other_interrupts());
+    return interrupted != 0 || (other_interrupts && other_interrupts(other_context));
 }
 
 bool progress_stops(void *context)

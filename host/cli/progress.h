@@ -33,5 +33,5 @@ void progress_close(Progress *progress);
 bool progress_interrupted(void);
 // Returns progress_interrupted(). A renderer's `stop` function, which ignores its context.
 bool progress_stops(void *context);
-// Makes progress_interrupted call `ask` in addition, and return true if it does.
-void progress_ask(bool (*ask)(void));
+// Makes progress_interrupted return true also if `interrupts` does, which may be NULL.
+void progress_set_interrupt(bool (*interrupts)(void *context), void *context);

@@ -69,12 +69,14 @@ static void scene_send(void *context, SceneVariant variant, const CompiledScene 
     scene_broadcast(&sent, 0, true);
 }
 
+// What the first rank knows about another one.
 typedef struct {
     Request request;
     BandRows rows; // handed out and not yet received
     Film band;     // collects their layers; height 0 until its header arrives
     Layer next_layer;
-    bool wants_rows, end_sent, is_rejected, is_done;
+    bool wants_rows, end_sent, is_dropped, is_done;
+    char failure[sizeof((Rank *)0)->failure]; // as reported by TAG_DONE
 } RankState;
 
 // Receives `size` bytes, beginning with the message of a status. Discards the message and returns false if it
@@ -103,8 +105,8 @@ static bool request_receive(RankState *state, const MPI_Status *status)
            state->request.rows_max > 0 && state->request.step > 0;
 }
 
-// Delivers the band to the scheduler once it has all layers.
-static void layers_await(RankState *state, Scheduler *scheduler, size_t worker)
+// Delivers the band to the scheduler if it has all layers.
+static void band_deliver(RankState *state, Scheduler *scheduler, size_t worker)
 {
     while (state->next_layer < LAYER_COUNT && !state->band.layers[state->next_layer])
         state->next_layer++;
@@ -137,45 +139,54 @@ static bool layer_receive(RankState *state, const MPI_Status *status)
     return is_right;
 }
 
-// Drops a rank that cannot render its rows. The others render them.
-static void rank_drop(const Ranks *ranks, Scheduler *scheduler, size_t worker, int rank, const char *why)
+// Receives a rank's last message.
+static bool done_receive(RankState *state, const MPI_Status *status)
 {
-    fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host, why);
-    scheduler_drop(scheduler, worker);
+    const bool is_right = receive_checked(state->failure, sizeof state->failure, status);
+    state->failure[is_right ? sizeof state->failure - 1 : 0] = '\0';
+    state->is_done = true;
+    return is_right;
 }
 
-static void message_receive(const Ranks *ranks, RankState *states, Scheduler *scheduler, size_t first_worker,
+// Receives a message of a rank. Returns false if it is not one that was due.
+static bool message_receive(const Ranks *ranks, RankState *state, const MPI_Status *status)
+{
+    switch (status->MPI_TAG) {
+    case TAG_REQUEST:
+        return request_receive(state, status);
+    case TAG_BAND:
+        return header_receive(ranks, state, status);
+    case TAG_LAYERS:
+        return layer_receive(state, status);
+    case TAG_DONE:
+        return done_receive(state, status);
+    default:
+        return receive_checked(NULL, SIZE_MAX, status);
+    }
+}
+
+// Receives a message of a rank. Delivers the band that it completes, or drops the rank, whose rows the others
+// then render.
+static void message_process(const Ranks *ranks, RankState *state, Scheduler *scheduler, size_t worker,
                             const MPI_Status *status)
 {
-    const int rank = status->MPI_SOURCE;
-    const size_t index = (size_t)rank - 1, worker = first_worker + index;
-    RankState *state = &states[index];
-    char failure[sizeof ranks->items->failure];
-    bool is_right = false;
-    if (status->MPI_TAG == TAG_REQUEST) {
-        is_right = request_receive(state, status);
-    } else if (status->MPI_TAG == TAG_BAND && !state->is_rejected) {
-        is_right = header_receive(ranks, state, status);
-        if (is_right) layers_await(state, scheduler, worker);
-    } else if (status->MPI_TAG == TAG_LAYERS && !state->is_rejected) {
-        is_right = layer_receive(state, status);
-        if (is_right) layers_await(state, scheduler, worker);
-    } else if (status->MPI_TAG == TAG_DONE) {
-        const bool owes_rows = state->rows.row_count > 0 && !scheduler_has_ended(scheduler);
-        is_right = receive_checked(failure, sizeof failure, status);
-        failure[sizeof failure - 1] = '\0';
-        state->is_done = true;
-        if (is_right && failure[0] != '\0' && !state->is_rejected)
-            rank_drop(ranks, scheduler, worker, rank, failure);
-        else
-            is_right &= !owes_rows;
-    } else {
-        receive_checked(NULL, SIZE_MAX, status);
+    const bool is_right = message_receive(ranks, state, status);
+    const bool owes_rows = state->is_done && state->rows.row_count > 0 && !scheduler_has_ended(scheduler);
+    if (state->is_dropped) return;
+    if (is_right && !owes_rows && state->failure[0] == '\0') {
+        if (status->MPI_TAG == TAG_BAND || status->MPI_TAG == TAG_LAYERS)
+            band_deliver(state, scheduler, worker);
+        return;
     }
-    if (is_right || state->is_rejected) return;
-    state->is_rejected = true;
-    rank_drop(ranks, scheduler, worker, rank,
-              "it sent data that is not a band of its rows; the others continue without it");
+    const int rank = status->MPI_SOURCE;
+    fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host,
+            state->failure[0] != '\0'
+                ? state->failure
+                : "it sent data that is not a band of its rows; the others continue without it");
+    state->is_dropped = true;
+    state->rows = (BandRows){0}; // so that no later band is right
+    film_free(&state->band);
+    scheduler_drop(scheduler, worker);
 }
 
 // Answers a rank that wants rows, and reports the end to each once. Returns false if nothing is due.
@@ -184,7 +195,7 @@ static bool rank_answer(RankState *state, Scheduler *scheduler, size_t worker, i
     if (state->wants_rows && !state->is_done) {
         bool waits = false;
         BandRows rows = {0};
-        if (!state->is_rejected)
+        if (!state->is_dropped)
             rows = scheduler_try(scheduler, worker, state->request.rows_max, state->request.step, &waits);
         if (rows.row_count == 0 && waits) return false;
         send_bytes(&rows, sizeof rows, rank, TAG_ROWS);
@@ -205,7 +216,10 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
     for (size_t done_count = 0; done_count < ranks->remote.count;) {
         MPI_Status status;
         bool is_busy = has_message(MPI_ANY_SOURCE, MPI_ANY_TAG, &status);
-        if (is_busy) message_receive(ranks, states, scheduler, first_worker, &status);
+        if (is_busy) {
+            const size_t index = (size_t)status.MPI_SOURCE - 1;
+            message_process(ranks, &states[index], scheduler, first_worker + index, &status);
+        }
         if (progress_interrupted()) scheduler_end(scheduler);
         done_count = 0;
         for (size_t i = 0; i < ranks->remote.count; i++) {

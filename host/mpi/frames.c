@@ -260,48 +260,22 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
 
 // The other ranks.
 
-static bool end_received;
-
-static bool frames_have_ended(void)
-{
-    MPI_Status status;
-    if (!end_received && has_message(0, TAG_END, &status)) {
-        receive_bytes(NULL, 0, 0, TAG_END);
-        end_received = true;
-    }
-    return end_received;
-}
-
-static size_t frame_await(void)
-{
-    MPI_Status status;
-    while (!has_message(0, TAG_FRAME, &status)) {
-        frames_have_ended();
-        rest();
-    }
-    size_t frame;
-    receive_bytes(&frame, sizeof frame, 0, TAG_FRAME);
-    return frame;
-}
-
 void frames_work(size_t local_rank, int argument_count, char **arguments)
 {
     int status;
     RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
     if (command) render_command_choose_device(command, local_rank);
     if (files_are_shared(command, (Call){argument_count, arguments}, false)) {
-        size_t frame;
+        bool has_ended = false;
         status = EXIT_DONE;
-        end_received = false;
-        progress_ask(frames_have_ended);
-        for (;;) {
+        progress_set_interrupt(end_received, &has_ended);
+        for (size_t frame;; status = frame_render(command, frame)) {
             send_bytes(&status, sizeof status, 0, TAG_FRAME_DONE);
-            frame = frame_await();
+            receive_bytes(&frame, sizeof frame, 0, TAG_FRAME);
             if (frame == NO_FRAME) break;
-            status = frame_render(command, frame);
         }
-        progress_ask(NULL);
-        if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
+        progress_set_interrupt(NULL, NULL);
+        end_await(&has_ended);
         render_command_drop_devices(command);
     }
     if (command) render_command_close(command);

@@ -49,21 +49,38 @@ void send_bytes(const void *bytes, size_t size, int rank, int tag)
     } while (done < size);
 }
 
-void receive_bytes(void *bytes, size_t size, int rank, int tag)
-{
-    size_t done = 0;
-    do {
-        const int count = message_size(size - done);
-        MPI_Recv((char *)bytes + done, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        done += (size_t)count;
-    } while (done < size);
-}
-
 bool has_message(int rank, int tag, MPI_Status *status)
 {
     int is_there;
     MPI_Iprobe(rank, tag, MPI_COMM_WORLD, &is_there, status);
     return is_there;
+}
+
+void receive_bytes(void *bytes, size_t size, int rank, int tag)
+{
+    size_t done = 0;
+    do {
+        const int count = message_size(size - done);
+        MPI_Status status;
+        while (!has_message(rank, tag, &status))
+            rest();
+        MPI_Recv((char *)bytes + done, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        done += (size_t)count;
+    } while (done < size);
+}
+
+bool end_received(void *received)
+{
+    bool *is_received = received;
+    MPI_Status status;
+    if (!*is_received && has_message(0, TAG_END, &status)) end_await(is_received);
+    return *is_received;
+}
+
+void end_await(bool *received)
+{
+    if (!*received) receive_bytes(NULL, 0, 0, TAG_END);
+    *received = true;
 }
 
 // The members of a CompiledScene that are read by renderers that do not move. The items of the arrays follow.

@@ -1,9 +1,32 @@
-// The messages between the ranks of a job. The first rank broadcasts one Job after another. For an image,
-// the others answer with their Ranks and then receive Orders: one for each variant that a rank needs,
-// followed by its compiled scene, and then the start. From then on, each asks the first rank for rows and
-// sends their bands, until it has sent TAG_DONE and received TAG_END.
+// The protocol between the ranks of a job. All ranks are processes of one program and one architecture, so
+// messages are structs without pointers, which would mean nothing in another process. If a process dies,
+// mpirun ends the job.
 //
-// Messages are structs of this program without pointers, which would mean nothing in another process.
+// The first rank broadcasts Jobs, the last of which is JOB_END.
+//
+// JOB_IMAGE: all ranks render bands of one image.
+// 1. The first rank broadcasts the device selector. Each other rank opens a device and answers with its Rank.
+// 2. The first rank broadcasts Orders: ORDER_SCENE with each variant of the scene that a rank needs, followed
+// by
+//    the compiled scene for the ranks that need it, and then ORDER_START. ORDER_CANCEL ends the job instead
+//    if a rank has no device or the image cannot be rendered.
+// 3. Each other rank sends TAG_REQUEST, receives TAG_ROWS and sends the band of these rows as TAG_BAND and
+//    TAG_LAYERS, until it receives no rows or TAG_END or its device fails. Then it sends TAG_DONE.
+// 4. The first rank sends each other rank TAG_END once: when all rows are rendered, when the user interrupts,
+// or
+//    after that rank's TAG_DONE. The rank then waits for the next Job.
+// A rank that reports a failure, or sends anything but its rows, is dropped with a warning: the others render
+// its rows, its bands are discarded, and its requests are answered with no rows.
+//
+// JOB_FRAMES: each rank renders whole frames alone.
+// 1. The first rank broadcasts the name of a marker file and a hash of the arguments and files. All ranks
+// learn
+//    whether all see both. If not, the job ends, and all ranks render the frames together.
+// 2. Each other rank sends TAG_FRAME_DONE and receives TAG_FRAME, until it receives NO_FRAME.
+// 3. The first rank sends each other rank TAG_END once, before NO_FRAME: when all frames are rendered, when
+// the
+//    user interrupts, which stops a frame that is being rendered, or when that rank's device has failed.
+//    Other ranks render its frame.
 #pragma once
 
 #include "host/cli/ranks.h"
@@ -14,10 +37,10 @@ enum {
     TAG_ROWS,       // BandRows, the answer; no rows: the end
     TAG_BAND,       // a FilmHeader, followed by the layers with the next tag
     TAG_LAYERS,     // a layer, in several messages if it is large
-    TAG_END,        // to a rank that renders: the render has ended
+    TAG_END,        // no bytes
     TAG_DONE,       // a rank's last message: why its device failed, or an empty text
-    TAG_FRAME_DONE, // the exit status of a rank's frame; EXIT_DONE before the first
-    TAG_FRAME,      // the answer: the next frame's index, or NO_FRAME
+    TAG_FRAME_DONE, // the status of a rank's frame; EXIT_DONE before the first
+    TAG_FRAME,      // the index of the next frame, or NO_FRAME
 };
 
 typedef struct {
@@ -78,10 +101,16 @@ void rest(void);
 int message_size(size_t bytes_left);
 // Broadcasts from the first of `ranks`.
 void broadcast(void *bytes, size_t size, MPI_Comm ranks);
-// Send and receive bytes in one message, even if there are none, or in several of the same tag.
+// Send and receive bytes in one message, even if there are none, or in several of the same tag. Receiving
+// rests until each message has arrived.
 void send_bytes(const void *bytes, size_t size, int rank, int tag);
 void receive_bytes(void *bytes, size_t size, int rank, int tag);
 bool has_message(int rank, int tag, MPI_Status *status);
+// Returns whether TAG_END was received, which may be now. `received` is a bool that keeps this and is false
+// when a job begins.
+bool end_received(void *received);
+// Waits for TAG_END unless it was received.
+void end_await(bool *received);
 
 // Sends a compiled scene from the first rank to those with `takes`, which allocate its arrays. All ranks
 // call it. A rank that does not take the scene leaves `compiled` unchanged.

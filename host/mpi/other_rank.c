@@ -10,27 +10,12 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static bool has_ended(void *ended)
-{
-    bool *end_received = ended;
-    MPI_Status status;
-    if (!*end_received && has_message(0, TAG_END, &status)) {
-        receive_bytes(NULL, 0, 0, TAG_END);
-        *end_received = true;
-    }
-    return *end_received;
-}
-
 static BandRows rows_acquire(void *ended, uint32_t rows_max, uint32_t step)
 {
+    (void)ended;
     const Request request = {rows_max, step};
-    send_bytes(&request, sizeof request, 0, TAG_REQUEST);
-    MPI_Status status;
-    while (!has_message(0, TAG_ROWS, &status)) {
-        has_ended(ended);
-        rest();
-    }
     BandRows rows;
+    send_bytes(&request, sizeof request, 0, TAG_REQUEST);
     receive_bytes(&rows, sizeof rows, 0, TAG_ROWS);
     return rows;
 }
@@ -41,7 +26,7 @@ static bool band_send(void *ended, const Film *band)
     send_bytes(&header, sizeof header, 0, TAG_BAND);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (band->layers[layer]) send_bytes(band->layers[layer], film_layer_size(band, layer), 0, TAG_LAYERS);
-    return !has_ended(ended);
+    return !end_received(ended);
 }
 
 // The state of this rank's renderer.
@@ -99,14 +84,14 @@ static void scene_receive(RankRenderer *worker, SceneVariant variant)
     }
 }
 
-// Renders until the first rank has no more rows, and sends the reason if the device failed. Waits for the
-// message that ends this job, because a late one would end the next job.
+// Renders until the first rank has no more rows, and sends the reason if the device failed. Waits for
+// TAG_END, which would otherwise end the next job.
 static void worker_render(RankRenderer *worker, unsigned aovs)
 {
     char failure[sizeof worker->own.failure] = "";
-    bool end_received = false;
+    bool has_ended = false;
     const BandQueue queue = {
-        .acquire = rows_acquire, .deliver = band_send, .has_ended = has_ended, .context = &end_received};
+        .acquire = rows_acquire, .deliver = band_send, .has_ended = end_received, .context = &has_ended};
     const Compute *compute = worker->devices.items[0].compute;
     if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
     if (worker->messages.count > 0) {
@@ -117,7 +102,7 @@ static void worker_render(RankRenderer *worker, unsigned aovs)
         free(text);
     }
     send_bytes(failure, sizeof failure, 0, TAG_DONE);
-    if (!end_received) receive_bytes(NULL, 0, 0, TAG_END);
+    end_await(&has_ended);
 }
 
 static void job_run(RankRenderer *worker, const Job *job)
