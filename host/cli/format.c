@@ -7,6 +7,7 @@
 #include "host/cli/options.h"
 #include <inttypes.h>
 #include <jansson.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -124,26 +125,40 @@ static void value_append(Text *text, const json_t *value)
     }
 }
 
-static Text column_text(const ReportRow *row, const ResultColumn *column)
+ShortText column_heading(const char *column)
+{
+    ShortText heading;
+    snprintf(heading.text, sizeof heading.text, "%.*s", (int)strcspn(column, "="), column);
+    return heading;
+}
+
+static const json_t *column_value(const ReportRow *row, const char *column)
+{
+    const char *equals = strchr(column, '=');
+    return value_at(row, equals ? equals + 1 : column);
+}
+
+static Text column_text(const ReportRow *row, const char *column)
 {
     Text text = {0};
-    value_append(&text, value_at(row, column->path));
+    value_append(&text, column_value(row, column));
     return text;
 }
 
-static size_t column_count(const ResultTable *table)
+// Returns a column, of which the names are first, or NULL past the last.
+static const char *column_at(const ResultTable *table, size_t index)
 {
-    size_t count = 0;
-    while (count < RESULT_COLUMNS_MAX && table->columns[count].heading)
-        count++;
-    return count;
+    size_t name_count = 0;
+    while (table->names[name_count])
+        name_count++;
+    return index < name_count ? table->names[index] : table->values[index - name_count];
 }
 
 // Appends the row's name, which consists of its first columns that have a value, separated by `between`.
 static void name_append(Text *text, const ReportRow *row, const ResultTable *table, const char *between)
 {
-    for (size_t i = 0; i < table->name_count; i++) {
-        Text value = column_text(row, &table->columns[i]);
+    for (size_t i = 0; table->names[i]; i++) {
+        Text value = column_text(row, table->names[i]);
         if (value.count > 0 || i == 0) text_appendf(text, "%s%s", i > 0 ? between : "", text_c(&value));
         text_free(&value);
     }
@@ -166,46 +181,20 @@ static RowOutcome row_outcome(const ReportRow *row, const ResultTable *table)
     return outcome;
 }
 
-// Appends text, replacing the characters that a format reserves. `replace` returns NULL for all others.
-static void escaped_append(Text *text, const char *from, const char *(*replace)(char character))
+// The replacements of characters that a format reserves, each after its character. That of a newline holds
+// for all control characters.
+static const char *const xml_escapes[] = {"&&amp;", "<&lt;", ">&gt;", "\"&quot;", "\n ", NULL};
+static const char *const markdown_escapes[] = {"|\\|", "\\\\\\", "<&lt;", "\n ", NULL};
+static const char *const csv_escapes[] = {"\"\"\"", NULL};
+
+static void escaped_append(Text *text, const char *from, const char *const *escapes)
 {
     for (; *from; from++) {
-        const char *replacement = replace(*from);
-        if (replacement)
-            text_appendf(text, "%s", replacement);
-        else
-            text_append(text, from, 1);
+        const char *const *escape = escapes;
+        while (*escape && **escape != ((unsigned char)*from < ' ' ? '\n' : *from))
+            escape++;
+        text_append(text, *escape ? *escape + 1 : from, *escape ? strlen(*escape + 1) : 1);
     }
-}
-
-static const char *xml_replace(char character)
-{
-    switch (character) {
-    case '&':
-        return "&amp;";
-    case '<':
-        return "&lt;";
-    case '>':
-        return "&gt;";
-    case '"':
-        return "&quot;";
-    default:
-        return (unsigned char)character < ' ' ? " " : NULL;
-    }
-}
-
-static const char *markdown_replace(char character)
-{
-    return character == '|'                 ? "\\|"
-           : character == '\\'              ? "\\\\"
-           : character == '<'               ? "&lt;"
-           : (unsigned char)character < ' ' ? " "
-                                            : NULL;
-}
-
-static const char *csv_replace(char character)
-{
-    return character == '"' ? "\"\"" : NULL;
 }
 
 typedef struct {
@@ -220,13 +209,13 @@ typedef void RowWriter(Writing *writing, const ReportRow *row);
 
 static void csv_row(Writing *writing, const ReportRow *row)
 {
-    for (size_t i = 0; i < column_count(writing->table); i++) {
-        Text value = column_text(row, &writing->table->columns[i]);
-        const bool is_quoted = strpbrk(text_c(&value), ",\"\r\n") != NULL;
-        text_appendf(&writing->body, i > 0 ? "," : "");
-        text_appendf(&writing->body, is_quoted ? "\"" : "");
-        escaped_append(&writing->body, text_c(&value), csv_replace);
-        text_appendf(&writing->body, is_quoted ? "\"" : "");
+    const char *column;
+    for (size_t i = 0; (column = column_at(writing->table, i)); i++) {
+        Text value = column_text(row, column);
+        const char *quote = strpbrk(text_c(&value), ",\"\r\n") ? "\"" : "";
+        text_appendf(&writing->body, "%s%s", i > 0 ? "," : "", quote);
+        escaped_append(&writing->body, text_c(&value), csv_escapes);
+        text_appendf(&writing->body, "%s", quote);
         text_free(&value);
     }
     text_appendf(&writing->body, "\n");
@@ -234,15 +223,16 @@ static void csv_row(Writing *writing, const ReportRow *row)
 
 static void markdown_row(Writing *writing, const ReportRow *row)
 {
-    for (size_t i = 0; i < column_count(writing->table); i++) {
-        const json_t *member = value_at(row, writing->table->columns[i].path);
+    const char *column;
+    for (size_t i = 0; (column = column_at(writing->table, i)); i++) {
+        const json_t *member = column_value(row, column);
         Text value = {0};
         if (json_is_real(member))
             text_appendf(&value, "%.4g", json_real_value(member));
         else
             value_append(&value, member);
         text_appendf(&writing->body, "| ");
-        escaped_append(&writing->body, text_c(&value), markdown_replace);
+        escaped_append(&writing->body, text_c(&value), markdown_escapes);
         text_appendf(&writing->body, " ");
         text_free(&value);
     }
@@ -253,11 +243,11 @@ static void markdown_row(Writing *writing, const ReportRow *row)
 static void details_append(Text *text, const ReportRow *row, const ResultTable *table)
 {
     const size_t start = text->count;
-    for (size_t i = table->name_count; i < column_count(table); i++) {
-        Text value = column_text(row, &table->columns[i]);
+    for (size_t i = 0; table->values[i]; i++) {
+        Text value = column_text(row, table->values[i]);
         if (value.count > 0)
-            text_appendf(text, "%s%s %s", text->count > start ? ", " : "", table->columns[i].heading,
-                         text_c(&value));
+            text_appendf(text, "%s%s %s", text->count > start ? ", " : "",
+                         column_heading(table->values[i]).text, text_c(&value));
         text_free(&value);
     }
 }
@@ -269,7 +259,7 @@ static void junit_row(Writing *writing, const ReportRow *row)
     const RowOutcome outcome = row_outcome(row, writing->table);
     writing->counts[outcome]++;
     text_appendf(body, "  <testcase classname=\"glint.%s\" name=\"", writing->table->command);
-    escaped_append(body, text_c(&name), xml_replace);
+    escaped_append(body, text_c(&name), xml_escapes);
     const json_t *seconds = writing->table->seconds ? value_at(row, writing->table->seconds) : NULL;
     if (json_is_number(seconds)) text_appendf(body, "\" time=\"%.6f", json_number_value(seconds));
     if (outcome == ROW_UNAVAILABLE)
@@ -278,7 +268,7 @@ static void junit_row(Writing *writing, const ReportRow *row)
         details_append(&details, row, writing->table);
     text_appendf(body, outcome == ROW_PASSED ? "\">\n    <system-out>" : "\">\n    <%s message=\"",
                  outcome == ROW_FAILED ? "failure" : "skipped");
-    escaped_append(body, text_c(&details), xml_replace);
+    escaped_append(body, text_c(&details), xml_escapes);
     text_appendf(body, outcome == ROW_PASSED ? "</system-out>\n  </testcase>\n" : "\"/>\n  </testcase>\n");
     text_free(&details);
     text_free(&name);
@@ -332,8 +322,9 @@ static void rows_write(Writing *writing, RowWriter *write)
 
 static void headings_append(Writing *writing, const char *before, const char *between, const char *after)
 {
-    for (size_t i = 0; i < column_count(writing->table); i++)
-        text_appendf(&writing->body, "%s%s", i > 0 ? between : before, writing->table->columns[i].heading);
+    const char *column;
+    for (size_t i = 0; (column = column_at(writing->table, i)); i++)
+        text_appendf(&writing->body, "%s%s", i > 0 ? between : before, column_heading(column).text);
     text_appendf(&writing->body, "%s", after);
 }
 
@@ -347,9 +338,9 @@ static void document_write(Writing *writing, ReportFormat format, Text *text)
         break;
     case FORMAT_MARKDOWN:
         headings_append(writing, "| ", " | ", " |\n");
-        for (size_t i = 0; i < column_count(writing->table); i++)
-            text_appendf(&writing->body, "%s", i > 0 ? " --- |" : "| --- |");
-        text_appendf(&writing->body, "\n");
+        for (size_t i = 0; column_at(writing->table, i); i++)
+            text_appendf(&writing->body, "| --- ");
+        text_appendf(&writing->body, "|\n");
         rows_write(writing, markdown_row);
         break;
     case FORMAT_JUNIT:

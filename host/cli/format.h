@@ -15,13 +15,7 @@ typedef enum {
     FORMAT_COUNT
 } ReportFormat;
 
-// A column of a row's values. `path` names its member, with dots between members, such as "frame_ms.median".
-// It is looked up in the row, then in the object whose array has the row, then in the document.
-typedef struct {
-    const char *heading, *path;
-} ResultColumn;
-
-enum { RESULT_COLUMNS_MAX = 24 };
+enum { RESULT_NAMES_MAX = 8, RESULT_VALUES_MAX = 16 };
 
 // Describes a command's results as rows.
 typedef struct {
@@ -29,9 +23,10 @@ typedef struct {
     // The array of rows, or one array in each object of another, such as "scenes.variants". With "" the
     // document is the only row.
     const char *rows;
-    // The columns, up to the first that has no heading. The first `name_count` name the row.
-    ResultColumn columns[RESULT_COLUMNS_MAX];
-    size_t name_count;
+    // The columns that name a row, and the others, up to NULL, as "path" or "heading=path". The path names a
+    // member, with dots between members, such as "frame_ms.median". It is looked up in the row, then in the
+    // object whose array has the row, then in the document.
+    const char *names[RESULT_NAMES_MAX + 1], *values[RESULT_VALUES_MAX + 1];
     // The paths of verdicts, up to NULL, and the value with which a row has failed: "true", "false" or a
     // text. The first verdict that the row has counts.
     const char *verdicts[2], *failed;
@@ -48,6 +43,9 @@ typedef struct {
     // text.
     const char *output;
 } ReportOptions;
+
+// Returns the heading of a column.
+ShortText column_heading(const char *column);
 
 extern const Option report_options[3];
 // Chooses the format by the file's ending if no other is given. Finds an ending that gives none, and a format

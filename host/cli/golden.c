@@ -51,16 +51,8 @@ static const Option options_own[] = {
 static const ResultTable golden_table = {
     .command = "golden",
     .rows = "scenes",
-    .columns = {{"scene", "scene"},
-                {"verdict", "verdict"},
-                {"first difference", "first"},
-                {"tiles", "tiles"},
-                {"left", "left"},
-                {"top", "top"},
-                {"right", "right"},
-                {"bottom", "bottom"},
-                {"crop", "crop"}},
-    .name_count = 1,
+    .names = {"scene"},
+    .values = {"verdict", "first difference=first", "tiles", "left", "top", "right", "bottom", "crop"},
     .verdicts = {"same"},
     .failed = "false",
 };

@@ -17,8 +17,8 @@ static void constants_append(Text *text, const SideBySide *side)
         Text value = {0};
         side_column_append(&value, &side_first(side, 0)->row->key, column);
         if (value.count > 0)
-            text_appendf(text, "%s%s %s", text->count > 0 ? ", " : "", bench_table.columns[column].heading,
-                         text_c(&value));
+            text_appendf(text, "%s%s %s", text->count > 0 ? ", " : "",
+                         column_heading(bench_table.names[column]).text, text_c(&value));
         text_free(&value);
     }
 }
@@ -127,7 +127,7 @@ void side_by_side_print(const SideBySide *side, FILE *stream)
     fputc('\n', stream);
     for (size_t column = 0; column < SIDE_COLUMNS; column++) {
         if (!side->is_shown[column]) continue;
-        text_appendf(&rows, "%s\t", bench_table.columns[column].heading);
+        text_appendf(&rows, "%s\t", column_heading(bench_table.names[column]).text);
         text_appendf(&alignment, "l");
     }
     text_appendf(&rows, "\tframe ms\tquartiles\tkernel ms\t%s\n",
@@ -232,7 +232,7 @@ Json *side_by_side_json(const SideBySide *side)
     json_end(json);
     json_begin_array(json, "columns");
     for (size_t column = 0; column < SIDE_COLUMNS; column++)
-        if (side->is_shown[column]) json_text(json, NULL, bench_table.columns[column].heading);
+        if (side->is_shown[column]) json_text(json, NULL, column_heading(bench_table.names[column]).text);
     json_end(json);
     constants_append(&constants, side);
     json_text(json, "constants", text_c(&constants));
