@@ -14,6 +14,7 @@
 #include "host/render/arithmetic.h"
 #include <inttypes.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -43,28 +44,25 @@ static const Option options_own[] = {
 static const Option precision_own[] = {
     PRECISION_OPTION("single, strict or double (default: all that the device has)", ARITHMETIC_COUNT)};
 
-static bool is_case(const char *name)
+// Returns the index of a case, or the number of cases if there is none of this name.
+static size_t case_index(const char *name)
 {
     size_t i = 0;
     while (verify_case_name(i) && strcmp(verify_case_name(i), name) != 0)
         i++;
-    return verify_case_name(i);
-}
-
-static void case_fault(const char *name)
-{
-    fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
-    for (size_t i = 0; verify_case_name(i); i++)
-        fprintf(stderr, "%s%s", i ? ", " : "", verify_case_name(i));
-    fprintf(stderr, " (docs/verify.md)\n");
+    return i;
 }
 
 static const char *options_check(void *verify_options)
 {
     const VerifyOptions *options = verify_options;
     for (size_t i = 0; i < options->names.count; i++) {
-        if (is_case(options->names.items[i])) continue;
-        case_fault(options->names.items[i]);
+        const char *name = options->names.items[i];
+        if (verify_case_name(case_index(name))) continue;
+        fprintf(stderr, "glint: verify: there is no case \"%s\"; the cases are ", name);
+        for (size_t k = 0; verify_case_name(k); k++)
+            fprintf(stderr, "%s%s", k ? ", " : "", verify_case_name(k));
+        fprintf(stderr, " (docs/verify.md)\n");
         return "";
     }
     return NULL;
@@ -121,37 +119,58 @@ static size_t records_count(const PrecisionRecord *record, bool (*is_counted)(co
     return count;
 }
 
-static void record_print(CaseRecord *record, char tier)
+// The counts of faults of a result.
+static const struct {
+    const char *key, *words;
+    size_t offset;
+} faults[] = {{"wrong", "wrong", offsetof(VerifyResult, wrong)},
+              {"leaks", "leaks", offsetof(VerifyResult, leaks)},
+              {"unsound", "unsound", offsetof(VerifyResult, unsound)},
+              {"off", "off the surface", offsetof(VerifyResult, off_surface)},
+              {"turned", "normals turned", offsetof(VerifyResult, wrong_normals)},
+              {"differing", "differ", offsetof(VerifyResult, differing)}};
+
+static size_t fault_count(const VerifyResult *result, size_t index)
 {
-    const VerifyResult *result = &record->result;
-    record->is_printed = true;
-    printf("  %-3s %c  %-60s ", result->name, tier, result->title);
-    if (record->state == CASE_CRASHED) {
-        printf("%25s  FAIL  %s\n", "", record->crash);
-        fflush(stdout);
-        return;
-    }
-    if (result->bound > 0)
-        printf("%8.3g of %-8.3g %-4s", result->worst, result->bound, result->unit);
-    else
-        printf("%20zu rays", result->ray_count);
-    printf("  %s", verify_holds(result) ? "ok" : "FAIL");
-    const struct {
-        size_t count;
-        const char *what;
-    } faults[] = {{result->wrong, "wrong"},
-                  {result->leaks, "leaks"},
-                  {result->unsound, "unsound"},
-                  {result->off_surface, "off the surface"},
-                  {result->wrong_normals, "normals turned"},
-                  {result->differing, "differ"}};
-    for (size_t i = 0; i < COUNT_OF(faults); i++)
-        if (faults[i].count > 0) printf("  %zu %s", faults[i].count, faults[i].what);
-    putchar('\n');
+    return *(const size_t *)((const char *)result + faults[index].offset);
+}
+
+// Prints text in place of the line of progress, if the command prints text.
+static void __attribute__((format(printf, 2, 3)))
+text_print(Verification *verification, const char *format, ...)
+{
+    if (!verification->has_text) return;
+    progress_close(&verification->progress);
+    va_list arguments;
+    va_start(arguments, format);
+    vprintf(format, arguments);
+    va_end(arguments);
     fflush(stdout);
 }
 
-static void record_add_json(Json *json, const CaseRecord *record)
+static void record_print(Verification *verification, CaseRecord *record)
+{
+    const VerifyResult *result = &record->result;
+    Text line = {0};
+    if (record->state == CASE_CRASHED)
+        text_appendf(&line, "%25s  FAIL  %s", "", record->crash);
+    else if (result->bound > 0)
+        text_appendf(&line, "%8.3g of %-8.3g %-4s", result->worst, result->bound, result->unit);
+    else
+        text_appendf(&line, "%20zu rays", result->ray_count);
+    if (record->state != CASE_CRASHED) {
+        text_appendf(&line, "  %s", verify_holds(result) ? "ok" : "FAIL");
+        for (size_t i = 0; i < COUNT_OF(faults); i++)
+            if (fault_count(result, i) > 0)
+                text_appendf(&line, "  %zu %s", fault_count(result, i), faults[i].words);
+    }
+    text_print(verification, "  %-3s %c  %-60s %s\n", result->name, verification->tier, result->title,
+               text_c(&line));
+    text_free(&line);
+    record->is_printed = true;
+}
+
+static void record_json(Json *json, const CaseRecord *record)
 {
     const VerifyResult *result = &record->result;
     json_begin_object(json, NULL);
@@ -160,33 +179,19 @@ static void record_add_json(Json *json, const CaseRecord *record)
     json_bool(json, "passed", !has_failed(record));
     if (record->state == CASE_CRASHED) {
         json_text(json, "crash", record->crash);
-        json_number(json, "seconds", record->seconds);
-        json_end(json);
-        return;
+    } else {
+        json_count(json, "rays", result->ray_count);
+        for (size_t i = 0; i < COUNT_OF(faults); i++)
+            json_count(json, faults[i].key, fault_count(result, i));
+        json_number(json, "surface_part", result->worst_position_ratio);
+        json_number(json, "normal_part", result->worst_normal_ratio);
+        json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
+        json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
+        if (result->bound > 0) json_text(json, "unit", result->unit);
+        hash_json(json, "hash", result->hash);
     }
-    json_count(json, "rays", result->ray_count);
-    json_count(json, "wrong", result->wrong);
-    json_count(json, "leaks", result->leaks);
-    json_count(json, "unsound", result->unsound);
-    json_count(json, "off", result->off_surface);
-    json_count(json, "turned", result->wrong_normals);
-    json_count(json, "differing", result->differing);
-    json_number(json, "surface_part", result->worst_position_ratio);
-    json_number(json, "normal_part", result->worst_normal_ratio);
-    json_number(json, "worst", result->bound > 0 ? result->worst : NAN);
-    json_number(json, "bound", result->bound > 0 ? result->bound : NAN);
-    if (result->bound > 0) json_text(json, "unit", result->unit);
-    hash_json(json, "hash", result->hash);
     json_number(json, "seconds", record->seconds);
     json_end(json);
-}
-
-static CaseRecord *record_of(const Verification *verification, const char *name)
-{
-    size_t i = 0;
-    while (strcmp(verify_case_name(i), name) != 0)
-        i++;
-    return &verification->record->cases[i];
 }
 
 static size_t rows_ended(const Verification *verification)
@@ -197,21 +202,11 @@ static size_t rows_ended(const Verification *verification)
     return count;
 }
 
-// Clears the line of progress for a line of the report.
-static void line_begin(Verification *verification)
-{
-    fflush(stdout);
-    progress_close(&verification->progress);
-}
-
 static bool case_start(void *context, const VerifyResult *result)
 {
     Verification *verification = context;
-    CaseRecord *record = record_of(verification, result->name);
-    if (record->state == CASE_CRASHED && !record->is_printed && verification->has_text) {
-        line_begin(verification);
-        record_print(record, verification->tier);
-    }
+    CaseRecord *record = &verification->record->cases[case_index(result->name)];
+    if (record->state == CASE_CRASHED && !record->is_printed) record_print(verification, record);
     if (has_ended(record)) return false;
     *record = (CaseRecord){.state = CASE_RUNNING, .result = *result, .start_seconds = clock_seconds()};
     const size_t ended = rows_ended(verification);
@@ -225,13 +220,11 @@ static bool case_receive(void *context, const VerifyResult *result)
 {
     Verification *verification = context;
     if (!compute_ok(verification->compute)) return false;
-    CaseRecord *record = record_of(verification, result->name);
+    CaseRecord *record = &verification->record->cases[case_index(result->name)];
     record->result = *result;
     record->seconds = clock_seconds() - record->start_seconds;
     record->state = CASE_DONE;
-    if (!verification->has_text) return true;
-    line_begin(verification);
-    record_print(record, verification->tier);
+    record_print(verification, record);
     return true;
 }
 
@@ -259,11 +252,7 @@ static void precision_verify(Verification *verification, Compute *compute)
                     "glint: verify: the reference has %d bits here: tier D is checked against numbers of the "
                     "precision that it tests\n",
                     verify_reference_bits());
-        if (verification->has_text) {
-            line_begin(verification);
-            printf("%s\n", precision_names[verification->precision]);
-            fflush(stdout);
-        }
+        text_print(verification, "%s\n", precision_names[verification->precision]);
         record->is_started = true;
     }
     const VerifyChoice choice = {options->names.items, options->names.count};
@@ -272,18 +261,16 @@ static void precision_verify(Verification *verification, Compute *compute)
     record->seconds = clock_seconds() - record->start_seconds;
     if (!compute_ok(compute)) return;
     record->is_ended = true;
-    if (!verification->has_text) return;
     const size_t count = records_count(record, has_ended);
-    line_begin(verification);
-    printf("  tier %c: %zu of %zu case%s passed, in %.1f s; kernels: trace %016" PRIx64 ", render %016" PRIx64
-           "\n",
-           verification->tier, count - records_count(record, has_failed), count, text_plural(count),
-           record->seconds, record->kernels.trace_hash, record->kernels.render_hash);
-    fflush(stdout);
+    text_print(verification,
+               "  tier %c: %zu of %zu case%s passed, in %.1f s; kernels: trace %016" PRIx64
+               ", render %016" PRIx64 "\n",
+               verification->tier, count - records_count(record, has_failed), count, text_plural(count),
+               record->seconds, record->kernels.trace_hash, record->kernels.render_hash);
 }
 
-static void precision_add_json(Json *json, const PrecisionRecord *record, Precision precision,
-                               const VerifyOptions *options)
+static void precision_json(Json *json, const PrecisionRecord *record, Precision precision,
+                           const VerifyOptions *options)
 {
     const RenderSettings settings = precision_settings(options, precision);
     const char tier[] = {(char)('A' + verify_tier(&settings)), '\0'};
@@ -292,7 +279,7 @@ static void precision_add_json(Json *json, const PrecisionRecord *record, Precis
     json_text(json, "tier", tier);
     json_begin_array(json, "cases");
     for (size_t i = 0; i < VERIFY_CASES_MAX; i++)
-        if (has_ended(&record->cases[i])) record_add_json(json, &record->cases[i]);
+        if (has_ended(&record->cases[i])) record_json(json, &record->cases[i]);
     json_end(json);
     const size_t failed = records_count(record, has_failed);
     json_int64(json, "lanes", record->kernels.lanes);
@@ -314,7 +301,7 @@ static Json *journal_json(const Verification *verification)
     json_begin_array(json, "precisions");
     for (Precision precision = 0; precision < ARITHMETIC_COUNT; precision++) {
         const PrecisionRecord *record = &verification->journal->precisions[precision];
-        if (record->is_started) precision_add_json(json, record, precision, options);
+        if (record->is_started) precision_json(json, record, precision, options);
     }
     json_end(json);
     return json;
@@ -347,11 +334,9 @@ static int device_verify(Verification *verification, Compute *compute)
     if (options->common.has_precision && !journal->is_headed &&
         !arithmetic_is_suitable(compute, options, first))
         return EXIT_USER;
-    if (verification->has_text && !journal->is_headed) {
-        printf("%s; reference of %d bits%s\n", compute->device->name, verify_reference_bits(),
-               options->quick ? "; quick" : "");
-        fflush(stdout);
-    }
+    if (!journal->is_headed)
+        text_print(verification, "%s; reference of %d bits%s\n", compute->device->name,
+                   verify_reference_bits(), options->quick ? "; quick" : "");
     journal->is_headed = true;
     verification->row_count = verification->case_count * (size_t)(last - first + 1);
     size_t failed = 0;
