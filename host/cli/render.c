@@ -20,28 +20,21 @@ static char *frame_name_make(const char *pattern, uint32_t frame)
     return text_format("%.*s%0*u%s", (int)(place.start - pattern), pattern, place.digits, frame, place.end);
 }
 
-// Returns the path of a frame's image. The caller frees it.
-static char *frame_path_make(const RenderOptions *options, uint32_t frame)
+// Returns the path of an image. The caller frees it.
+static char *image_path_make(const RenderOptions *options, size_t index)
 {
     const char *output = options->output.path;
+    const bool is_frame = options->frame_count > 0;
+    const uint32_t frame = options->first_frame + (uint32_t)index;
     if (options->has_format) return memory_copy_text(output);
-    if (output && (frame_place_of(output).start || !output_is_folder(output)))
+    if (output && is_frame && (frame_place_of(output).start || !output_is_folder(output)))
         return frame_name_make(output, frame);
-    char *name = image_output_default_path(options->scenes.items[0]);
-    char *path = text_format("%s%s%.*s-%04u.png", output ? output : "", output ? "/" : "",
-                             (int)(strlen(name) - strlen(".png")), name, frame);
-    free(name);
-    return path;
-}
-
-// Returns the path of a scene's image. The caller frees it.
-static char *path_make(const RenderOptions *options, const char *scene)
-{
-    const char *output = options->output.path;
-    if (output && (options->scenes.count == 1 || options->has_format)) return memory_copy_text(output);
-    char *name = image_output_default_path(scene);
-    if (!output) return name;
-    char *path = text_format("%s/%s", output, name);
+    if (output && !is_frame && options->scenes.count == 1) return memory_copy_text(output);
+    char *name = image_output_default_path(options->scenes.items[is_frame ? 0 : index]);
+    if (is_frame) name[strlen(name) - strlen(".png")] = '\0';
+    char *ending = is_frame ? text_format("-%04u.png", frame) : memory_copy_text("");
+    char *path = text_format("%s%s%s%s", output ? output : "", output ? "/" : "", name, ending);
+    free(ending);
     free(name);
     return path;
 }
@@ -60,14 +53,6 @@ static bool paths_differ(char *const *paths, const RenderOptions *options)
     return true;
 }
 
-struct RenderCommand {
-    RenderOptions options;
-    size_t count; // images: scenes, or frames of one
-    char **paths; // one of each
-    RenderDevices open;
-    int status;
-};
-
 RenderCommand *render_command_open(int argument_count, char **arguments, int *status)
 {
     RenderOptions options;
@@ -78,9 +63,7 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
     command->count = options.frame_count > 0 ? options.frame_count : options.scenes.count;
     command->paths = memory_allocate(command->count, sizeof *command->paths);
     for (size_t i = 0; i < command->count; i++)
-        command->paths[i] = options.frame_count > 0
-                                ? frame_path_make(&options, options.first_frame + (uint32_t)i)
-                                : path_make(&options, options.scenes.items[i]);
+        command->paths[i] = image_path_make(&options, i);
     if (paths_differ(command->paths, &options)) return command;
     render_command_close(command);
     *status = EXIT_USER;
@@ -121,30 +104,9 @@ bool render_command_check_overwrites(RenderCommand *command)
     return true;
 }
 
-void render_command_choose_device(RenderCommand *command, size_t number)
-{
-    command->open.is_single = true;
-    command->open.number = number;
-}
-
-size_t render_command_count(const RenderCommand *command)
-{
-    return command->count;
-}
-
 const char *render_command_scene(const RenderCommand *command, size_t index)
 {
     return command->options.scenes.items[command->options.frame_count > 0 ? 0 : index];
-}
-
-const char *render_command_path(const RenderCommand *command, size_t index)
-{
-    return command->paths[index];
-}
-
-bool render_command_reports_to_stdout(const RenderCommand *command)
-{
-    return timing_uses_stdout(command->options.timing);
 }
 
 bool render_command_open_devices(RenderCommand *command)
@@ -181,11 +143,6 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     const int status = image_file_render(of_image, command->paths[index], open, ranks);
     free(checkpoint);
     return render_devices_work(open) ? status : EXIT_MACHINE;
-}
-
-bool render_command_is_unfit(const RenderCommand *command)
-{
-    return command->open.is_unfit;
 }
 
 void render_command_record(RenderCommand *command, int status)

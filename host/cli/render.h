@@ -1,15 +1,20 @@
 // Runs glint render scene by scene, with other ranks' devices or as one of several processes.
 #pragma once
 
-#include "host/cli/ranks.h"
+#include "host/cli/render_devices.h"
+#include "host/cli/render_options.h"
 
-typedef struct RenderCommand RenderCommand;
+typedef struct {
+    RenderOptions options;
+    size_t count;       // images: scenes, or frames of one
+    char **paths;       // of the images
+    RenderDevices open; // is_single and number may be set before it is opened
+    int status;         // of the images so far
+} RenderCommand;
 
 // Reads the command line. Returns NULL if help was requested or a mistake was printed; *status is then the
 // exit status.
 RenderCommand *render_command_open(int argument_count, char **arguments, int *status);
-// Restricts the command to one device, the one at `number` modulo the number of devices.
-void render_command_choose_device(RenderCommand *command, size_t number);
 
 // Returns false with a message, before anything is rendered, if an image would overwrite a file that one of
 // several scenes is read from. Reads those scenes whose image exists.
@@ -17,16 +22,10 @@ bool render_command_check_overwrites(RenderCommand *command);
 // Opens the devices before the first scene is read. Returns false with a message if there is none.
 bool render_command_open_devices(RenderCommand *command);
 
-size_t render_command_count(const RenderCommand *command); // the number of images: scenes, or frames of one
 const char *render_command_scene(const RenderCommand *command, size_t index);
-const char *render_command_path(const RenderCommand *command, size_t index); // the image
-bool render_command_reports_to_stdout(const RenderCommand *command);
 
 // Renders one image and returns its exit status. `ranks` may be NULL.
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);
-// Returns whether the last scene or the settings did not fit a device. That is the user's mistake if all
-// devices are alike.
-bool render_command_is_unfit(const RenderCommand *command);
 // Merges a scene's status into the command's.
 void render_command_record(RenderCommand *command, int status);
 // Renders the scenes from `first` on until the command ends, and merges their statuses. This must be the

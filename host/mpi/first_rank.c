@@ -257,7 +257,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
         arguments[1] = name;
         RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
         if (command) {
-            render_command_choose_device(command, 0);
+            command->open.is_single = true;
             if (render_command_check_overwrites(command)) {
                 const size_t dealt = frames_deal(command, other_count, argument_count, arguments);
                 render_command_run_from(command, dealt, &ranks);

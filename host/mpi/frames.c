@@ -20,7 +20,7 @@ enum { FRAME_UNFIT = 256 };
 static int frame_render(RenderCommand *command, size_t frame)
 {
     const int status = render_command_run(command, frame, NULL);
-    return status == EXIT_USER && render_command_is_unfit(command) ? FRAME_UNFIT : status;
+    return status == EXIT_USER && command->open.is_unfit ? FRAME_UNFIT : status;
 }
 
 // Tests whether the files are shared.
@@ -40,8 +40,8 @@ static uint64_t files_hash(const RenderCommand *command, Call call)
     uint64_t hash = HASH_START;
     for (int i = 2; i < call.argument_count; i++)
         hash = hash_bytes(hash, call.arguments[i], strlen(call.arguments[i]) + 1);
-    for (size_t i = 0; i < render_command_count(command); i++) {
-        const char *scene = render_command_scene(command, i), *path = render_command_path(command, i);
+    for (size_t i = 0; i < command->count; i++) {
+        const char *scene = render_command_scene(command, i), *path = command->paths[i];
         struct stat file = {0};
         if (stat(scene, &file) != 0) file.st_size = -1;
         const uint64_t facts[] = {file.st_ino, (uint64_t)file.st_size, (uint64_t)file.st_mtim.tv_sec,
@@ -55,10 +55,9 @@ static uint64_t files_hash(const RenderCommand *command, Call call)
 // Returns whether standard streams are used, which only one rank can read, or write in order.
 static bool uses_standard_streams(const RenderCommand *command)
 {
-    if (render_command_reports_to_stdout(command)) return true;
-    for (size_t i = 0; i < render_command_count(command); i++)
-        if (strcmp(render_command_scene(command, i), "-") == 0 ||
-            strcmp(render_command_path(command, i), "-") == 0)
+    if (timing_uses_stdout(command->options.timing)) return true;
+    for (size_t i = 0; i < command->count; i++)
+        if (strcmp(render_command_scene(command, i), "-") == 0 || strcmp(command->paths[i], "-") == 0)
             return true;
     return false;
 }
@@ -66,7 +65,7 @@ static bool uses_standard_streams(const RenderCommand *command)
 // Makes a new file in the images' folder. Its name is empty if that fails.
 static void marker_make(const RenderCommand *command, char *name)
 {
-    const char *path = render_command_path(command, 0), *slash = strrchr(path, '/');
+    const char *path = command->paths[0], *slash = strrchr(path, '/');
     const int length =
         snprintf(name, MARKER_BYTES, "%.*s.glint-XXXXXX", slash ? (int)(slash + 1 - path) : 0, path);
     const int descriptor = length < MARKER_BYTES ? mkstemp(name) : -1;
@@ -136,7 +135,7 @@ static bool frame_record(Deal *deal, size_t frame, int status)
         render_command_record(deal->command, status);
     } else {
         array_push(deal->again, frame);
-        deal->end = render_command_count(deal->command);
+        deal->end = deal->command->count;
         deal->workers--;
     }
     if (status == EXIT_INTERRUPTED || deal->workers == 0) deal->has_ended = true;
@@ -229,7 +228,7 @@ static void frames_serve(Deal *deal, size_t other_count)
 
 size_t frames_deal(RenderCommand *command, size_t other_count, int argument_count, char **arguments)
 {
-    const size_t worker_count = other_count + 1, whole = render_command_count(command) / worker_count;
+    const size_t worker_count = other_count + 1, whole = command->count / worker_count;
     if (other_count == 0 || whole == 0) return 0;
     Job job = {.type = JOB_FRAMES};
     broadcast(&job, sizeof job, MPI_COMM_WORLD);
@@ -264,7 +263,10 @@ void frames_work(size_t local_rank, int argument_count, char **arguments)
 {
     int status;
     RenderCommand *command = render_command_open(argument_count - 1, arguments + 1, &status);
-    if (command) render_command_choose_device(command, local_rank);
+    if (command) {
+        command->open.is_single = true;
+        command->open.number = local_rank;
+    }
     if (files_are_shared(command, (Call){argument_count, arguments}, false)) {
         bool has_ended = false;
         status = EXIT_DONE;
