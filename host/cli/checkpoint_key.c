@@ -22,13 +22,15 @@ static void model_append(Text *key, const Rank *rank, uint32_t lanes)
     free(model);
 }
 
-static void devices_append(Text *key, Renderer *const *renderers, size_t count, const Ranks *ranks)
+static void devices_append(Text *key, const ImageOrigin *origin)
 {
-    for (size_t i = 0; i < count; i++) {
+    const Ranks *ranks = origin->ranks;
+    for (size_t i = 0; i < origin->renderer_count; i++) {
         Rank own = {0};
-        rank_set_device(&own, renderer_report(renderers[i])->device);
-        model_append(key, &own, renderer_report(renderers[i])->lanes);
-        const Device *reference = renderer_report(renderers[i])->reference_device;
+        const RenderReport *report = renderer_report(origin->renderers[i]);
+        const Device *reference = report->reference_device;
+        rank_set_device(&own, report->device);
+        model_append(key, &own, report->lanes);
         if (!reference) continue;
         rank_set_device(&own, reference);
         model_append(key, &own, device_lanes(reference, true, 0));
@@ -38,9 +40,9 @@ static void devices_append(Text *key, Renderer *const *renderers, size_t count, 
             model_append(key, &ranks->items[i], ranks->items[i].lanes[PASS_ALL]);
 }
 
-void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,
-                    size_t count, const Ranks *ranks)
+void checkpoint_key(Text *key, const ImageOrigin *origin, unsigned aovs)
 {
+    const RenderSettings *settings = origin->settings;
     text_appendf(key, "glint: %s\n", glint_version());
     text_appendf(key, "kernels: %016llx\n", kernels_hash());
     text_appendf(key, "precision: %s\n", precision_names[settings->precision]);
@@ -55,8 +57,8 @@ void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Re
         if (aovs >> layer & 1) text_appendf(key, " %s", layer_names[layer]);
     text_appendf(key, "\nperturb: %u:%u\n", settings->perturb_seed, settings->perturb_scale);
     text_appendf(key, "BVH: %s\n", bvh_choice_names[settings->bvh]);
-    const char *build_options = renderer_report(renderers[0])->device->build_options;
+    const char *build_options = renderer_report(origin->renderers[0])->device->build_options;
     text_appendf(key, "build options: %s\n", build_options ? build_options : "");
-    if (settings->precision != PRECISION_STRICT) devices_append(key, renderers, count, ranks);
-    text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_scene_hash(renderers[0]));
+    if (settings->precision != PRECISION_STRICT) devices_append(key, origin);
+    text_appendf(key, "scene: %016llx\n", (unsigned long long)renderer_scene_hash(origin->renderers[0]));
 }

@@ -2,9 +2,8 @@
 #pragma once
 
 #include "host/base/text.h"
-#include "host/cli/ranks.h"
+#include "host/cli/image_notes.h"
 
 // Appends the key of an image. The renderers must be open, with settings.hashes_scene. At `strict` any device
-// may resume the render; at other precisions only devices of the same models may. `ranks` may be NULL.
-void checkpoint_key(Text *key, const RenderSettings *settings, unsigned aovs, Renderer *const *renderers,
-                    size_t count, const Ranks *ranks);
+// may resume the render; at other precisions only devices of the same models may.
+void checkpoint_key(Text *key, const ImageOrigin *origin, unsigned aovs);

@@ -19,6 +19,7 @@ typedef struct {
     Shutter shutter;
     HostTimes *times;
     RenderSettings settings;
+    ImageOrigin origin;     // once the renderers are open
     Checkpoint *checkpoint; // NULL without --checkpoint
     ImageOutput *output;    // NULL unless this is the shutter's last time
     MessageList messages;
@@ -71,12 +72,11 @@ static void device_drop(void *context, size_t index)
 static bool checkpoint_start(ImageRender *render)
 {
     const RenderOptions *options = render->options;
-    Renderer *const *renderers = render->open->renderers;
+    const unsigned aovs = image_output_aovs(&options->output);
     if (!options->checkpoint) return true;
     Text key = {0};
-    checkpoint_key(&key, &render->settings, image_output_aovs(&options->output), renderers,
-                   render->open->devices.count, render->ranks);
-    const FilmHeader film = renderer_film_header(renderers[0], image_output_aovs(&options->output));
+    checkpoint_key(&key, &render->origin, aovs);
+    const FilmHeader film = renderer_film_header(render->origin.renderers[0], aovs);
     render->checkpoint = checkpoint_open(options->checkpoint, text_c(&key), &film, &render->messages);
     text_free(&key);
     return render->checkpoint != NULL;
@@ -98,14 +98,13 @@ static void rest_print(const RenderOptions *options)
 // Adds the warnings of a complete image, or of one of its times.
 static void warnings_add(ImageRender *render)
 {
-    const OpenDevices *devices = &render->open->devices;
-    const size_t device_count = shutter_is_last(&render->shutter) ? devices->count : 0;
+    const size_t device_count = shutter_is_last(&render->shutter) ? render->origin.renderer_count : 0;
     const uint64_t uncertified = render->times->rerenders.uncertified;
     if (uncertified > 0)
         message_warning(&render->messages, "%" PRIu64 " sample%s uncertified, as at precision double",
                         uncertified, uncertified == 1 ? " is" : "s are");
     for (size_t i = 0; i < device_count; i++) {
-        const RenderReport *report = renderer_report(render->open->renderers[i]);
+        const RenderReport *report = renderer_report(render->origin.renderers[i]);
         if (report->is_out_of_line)
             message_warning(
                 &render->messages,
@@ -135,19 +134,15 @@ static bool files_write(ImageRender *render, bool is_whole)
 static bool bands_render(ImageRender *render)
 {
     RenderOptions *options = render->options;
-    OpenDevices *devices = &render->open->devices;
-    Renderer *const *renderers = render->open->renderers;
+    const ImageOrigin *origin = &render->origin;
     Ranks *ranks = render->ranks;
     HostTimes *times = render->times;
     const bool is_last = shutter_is_last(&render->shutter);
-    if (is_last)
-        render->output = image_output_open(&options->output,
-                                           &(ImageOrigin){options->scene, render->scene, &render->settings,
-                                                          renderers, devices->count, ranks});
+    if (is_last) render->output = image_output_open(&options->output, origin);
     const unsigned aovs = is_last ? image_output_aovs(&options->output) : 0;
-    if (ranks) ranks->film = renderer_film_header(renderers[0], aovs);
-    const RenderJob job = {.renderers = renderers,
-                           .count = devices->count,
+    if (ranks) ranks->film = renderer_film_header(origin->renderers[0], aovs);
+    const RenderJob job = {.renderers = origin->renderers,
+                           .count = origin->renderer_count,
                            .aovs = aovs,
                            .sink = band_receive,
                            .dropped = device_drop,
@@ -180,8 +175,7 @@ static int image_render(ImageRender *render)
     if (render->ranks && is_last && options->timing == TIMING_TRACE)
         fprintf(stderr, "glint: --timing=trace covers only the first rank's devices\n");
     if (is_whole && is_last && options->timing != TIMING_NONE)
-        timing_print(options->timing, render->open->renderers, render->open->devices.count, render->ranks,
-                     &render->settings, render->times);
+        timing_print(options->timing, &render->origin, render->times);
     return is_whole                 ? EXIT_DONE
            : is_faulty              ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
            : progress_interrupted() ? EXIT_INTERRUPTED
@@ -233,6 +227,8 @@ static int time_render(ImageRender *render)
     if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
+        render->origin = (ImageOrigin){
+            options->scene, scene, settings, render->open->renderers, render->open->devices.count, ranks};
         const bool can_start = has_started && checkpoint_start(render);
         if (ranks) ranks->start(can_start);
         if (can_start) status = image_render(render);
@@ -333,8 +329,7 @@ int image_file_render(RenderOptions options, const char *path, RenderDevices *op
     MessageList printed = {0};
     if (image_output_path_known(path) && scene_open_once(&scene, options.scene, common, &printed) &&
         !image_output_overwrites_scene(&options.output, &scene, options.scene)) {
-        HostTimes times = {.scene = options.scene,
-                           .frame = options.frame_count > 0 ? common->frame : NAN,
+        HostTimes times = {.frame = options.frame_count > 0 ? common->frame : NAN,
                            .is_several = options.has_several,
                            .parse_seconds = clock_seconds() - start,
                            .stage = common->stage};

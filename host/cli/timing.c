@@ -121,21 +121,22 @@ static void rerenders_print(RerenderCounts counts, const RenderSettings *setting
             (unsigned long long)counts.uncertified);
 }
 
-static void text_print(Renderer *const *renderers, size_t count, const Ranks *ranks,
-                       const RenderSettings *settings, const HostTimes *host)
+static void text_print(const ImageOrigin *origin, const HostTimes *host)
 {
+    const RenderSettings *settings = origin->settings;
+    const Ranks *ranks = origin->ranks;
     fprintf(stderr, "%ux%u, %u sample%s per pixel, precision %s\n", settings->region_width,
             settings->region_height, settings->sample_count, text_plural(settings->sample_count),
             precision_names[settings->precision]);
     rerenders_print(host->rerenders, settings);
     line_print("parse", host->parse_seconds, "");
     if (host->pilot) pilot_print(host->pilot);
-    for (size_t i = 0; i < count; i++) {
-        const RenderReport *report = renderer_report(renderers[i]);
+    for (size_t i = 0; i < origin->renderer_count; i++) {
+        const RenderReport *report = renderer_report(origin->renderers[i]);
         fprintf(stderr, "%s, %u lane%s (kernel %016llx)\n", report->device->name, report->lanes,
                 text_plural(report->lanes), (unsigned long long)report->kernel_hash);
         passports_remark(report->device, stderr);
-        if (count > 1 || ranks) share_print(&report->share, settings);
+        if (origin->renderer_count > 1 || ranks) share_print(&report->share, settings);
         device_print(report);
     }
     for (size_t i = 0; ranks && i < ranks->remote.count; i++) {
@@ -252,11 +253,11 @@ static void pilot_json(Json *json, const Pilot *pilot)
     json_end(json);
 }
 
-static void json_report(Renderer *const *renderers, size_t count, const Ranks *ranks,
-                        const RenderSettings *settings, const HostTimes *host)
+static void json_report(const ImageOrigin *origin, const HostTimes *host)
 {
+    const RenderSettings *settings = origin->settings;
     Json *json = report_json_open(4, NULL);
-    json_text(json, "scene", host->scene);
+    json_text(json, "scene", origin->scene_path);
     if (!isnan(host->frame)) json_number(json, "frame", host->frame);
     size_json(json, settings->region_width, settings->region_height);
     json_int64(json, "samples", settings->sample_count);
@@ -268,10 +269,10 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
     json_number(json, "parse_ms", 1e3 * host->parse_seconds);
     if (host->pilot) pilot_json(json, host->pilot);
     json_begin_array(json, "by_device");
-    for (size_t i = 0; i < count; i++)
-        render_device_json(json, renderer_report(renderers[i]), settings);
+    for (size_t i = 0; i < origin->renderer_count; i++)
+        render_device_json(json, renderer_report(origin->renderers[i]), settings);
     json_end(json);
-    if (ranks) ranks_json(json, ranks, settings);
+    if (origin->ranks) ranks_json(json, origin->ranks, settings);
     json_number(json, "render_ms", 1e3 * host->render_seconds);
     json_number(json, "encode_ms", 1e3 * host->encode_seconds);
     if (host->is_several)
@@ -280,13 +281,12 @@ static void json_report(Renderer *const *renderers, size_t count, const Ranks *r
         json_print(json, stdout);
 }
 
-void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,
-                  const RenderSettings *settings, const HostTimes *host)
+void timing_print(TimingStyle style, const ImageOrigin *origin, const HostTimes *host)
 {
     if (style == TIMING_JSON)
-        json_report(renderers, count, ranks, settings, host);
+        json_report(origin, host);
     else if (style == TIMING_TRACE)
-        timing_trace_print(renderers, count, host->stage);
+        timing_trace_print(origin->renderers, origin->renderer_count, host->stage);
     else
-        text_print(renderers, count, ranks, settings, host);
+        text_print(origin, host);
 }

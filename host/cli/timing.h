@@ -1,7 +1,7 @@
 // Reports the time of every stage and launch of a render, as text, JSON or a trace.
 #pragma once
 
-#include "host/cli/ranks.h"
+#include "host/cli/image_notes.h"
 #include "host/measure/pilot.h"
 
 typedef enum { TIMING_NONE, TIMING_TEXT, TIMING_JSON, TIMING_TRACE } TimingStyle;
@@ -13,7 +13,6 @@ static inline bool timing_uses_stdout(TimingStyle style)
 }
 
 typedef struct {
-    const char *scene;
     double frame;    // NAN without --frames
     bool is_several; // a JSON report is one line of several
     double parse_seconds, encode_seconds;
@@ -23,7 +22,6 @@ typedef struct {
     Stage *stage;             // keeps its spans; NULL unless they are wanted
 } HostTimes;
 
-// Prints the times of all renderers of the image. `ranks`, which rendered parts of it, may be NULL. Text goes
-// to stderr, JSON and the trace to stdout.
-void timing_print(TimingStyle style, Renderer *const *renderers, size_t count, const Ranks *ranks,
-                  const RenderSettings *settings, const HostTimes *host);
+// Prints the times of all renderers and ranks of the image. Text goes to stderr, JSON and the trace to
+// stdout.
+void timing_print(TimingStyle style, const ImageOrigin *origin, const HostTimes *host);
