@@ -13,7 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-typedef enum { LIMIT_RMSE, LIMIT_FLIP, LIMIT_OFF, LIMIT_ULP, LIMIT_COUNT } LimitType;
+enum { LIMIT_RMSE, LIMIT_FLIP, LIMIT_OFF, LIMIT_ULP, LIMIT_COUNT };
 
 static const struct {
     const char *name, *quantity, *needed; // the option is --max-NAME; `needed` is NULL if any values suit
@@ -80,6 +80,11 @@ static const CommandLine command_line = {
 typedef struct {
     Image reference, test;
     ImageMetrics metrics;
+    struct {
+        bool is_given, is_met;
+        double value; // the figure that it bounds
+    } limits[LIMIT_COUNT];
+    bool has_limits, passes;
 } ComparedImages;
 
 // Returns a channel's value at the worst pixel.
@@ -90,79 +95,65 @@ static double worst_value(const ComparedImages *comparison, const Image *image, 
     return image_value(image, pixel * image->channels + channel);
 }
 
-// Returns the figure that the limit bounds. limit_applies must be true.
-static double limited_value(const ImageMetrics *metrics, LimitType type)
+// Compares the figures with the limits, or without limits the images for equality. Figures exclude values
+// that are finite in only one of the images, so such values exceed every limit. Returns false with a message
+// if the images lack a limit's figure.
+static bool limits_compare(const DiffOptions *options, ComparedImages *comparison, MessageList *messages)
 {
-    switch (type) {
-    case LIMIT_RMSE:
-        return metrics->linear.rmse;
-    case LIMIT_FLIP:
-        return metrics->flip_mean;
-    case LIMIT_OFF:
-        return (double)(metrics->off_by_1 + metrics->off_by_more);
-    default:
-        return metrics->largest_ulp;
+    const ImageMetrics *metrics = &comparison->metrics;
+    const struct {
+        double value;
+        bool exists;
+    } figures[LIMIT_COUNT] = {
+        [LIMIT_RMSE] = {metrics->linear.rmse, true},
+        [LIMIT_FLIP] = {metrics->flip_mean, metrics->has_color},
+        [LIMIT_OFF] = {(double)(metrics->off_by_1 + metrics->off_by_more), metrics->has_color},
+        [LIMIT_ULP] = {metrics->largest_ulp, metrics->has_ulp},
+    };
+    bool are_met = true;
+    for (size_t i = 0; i < LIMIT_COUNT; i++) {
+        if (options->limits[i] < 0) continue;
+        if (!figures[i].exists)
+            return message_error(messages, "--max-%s: \"%s\" and \"%s\" do not both have %s",
+                                 limit_types[i].name, options->reference_path, options->test_path,
+                                 limit_types[i].needed);
+        comparison->has_limits = comparison->limits[i].is_given = true;
+        comparison->limits[i].value = figures[i].value;
+        comparison->limits[i].is_met =
+            metrics->unmatched_count == 0 && figures[i].value <= options->limits[i];
+        are_met = are_met && comparison->limits[i].is_met;
     }
+    comparison->passes = comparison->has_limits ? are_met : metrics->differing_count == 0;
+    return true;
 }
 
-static bool limit_applies(const ImageMetrics *metrics, LimitType type)
+static void limits_json(Json *json, const DiffOptions *options, const ComparedImages *comparison)
 {
-    return type == LIMIT_RMSE || (type == LIMIT_ULP ? metrics->has_ulp : metrics->has_color);
-}
-
-// The figures exclude values that are finite in only one of the images, so such values exceed every limit.
-static bool limit_is_met(const DiffOptions *options, const ImageMetrics *metrics, LimitType type)
-{
-    return metrics->unmatched_count == 0 && limited_value(metrics, type) <= options->limits[type];
-}
-
-static bool has_limit(const DiffOptions *options, LimitType type)
-{
-    return options->limits[type] >= 0;
-}
-
-static bool has_limits(const DiffOptions *options)
-{
-    bool has_any = false;
-    for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        has_any |= has_limit(options, i);
-    return has_any;
-}
-
-static bool limits_are_met(const DiffOptions *options, const ImageMetrics *metrics)
-{
-    bool met = true;
-    for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        met &= !has_limit(options, i) || limit_is_met(options, metrics, i);
-    return met;
-}
-
-static void limits_json(Json *json, const DiffOptions *options, const ImageMetrics *metrics)
-{
-    if (!has_limits(options)) return;
+    if (!comparison->has_limits) return;
     json_begin_object(json, "limits");
-    for (unsigned i = 0; i < LIMIT_COUNT; i++) {
-        if (!has_limit(options, i)) continue;
+    for (size_t i = 0; i < LIMIT_COUNT; i++) {
+        if (!comparison->limits[i].is_given) continue;
         json_begin_object(json, limit_types[i].name);
         json_number(json, "limit", options->limits[i]);
-        json_number(json, "value", limited_value(metrics, i));
-        json_bool(json, "met", limit_is_met(options, metrics, i));
+        json_number(json, "value", comparison->limits[i].value);
+        json_bool(json, "met", comparison->limits[i].is_met);
         json_end(json);
     }
     json_end(json);
-    json_bool(json, "met", limits_are_met(options, metrics));
+    json_bool(json, "met", comparison->passes);
 }
 
-static void limits_print(const DiffOptions *options, const ImageMetrics *metrics)
+static void limits_print(const DiffOptions *options, const ComparedImages *comparison)
 {
-    for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        if (has_limit(options, i))
-            printf("  %-10s --max-%s %.6g: %s %.6g\n", limit_is_met(options, metrics, i) ? "met" : "exceeded",
+    const size_t unmatched = comparison->metrics.unmatched_count;
+    for (size_t i = 0; i < LIMIT_COUNT; i++)
+        if (comparison->limits[i].is_given)
+            printf("  %-10s --max-%s %.6g: %s %.6g\n", comparison->limits[i].is_met ? "met" : "exceeded",
                    limit_types[i].name, options->limits[i], limit_types[i].quantity,
-                   limited_value(metrics, i));
-    if (has_limits(options) && metrics->unmatched_count > 0)
-        printf("  exceeded   every limit: %zu %s not finite and not the same in both\n",
-               metrics->unmatched_count, metrics->unmatched_count == 1 ? "value is" : "values are");
+                   comparison->limits[i].value);
+    if (comparison->has_limits && unmatched > 0)
+        printf("  exceeded   every limit: %zu %s not finite and not the same in both\n", unmatched,
+               unmatched == 1 ? "value is" : "values are");
 }
 
 static const char *kind_word(const Image *image)
@@ -243,7 +234,7 @@ static Json *diff_json(const DiffOptions *options, const ComparedImages *compari
         json_number(json, "black", metrics->linear.largest * pow(10, -HEATMAP_DECADES));
         json_end(json);
     }
-    limits_json(json, options, metrics);
+    limits_json(json, options, comparison);
     return json;
 }
 
@@ -296,7 +287,7 @@ static void text_print(const DiffOptions *options, const ComparedImages *compari
         printf("  nonfinite pixels: %zu and %zu; excluded from the figures\n", metrics->nonfinite_reference,
                metrics->nonfinite_test);
     if (metrics->differing_count > 0) differences_print(options, comparison);
-    limits_print(options, metrics);
+    limits_print(options, comparison);
 }
 
 static bool heatmap_make(const DiffOptions *options, const ComparedImages *comparison, MessageList *messages)
@@ -325,11 +316,7 @@ static bool images_compare(const DiffOptions *options, ComparedImages *compariso
         !image_comparable(&comparison->reference, &comparison->test, messages))
         return false;
     comparison->metrics = image_metrics(&comparison->reference, &comparison->test);
-    for (unsigned i = 0; i < LIMIT_COUNT; i++)
-        if (has_limit(options, i) && !limit_applies(&comparison->metrics, i))
-            return message_error(messages, "--max-%s: \"%s\" and \"%s\" do not both have %s",
-                                 limit_types[i].name, options->reference_path, options->test_path,
-                                 limit_types[i].needed);
+    if (!limits_compare(options, comparison, messages)) return false;
     return !options->heatmap_path || heatmap_make(options, comparison, messages);
 }
 
@@ -349,7 +336,5 @@ int command_diff(int argument_count, char **arguments)
     image_free(&comparison.reference);
     image_free(&comparison.test);
     if (!compared || !is_written) return EXIT_USER;
-    const bool passes = has_limits(&options) ? limits_are_met(&options, &comparison.metrics)
-                                             : comparison.metrics.differing_count == 0;
-    return passes ? EXIT_DONE : EXIT_CHECK;
+    return comparison.passes ? EXIT_DONE : EXIT_CHECK;
 }
