@@ -187,6 +187,21 @@ static RowComparison *rows_compare(const Bench *bench, const Baseline *baseline)
     return comparisons;
 }
 
+// Warns if the baseline was measured elsewhere.
+static void baseline_warn(const Baseline *baseline, const Device *device)
+{
+    const char *board = baseline->board;
+    struct utsname host = {0};
+    uname(&host);
+    if (strcmp(baseline->device, device->name) != 0)
+        fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
+                baseline->device);
+    else if (board[0] != '\0' && strcmp(board, device->board) != 0)
+        fprintf(stderr, "glint bench: the baseline was measured on another board, \"%s\"\n", board);
+    if (strcmp(baseline->host, host.nodename) != 0)
+        fprintf(stderr, "glint bench: the baseline was measured on another host, \"%s\"\n", baseline->host);
+}
+
 static int bench_print(const Bench *bench, const Baseline *baseline)
 {
     const BenchOptions *options = &bench->options;
@@ -207,17 +222,7 @@ static int bench_print(const Bench *bench, const Baseline *baseline)
         fputs("glint bench: no row could be measured\n", stderr);
         status = EXIT_USER;
     } else if (baseline) {
-        const char *board = baseline->board;
-        if (strcmp(baseline->device, device->name) != 0)
-            fprintf(stderr, "glint bench: the baseline was measured on another device, \"%s\"\n",
-                    baseline->device);
-        else if (board[0] != '\0' && strcmp(board, device->board) != 0)
-            fprintf(stderr, "glint bench: the baseline was measured on another board, \"%s\"\n", board);
-        struct utsname host = {0};
-        uname(&host);
-        if (strcmp(baseline->host, host.nodename) != 0)
-            fprintf(stderr, "glint bench: the baseline was measured on another host, \"%s\"\n",
-                    baseline->host);
+        baseline_warn(baseline, device);
         status = comparisons_status(comparisons, set->count, options->baseline);
     }
     free(comparisons);

@@ -294,10 +294,8 @@ int command_certify(int argument_count, char **arguments)
     OpenDevice open;
     status = EXIT_USER;
     if (scene_open(&scene, options.scene, &options.common) && device_open(&open, &options.common)) {
-        Progress progress;
-        progress_open(&progress, true); // so that signals only set the flag
+        progress_flag_signals();
         status = device_close(&open, scene_certify(&options, &scene, &open));
-        progress_close(&progress);
     }
     scene_free(&scene);
     return status;

@@ -336,11 +336,9 @@ int command_golden(int argument_count, char **arguments)
     OpenDevice open;
     status = EXIT_USER;
     if (is_read && device_open(&open, &options.common)) {
-        Progress progress;
-        progress_open(&progress, true); // so that signals only set the flag
+        progress_flag_signals();
         status = options.writes ? scenes_write(&file, &options, &open.compute)
                                 : scenes_check(&file, &options, &open.compute);
-        progress_close(&progress);
         status = device_close(&open, status);
     }
     golden_file_free(&file);

@@ -42,7 +42,7 @@ void progress_open(Progress *progress, bool quiet)
     double now = clock_seconds();
     *progress =
         (Progress){.visible = !quiet && isatty(STDERR_FILENO), .opened_seconds = now, .shown_seconds = now};
-    is_flag_read = 1;
+    progress_flag_signals();
 }
 
 void progress_hold_signals(void)
@@ -53,6 +53,11 @@ void progress_hold_signals(void)
 void progress_release_signals(void)
 {
     is_held = 0;
+}
+
+void progress_flag_signals(void)
+{
+    is_flag_read = 1;
 }
 
 void progress_end_at_once(void)

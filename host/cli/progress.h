@@ -26,7 +26,8 @@ void progress_step(Progress *progress, double fraction_done, const char *format,
 // Makes the signals set a flag until they are released, even if progress_end_at_once is called.
 void progress_hold_signals(void);
 void progress_release_signals(void);
-// Makes signals end the process at once, until progress_open is called.
+// Makes signals set a flag, as progress_open does, or end the process at once.
+void progress_flag_signals(void);
 void progress_end_at_once(void);
 // Erases the line. Signals still only set the flag.
 void progress_close(Progress *progress);

@@ -186,11 +186,9 @@ static int image_render(ImageRender *render)
 static int precision_choose(ImageRender *render, Pilot *pilot)
 {
     const RenderOptions *options = render->options;
-    Progress progress;
-    progress_open(&progress, true); // so that signals only set the flag
+    progress_flag_signals();
     const bool chosen = pilot_run(pilot, &options->budget, render->open->devices.items[0].compute,
                                   render->scene, &render->settings, &render->messages);
-    progress_close(&progress);
     const bool is_unfit = render->messages.count > 0;
     messages_print_once(&render->messages, render->printed, NULL);
     if (!chosen) return is_unfit ? EXIT_USER : progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;

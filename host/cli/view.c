@@ -88,8 +88,7 @@ static int window_show(ViewOptions *options, const Device *device)
     window.frames.settings.sample_count = options->sample_count;
     window.frames.settings.shift_to_eye = true;
     window.frames.settings.moves = true;
-    Progress progress;
-    progress_open(&progress, true); // so that signals only set the flag
+    progress_flag_signals();
     switch (window_run(&window)) {
     case WINDOW_CLOSED:
         return EXIT_DONE;
