@@ -167,8 +167,7 @@ static bool film_keep(Accuracy *accuracy, size_t scene, const AccuracyVariant *v
 {
     if (!accuracy->options.folder) return true;
     const AccuracyReport report = report_of(accuracy);
-    Text prefix = {0};
-    accuracy_saved_prefix(&prefix, &report, scene, variant);
+    Text prefix = accuracy_saved_prefix(&report, scene, variant);
     bool saved = film_save(film, text_c(&prefix), &accuracy->messages);
     text_free(&prefix);
     return saved;
@@ -243,7 +242,7 @@ static void scenes_prepare(Accuracy *accuracy)
     const VariantSet *set = &accuracy->set;
     accuracy->scenes = memory_allocate_zeroed(set->scene_count, sizeof *accuracy->scenes);
     for (size_t i = 0; i < set->count; i++) {
-        AccuracyScene *scene = &accuracy->scenes[set->scene_indices[i]];
+        AccuracyScene *scene = &accuracy->scenes[set->variants[i].scene - set->scenes];
         if (!scene->variants) {
             const Scene *source = set->variants[i].scene;
             const RenderSettings *settings = &set->variants[i].settings;

@@ -23,26 +23,23 @@ const ResultTable accuracy_table = {
 
 static const char is_reference[] = "it is the reference that the others are compared with, and has no errors";
 
-void accuracy_saved_prefix(Text *text, const AccuracyReport *report, size_t scene,
-                           const AccuracyVariant *variant)
+Text accuracy_saved_prefix(const AccuracyReport *report, size_t scene, const AccuracyVariant *variant)
 {
+    Text text = {0};
     const char *name = file_base_name(report->scenes[scene].path), *dot = strrchr(name, '.');
     size_t length = dot && dot > name ? (size_t)(dot - name) : strlen(name);
-    text_appendf(text, "%s/%zu-%.*s", report->folder, scene, (int)length, name);
+    text_appendf(&text, "%s/%zu-%.*s", report->folder, scene, (int)length, name);
     if (variant)
-        text_appendf(text, "-%s-%u-%s-%u", variant->row->key.precision, variant->row->key.lanes,
+        text_appendf(&text, "-%s-%u-%s-%u", variant->row->key.precision, variant->row->key.lanes,
                      variant->row->key.bvh, variant->samples);
     else
-        text_appendf(text, "-reference");
+        text_appendf(&text, "-reference");
+    return text;
 }
 
 static void saved_json(Json *json, const AccuracyReport *report, size_t scene, const AccuracyVariant *variant)
 {
-    if (!report->folder) return;
-    Text prefix = {0};
-    accuracy_saved_prefix(&prefix, report, scene, variant);
-    json_text(json, "saved", text_c(&prefix));
-    text_free(&prefix);
+    if (report->folder) text_json(json, "saved", accuracy_saved_prefix(report, scene, variant));
 }
 
 static void reference_json(Json *json, const AccuracyReport *report, size_t index)
@@ -241,10 +238,7 @@ static void pick_json(Json *json, const AccuracyScene *scene, size_t index)
         }
         json_end(json);
     }
-    Text sentence = {0};
-    accuracy_pick_sentence(&sentence, scene, index);
-    json_text(json, "text", text_c(&sentence));
-    text_free(&sentence);
+    text_json(json, "text", accuracy_pick_sentence(scene, index));
     json_end(json);
 }
 

@@ -2,6 +2,7 @@
 
 #include "host/base/base64.h"
 #include "host/base/memory.h"
+#include "host/cli/report_json.h"
 #include "host/image/heatmap.h"
 #include "host/image/png_bytes.h"
 #include "host/image/transfer.h"
@@ -42,9 +43,8 @@ static void png_json(Json *json, const char *key, const AccuracyScene *scene, co
     png_bytes_append(&png, pixels, scene->width, scene->height, palette, palette ? STEP_COUNT : 0);
     text_appendf(&uri, "data:image/png;base64,");
     base64_append(&uri, (const uint8_t *)png.items, png.count);
-    json_text(json, key, text_c(&uri));
+    text_json(json, key, uri);
     text_free(&png);
-    text_free(&uri);
 }
 
 static bool same_image(const AccuracyScene *scene, const float *a, const float *b)
@@ -104,8 +104,7 @@ static void scene_json(Json *json, const AccuracyScene *scene)
     for (size_t i = 0; i < scene->variant_count; i++) {
         Text name = {0};
         accuracy_variant_name(&name, scene, &scene->variants[i]);
-        json_text(json, NULL, text_c(&name));
-        text_free(&name);
+        text_json(json, NULL, name);
     }
     json_end(json);
     json_begin_array(json, "images");

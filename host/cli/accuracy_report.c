@@ -74,14 +74,9 @@ static void pick_certainty(Text *text, const AccuracyScene *scene, const Accurac
     text_free(&unknown);
 }
 
-void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
+// Appends the picked variant, its time and its error.
+static void pick_append(Text *text, const AccuracyScene *scene, const AccuracyRecommendation *picked)
 {
-    const AccuracyRecommendation *picked = &scene->recommendations[pick];
-    text_appendf(text, "for an error of at most %g: ", picked->budget);
-    if (picked->variant == SIZE_MAX) {
-        text_appendf(text, "none of these");
-        return;
-    }
     const AccuracyVariant *variant = &scene->variants[picked->variant];
     accuracy_variant_name(text, scene, variant);
     text_appendf(text, ", %.3g ms", accuracy_frame_ms(variant));
@@ -97,6 +92,18 @@ void accuracy_pick_sentence(Text *text, const AccuracyScene *scene, size_t pick)
         text_appendf(text, "; %zu pixel%s at silhouettes show%s another object", objects,
                      text_plural(objects), objects == 1 ? "s" : "");
     if (shadows > 0) text_appendf(text, "; %zu wrong at the edges of shadows", shadows);
+}
+
+Text accuracy_pick_sentence(const AccuracyScene *scene, size_t pick)
+{
+    const AccuracyRecommendation *picked = &scene->recommendations[pick];
+    Text text = {0};
+    text_appendf(&text, "for an error of at most %g: ", picked->budget);
+    if (picked->variant == SIZE_MAX)
+        text_appendf(&text, "none of these");
+    else
+        pick_append(&text, scene, picked);
+    return text;
 }
 
 static const char table_head[] =
@@ -204,8 +211,7 @@ void accuracy_print_text(const AccuracyReport *report, FILE *stream)
         fprintf(stream, "  fastest rows, with intervals of %g%% confidence for all together:\n",
                 100 * comparison_confidence);
         for (size_t k = 0; k < scene->recommendation_count; k++) {
-            Text sentence = {0};
-            accuracy_pick_sentence(&sentence, scene, k);
+            Text sentence = accuracy_pick_sentence(scene, k);
             fprintf(stream, "    %s\n", text_c(&sentence));
             text_free(&sentence);
         }

@@ -1,5 +1,6 @@
 #include "host/cli/passport_report.h"
 
+#include "host/cli/report_json.h"
 #include "host/render/arithmetic.h"
 #include <math.h>
 #include <string.h>
@@ -23,9 +24,8 @@ static void properties_json(Json *json, const Passport *passport)
         json_begin_object(json, NULL);
         json_text(json, "name", property_names[property]);
         json_text(json, "finding", finding_names[finding]);
-        json_text(json, "value", text_c(&what));
+        text_json(json, "value", what);
         json_end(json);
-        text_free(&what);
     }
     json_end(json);
 }

@@ -7,6 +7,12 @@
 #include <math.h>
 #include <stdio.h>
 
+void text_json(Json *json, const char *key, Text text)
+{
+    json_text(json, key, text_c(&text));
+    text_free(&text);
+}
+
 void summary_json(Json *json, const char *key, Summary seconds)
 {
     json_begin_object(json, key);
@@ -111,8 +117,7 @@ void build_options_json(Json *json, const RenderReport *report)
 {
     Text options = {0};
     program_options_append(&options, report->device, report->build_options);
-    json_text(json, "build_options", text_c(&options));
-    text_free(&options);
+    text_json(json, "build_options", options);
 }
 
 void device_identity_json(Json *json, const Device *device)

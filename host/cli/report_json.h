@@ -9,6 +9,7 @@
 // Opens a report, whose first members are the version of its schema, that of glint and, unless `device` is
 // NULL, the device.
 Json *report_json_open(int schema, const Device *device);
+void text_json(Json *json, const char *key, Text text);          // frees the text
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
 // Adds the reason for a missing figure to the open object.
 void unavailable_json(Json *json, const char *reason);

@@ -16,36 +16,26 @@ enum {
     COLUMN_LANES,
     COLUMN_BVH,
     COLUMN_SAMPLES,
-    COLUMN_BOUNCES
+    COLUMN_BOUNCES,
+    COLUMN_VARIANT
 };
 
-void side_column_append(Text *text, const BenchKey *key, size_t column)
+Text side_column_text(const BenchKey *key, size_t column)
 {
-    switch (column) {
-    case COLUMN_SCENE:
-        text_appendf(text, "%s", key->scene);
-        break;
-    case COLUMN_SIZE:
-        text_appendf(text, "%ux%u", key->width, key->height);
-        break;
-    case COLUMN_PRECISION:
-        text_appendf(text, "%s", key->precision);
-        break;
-    case COLUMN_LANES:
-        text_appendf(text, "%u", key->lanes);
-        break;
-    case COLUMN_BVH:
-        text_appendf(text, "%s", key->bvh);
-        break;
-    case COLUMN_SAMPLES:
-        text_appendf(text, "%u", key->samples);
-        break;
-    case COLUMN_BOUNCES:
-        text_appendf(text, "%u", key->bounces);
-        break;
-    default:
-        text_appendf(text, "%s", key->variant);
-    }
+    const char *const texts[SIDE_COLUMNS] = {[COLUMN_SCENE] = key->scene,
+                                             [COLUMN_PRECISION] = key->precision,
+                                             [COLUMN_BVH] = key->bvh,
+                                             [COLUMN_VARIANT] = key->variant};
+    const uint32_t numbers[SIDE_COLUMNS] = {
+        [COLUMN_LANES] = key->lanes, [COLUMN_SAMPLES] = key->samples, [COLUMN_BOUNCES] = key->bounces};
+    Text text = {0};
+    if (column == COLUMN_SIZE)
+        text_appendf(&text, "%ux%u", key->width, key->height);
+    else if (texts[column])
+        text_appendf(&text, "%s", texts[column]);
+    else
+        text_appendf(&text, "%u", numbers[column]);
+    return text;
 }
 
 static bool key_equal_but_lanes(const BenchKey *a, const BenchKey *b)
@@ -141,19 +131,17 @@ static void report_compare(SideBySide *side, size_t index)
 static bool column_differs(const SideBySide *side, size_t column)
 {
     const BenchKey *first = &side_first(side, 0)->row->key;
-    Text text = {0}, other = {0};
+    Text text = side_column_text(first, column);
     bool differs = false;
-    side_column_append(&text, first, column);
     for (size_t i = 0; i < side->row_count * side->report_count && !differs; i++) {
         if (!side->cells[i].row) continue;
         const BenchKey *key = &side->cells[i].row->key;
-        other.count = 0;
-        side_column_append(&other, key, column);
+        Text other = side_column_text(key, column);
         differs = column == COLUMN_SCENE ? key->scene_hash != first->scene_hash
                                          : strcmp(text_c(&text), text_c(&other)) != 0;
+        text_free(&other);
     }
     text_free(&text);
-    text_free(&other);
     return differs;
 }
 

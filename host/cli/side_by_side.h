@@ -44,8 +44,9 @@ static inline SideCell *side_cell(const SideBySide *side, size_t row, size_t rep
 {
     return &side->cells[row * side->report_count + report];
 }
-// Appends the value of a column of a row's name. These columns are the names of bench_table.
-void side_column_append(Text *text, const BenchKey *key, size_t column);
+// Returns the value of a column of a row's name, which the caller frees. These columns are the names of
+// bench_table.
+Text side_column_text(const BenchKey *key, size_t column);
 
 void side_by_side_print(const SideBySide *side, FILE *stream);
 Json *side_by_side_json(const SideBySide *side); // what the page draws; the caller closes it

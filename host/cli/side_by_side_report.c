@@ -9,18 +9,19 @@ static char report_letter(size_t report)
     return (char)('A' + report);
 }
 
-// Appends the columns in which rows do not differ, such as "size 160x90, precision single".
-static void constants_append(Text *text, const SideBySide *side)
+// Returns the columns in which rows do not differ, such as "size 160x90, precision single".
+static Text constants_text(const SideBySide *side)
 {
+    Text text = {0};
     for (size_t column = 0; column < SIDE_COLUMNS; column++) {
         if (side->is_shown[column]) continue;
-        Text value = {0};
-        side_column_append(&value, &side_first(side, 0)->row->key, column);
+        Text value = side_column_text(&side_first(side, 0)->row->key, column);
         if (value.count > 0)
-            text_appendf(text, "%s%s %s", text->count > 0 ? ", " : "",
+            text_appendf(&text, "%s%s %s", text.count > 0 ? ", " : "",
                          column_heading(bench_table.names[column]).text, text_c(&value));
         text_free(&value);
     }
+    return text;
 }
 
 // Returns milliseconds with about four digits.
@@ -94,9 +95,8 @@ static void name_append(Text *rows, const SideBySide *side, const BenchKey *key,
 {
     for (size_t column = 0; column < SIDE_COLUMNS; column++) {
         if (!side->is_shown[column]) continue;
-        Text text = {0}, text_above = {0};
-        side_column_append(&text, key, column);
-        if (above) side_column_append(&text_above, above, column);
+        Text text = side_column_text(key, column);
+        Text text_above = above ? side_column_text(above, column) : (Text){0};
         const bool is_repeated = above && (column == 0 || strcmp(text_c(&text), text_c(&text_above)) == 0);
         text_appendf(rows, "%s\t", is_repeated ? "" : text_c(&text));
         text_free(&text);
@@ -118,10 +118,9 @@ static void row_append(Text *rows, const SideBySide *side, size_t row)
 
 void side_by_side_print(const SideBySide *side, FILE *stream)
 {
-    Text constants = {0}, rows = {0}, alignment = {0};
+    Text constants = constants_text(side), rows = {0}, alignment = {0};
     for (size_t i = 0; i < side->report_count; i++)
         report_print(side, i, stream);
-    constants_append(&constants, side);
     if (constants.count > 0) fprintf(stream, "\n%s\n", text_c(&constants));
     text_free(&constants);
     fputc('\n', stream);
@@ -206,11 +205,8 @@ static void row_json(Json *json, const SideBySide *side, size_t row)
     json_begin_object(json, NULL);
     json_begin_array(json, "name");
     for (size_t column = 0; column < SIDE_COLUMNS; column++) {
-        Text text = {0};
-        if (!side->is_shown[column]) continue;
-        side_column_append(&text, &side_first(side, row)->row->key, column);
-        json_text(json, NULL, text_c(&text));
-        text_free(&text);
+        if (side->is_shown[column])
+            text_json(json, NULL, side_column_text(&side_first(side, row)->row->key, column));
     }
     json_end(json);
     json_begin_array(json, "cells");
@@ -223,7 +219,6 @@ static void row_json(Json *json, const SideBySide *side, size_t row)
 Json *side_by_side_json(const SideBySide *side)
 {
     Json *json = json_open();
-    Text constants = {0};
     json_number(json, "confidence", comparison_confidence);
     json_number(json, "tolerance", baseline_tolerance);
     json_begin_array(json, "reports");
@@ -234,9 +229,7 @@ Json *side_by_side_json(const SideBySide *side)
     for (size_t column = 0; column < SIDE_COLUMNS; column++)
         if (side->is_shown[column]) json_text(json, NULL, column_heading(bench_table.names[column]).text);
     json_end(json);
-    constants_append(&constants, side);
-    json_text(json, "constants", text_c(&constants));
-    text_free(&constants);
+    text_json(json, "constants", constants_text(side));
     json_begin_array(json, "rows");
     for (size_t row = 0; row < side->row_count; row++)
         row_json(json, side, row);

@@ -48,7 +48,6 @@ static void variant_add(VariantSet *set, const VariantOptions *options, size_t c
         variant->build_options = options->common.build_options;
         memcpy(variant->work_group, options->common.work_group, sizeof variant->work_group);
     }
-    set->scene_indices[set->count] = scene_index;
     key.precision = precision_names[settings->precision];
     key.bvh = bvh_choice_names[settings->bvh];
     key.lanes = settings->lanes;
@@ -115,7 +114,6 @@ bool variant_set_open(VariantSet *set, const VariantOptions *choices, size_t cho
         .scene_count = count,
         .variants = memory_allocate_zeroed(largest, sizeof *set->variants),
         .rows = memory_allocate_zeroed(largest, sizeof *set->rows),
-        .scene_indices = memory_allocate_zeroed(largest, sizeof *set->scene_indices),
     };
     for (size_t i = 0; i < count; i++) {
         if (!scene_open(&set->scenes[i], paths[i], &choices[0].common)) return false;
@@ -288,7 +286,6 @@ void variant_set_close(VariantSet *set)
     free(set->scenes);
     free(set->variants);
     free(set->rows);
-    free(set->scene_indices);
     calibration_free(&set->calibration);
     *set = (VariantSet){0};
 }

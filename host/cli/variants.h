@@ -37,7 +37,6 @@ typedef struct {
     // Parallel arrays, grouped by scene:
     Variant *variants;
     BenchRow *rows;
-    size_t *scene_indices;
     size_t count;
     size_t rows_before, row_count; // positions in the set that this one is a part of
     Calibration calibration;       // runs before each round of a benchmark
