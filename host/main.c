@@ -15,25 +15,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#define COMMAND_ROW(name, purpose) {#name, command_##name, purpose},
 static const struct {
     const char *name;
     int (*run)(int argument_count, char **arguments);
     const char *purpose;
-} commands[] = {
-    {"render", command_render, "render a scene file to an image"},
-    {"view", command_view, "show a scene in a window"},
-    {"trace", command_trace, "trace explicit rays"},
-    {"check", command_check, "read a scene and report its contents"},
-    {"devices", command_devices, "list OpenCL devices"},
-    {"diff", command_diff, "compare two images"},
-    {"bench", command_bench, "measure speed on a device"},
-    {"accuracy", command_accuracy, "measure speed against error"},
-    {"certify", command_certify, "compare an image with a reference of quadruple precision"},
-    {"verify", command_verify, "run the hard cases on a device"},
-    {"golden", command_golden, "write or check the hashes of images at strict"},
-    {"report", command_report, "write an archive for a bug report, or compare reports of bench"},
-    {"cache", command_cache, "list, check or empty the kernel cache"},
-};
+} commands[] = {COMMAND_LIST(COMMAND_ROW)};
 
 enum { COMMAND_COUNT = COUNT_OF(commands) };
 

@@ -1,16 +1,21 @@
 // The subcommands. Each receives its name as the first argument and returns the exit status.
 #pragma once
 
-int command_render(int argument_count, char **arguments);
-int command_view(int argument_count, char **arguments);
-int command_trace(int argument_count, char **arguments);
-int command_check(int argument_count, char **arguments);
-int command_devices(int argument_count, char **arguments);
-int command_diff(int argument_count, char **arguments);
-int command_bench(int argument_count, char **arguments);
-int command_accuracy(int argument_count, char **arguments);
-int command_certify(int argument_count, char **arguments);
-int command_verify(int argument_count, char **arguments);
-int command_golden(int argument_count, char **arguments);
-int command_report(int argument_count, char **arguments);
-int command_cache(int argument_count, char **arguments);
+// COMMAND(name, purpose)
+#define COMMAND_LIST(COMMAND)                                                                                \
+    COMMAND(render, "render a scene file to an image")                                                       \
+    COMMAND(view, "show a scene in a window")                                                                \
+    COMMAND(trace, "trace explicit rays")                                                                    \
+    COMMAND(check, "read a scene and report its contents")                                                   \
+    COMMAND(devices, "list OpenCL devices")                                                                  \
+    COMMAND(diff, "compare two images")                                                                      \
+    COMMAND(bench, "measure speed on a device")                                                              \
+    COMMAND(accuracy, "measure speed against error")                                                         \
+    COMMAND(certify, "compare an image with a reference of quadruple precision")                             \
+    COMMAND(verify, "run the hard cases on a device")                                                        \
+    COMMAND(golden, "write or check the hashes of images at strict")                                         \
+    COMMAND(report, "write an archive for a bug report, or compare reports of bench")                        \
+    COMMAND(cache, "list, check or empty the kernel cache")
+
+#define COMMAND_DECLARATION(name, purpose) int command_##name(int argument_count, char **arguments);
+COMMAND_LIST(COMMAND_DECLARATION)
