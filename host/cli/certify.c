@@ -56,6 +56,7 @@ typedef struct {
     const Scene *scene;
     Compute *compute;
     CertifySample sample;
+    size_t uncertain_count; // pixels that the reference leaves uncertain
     double reference_seconds;
     struct {
         bool measured;
@@ -84,11 +85,10 @@ static void certified_print(const CertifyErrors *errors, const CertifyUncertifie
 static void text_print(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
-    size_t uncertain = 0, textured = 0;
-    for (size_t i = 0; i < sample->count; i++) {
-        uncertain += reference_is_uncertain(&sample->pixels[i]);
+    const size_t uncertain = certification->uncertain_count;
+    size_t textured = 0;
+    for (size_t i = 0; i < sample->count; i++)
         textured += sample->pixels[i].has_texture;
-    }
     device_heading_print(certification->compute->device, stdout);
     printf("%s, %ux%u: %zu pixel%s, reference of %d bits in %.1f s", certification->options->scene,
            sample->width, sample->height, sample->count, text_plural(sample->count), (int)QUAD_BITS,
@@ -167,10 +167,7 @@ static Json *certify_json(const Certification *certification)
     json_count(json, "pixels", sample->count);
     json_int64(json, "reference_bits", QUAD_BITS);
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
-    size_t uncertain = 0;
-    for (size_t i = 0; i < sample->count; i++)
-        uncertain += reference_is_uncertain(&sample->pixels[i]);
-    json_count(json, "reference_uncertain", uncertain);
+    json_count(json, "reference_uncertain", certification->uncertain_count);
     json_begin_array(json, "precisions");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
         if (certification->rows[i].measured)
@@ -267,6 +264,8 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
                              path_of(options), progress_interrupted))
         return EXIT_INTERRUPTED;
     certification.reference_seconds = clock_seconds() - start;
+    for (size_t i = 0; i < certification.sample.count; i++)
+        certification.uncertain_count += reference_is_uncertain(&certification.sample.pixels[i]);
     int status = EXIT_DONE;
     for (unsigned i = 0; i < PRECISION_COUNT && status == EXIT_DONE; i++) {
         if (!options->common.precisions || options->common.precisions >> i & 1)
