@@ -187,7 +187,22 @@ const Device *device_find(DeviceList *devices, const char *selector)
     return device;
 }
 
-static void driver_options_apply(DeviceList *list, const CommonOptions *common)
+const Device *device_choose_numbered(const DeviceList *devices, const char *selector, size_t number,
+                                     MessageList *messages)
+{
+    const char *listed = device_selector(selector);
+    const Device **chosen;
+    const Device *first = listed ? NULL : device_choose(devices, NULL, messages);
+    const size_t count = devices_choose(devices, listed ? listed : "all", &chosen, messages);
+    size_t kept = 0;
+    for (size_t i = 0; i < count; i++)
+        if (!first || chosen[i]->type == first->type) chosen[kept++] = chosen[i];
+    const Device *device = kept > 0 ? chosen[number % kept] : NULL;
+    free(chosen);
+    return device;
+}
+
+void devices_apply_options(DeviceList *list, const CommonOptions *common)
 {
     for (size_t i = 0; i < list->count; i++) {
         list->items[i].build_options = common->build_options;
@@ -219,7 +234,7 @@ bool device_open(OpenDevice *open, const CommonOptions *common)
 {
     *open = (OpenDevice){0};
     const Device *device = device_find(&open->devices, common->device);
-    driver_options_apply(&open->devices, common);
+    devices_apply_options(&open->devices, common);
     if (!device || !work_group_is_allowed(device)) {
         device_list_close(&open->devices);
         return false;
@@ -247,8 +262,7 @@ bool reference_open(Compute *compute, const DeviceList *devices, const char *sel
 // report them as leaks.
 static ARRAY_OF(Compute) left;
 
-// Closes a Compute. Returns EXIT_MACHINE with a message if the device failed, else `status`.
-static int compute_end(Compute *compute, int status)
+int compute_end(Compute *compute, int status)
 {
     char *unmap_failure = compute_unmap_failure_text(compute);
     if (compute_ok(compute) && unmap_failure) fprintf(stderr, "glint: warning: %s\n", unmap_failure);
@@ -269,97 +283,6 @@ static int compute_end(Compute *compute, int status)
 int device_close(OpenDevice *open, int status)
 {
     status = compute_end(&open->compute, status);
-    device_list_close(&open->devices);
-    return status;
-}
-
-// Closes the Compute, unless compute_end has done so, and frees it.
-static void compute_free(Compute *compute)
-{
-    compute_close(compute);
-    free(compute);
-}
-
-static void computes_open(OpenDevices *open, const Device *const *devices, size_t count)
-{
-    open->count = count;
-    open->items = memory_allocate_zeroed(count, sizeof *open->items);
-    for (size_t i = 0; i < count; i++) {
-        open->items[i].compute = memory_allocate_zeroed(1, sizeof *open->items[i].compute);
-        compute_open(open->items[i].compute, devices[i]);
-    }
-}
-
-bool devices_open(OpenDevices *open, const char *selector)
-{
-    *open = (OpenDevices){0};
-    device_list_open(&open->devices, &device_warnings);
-    MessageList messages = {0};
-    const Device **devices;
-    const char *listed = device_selector(selector);
-    size_t count = devices_choose(&open->devices, listed, &devices, &messages);
-    messages_print(&messages, NULL);
-    open->are_all = listed && strcasecmp(listed, "all") == 0;
-    computes_open(open, devices, count);
-    free(devices);
-    if (count == 0) devices_abandon(open);
-    return count > 0;
-}
-
-bool devices_apply_options(OpenDevices *open, const CommonOptions *common)
-{
-    driver_options_apply(&open->devices, common);
-    for (size_t i = 0; i < open->count; i++)
-        if (!work_group_is_allowed(open->items[i].compute->device)) return false;
-    return true;
-}
-
-bool devices_open_one(OpenDevices *open, const char *selector, size_t number, MessageList *messages)
-{
-    *open = (OpenDevices){0};
-    device_list_open(&open->devices, &device_warnings);
-    const char *listed = device_selector(selector);
-    const Device **devices;
-    const Device *first = listed ? NULL : device_choose(&open->devices, NULL, messages);
-    size_t count = devices_choose(&open->devices, listed ? listed : "all", &devices, messages), kept = 0;
-    for (size_t i = 0; i < count; i++)
-        if (!first || devices[i]->type == first->type) devices[kept++] = devices[i];
-    if (kept > 0) computes_open(open, &devices[number % kept], 1);
-    free(devices);
-    if (kept == 0) devices_abandon(open);
-    return kept > 0;
-}
-
-void devices_abandon(OpenDevices *open)
-{
-    for (size_t i = 0; i < open->count; i++)
-        compute_free(open->items[i].compute);
-    free(open->items);
-    device_list_close(&open->devices);
-}
-
-void devices_drop(OpenDevices *open, size_t index)
-{
-    char *failure = compute_failure_text(open->items[index].compute);
-    fprintf(stderr, "glint: warning: the other devices continue without it: %s\n", failure);
-    free(failure);
-    open->items[index].is_dropped = true;
-}
-
-void devices_remove(OpenDevices *open, size_t index)
-{
-    compute_free(open->items[index].compute);
-    open->count--;
-    memmove(&open->items[index], &open->items[index + 1], (open->count - index) * sizeof *open->items);
-}
-
-int devices_close(OpenDevices *open, int status)
-{
-    for (size_t i = 0; i < open->count; i++) {
-        if (!open->items[i].is_dropped) status = compute_end(open->items[i].compute, status);
-        compute_free(open->items[i].compute);
-    }
-    free(open->items);
     device_list_close(&open->devices);
     return status;
 }

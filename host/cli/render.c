@@ -109,12 +109,6 @@ const char *render_command_scene(const RenderCommand *command, size_t index)
     return command->options.scenes.items[command->options.frame_count > 0 ? 0 : index];
 }
 
-bool render_command_open_devices(RenderCommand *command)
-{
-    command->open.reference_selector = command->options.common.reference_device;
-    return render_devices_open(&command->open, &command->options.common);
-}
-
 // Returns whether all files of an image exist, and prints the image's name if so.
 static bool image_exists(const RenderOptions *options, const char *path)
 {
@@ -169,9 +163,9 @@ void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks)
 
 void render_command_drop_devices(RenderCommand *command)
 {
-    OpenDevices *devices = &command->open.devices;
-    for (size_t i = 0; i < devices->count; i++)
-        if (!compute_ok(devices->items[i].compute)) devices_drop(devices, i);
+    RenderDevices *open = &command->open;
+    for (size_t i = 0; i < open->count; i++)
+        if (!compute_ok(open->items[i].compute)) render_devices_drop(open, i);
 }
 
 int render_command_close(RenderCommand *command)

@@ -19,9 +19,6 @@ RenderCommand *render_command_open(int argument_count, char **arguments, int *st
 // Returns false with a message, before anything is rendered, if an image would overwrite a file that one of
 // several scenes is read from. Reads those scenes whose image exists.
 bool render_command_check_overwrites(RenderCommand *command);
-// Opens the devices before the first scene is read. Returns false with a message if there is none.
-bool render_command_open_devices(RenderCommand *command);
-
 const char *render_command_scene(const RenderCommand *command, size_t index);
 
 // Renders one image and returns its exit status. `ranks` may be NULL.

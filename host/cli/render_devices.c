@@ -3,22 +3,59 @@
 #include "host/base/memory.h"
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
+#include <strings.h>
 
 bool render_devices_open(RenderDevices *open, const CommonOptions *common)
 {
-    const char *selector = common->device;
     if (open->is_open) return true;
+    const char *selector = device_selector(common->device);
     MessageList messages = {0};
-    open->is_open = open->is_single ? devices_open_one(&open->devices, selector, open->number, &messages)
-                                    : devices_open(&open->devices, selector);
+    const Device *single = NULL, **listed = NULL;
+    device_list_open(&open->list, &device_warnings);
+    devices_apply_options(&open->list, common);
+    if (open->is_single)
+        single = device_choose_numbered(&open->list, selector, open->number, &messages);
+    else
+        open->count = devices_choose(&open->list, selector, &listed, &messages);
+    if (single) open->count = 1;
     messages_print(&messages, NULL);
-    if (open->is_open && !devices_apply_options(&open->devices, common)) {
-        devices_abandon(&open->devices);
-        open->devices = (OpenDevices){0};
-        open->is_open = false;
+    const Device *const *devices = single ? &single : listed;
+    open->is_open = open->count > 0;
+    for (size_t i = 0; i < open->count; i++)
+        open->is_open = open->is_open && work_group_is_allowed(devices[i]);
+    if (open->is_open) {
+        open->are_all = !single && selector && strcasecmp(selector, "all") == 0;
+        open->reference_selector = common->reference_device;
+        open->items = memory_allocate_zeroed(open->count, sizeof *open->items);
+        open->renderers = memory_allocate_zeroed(open->count, sizeof *open->renderers);
+        for (size_t i = 0; i < open->count; i++) {
+            open->items[i].compute = memory_allocate(1, sizeof *open->items[i].compute);
+            compute_open(open->items[i].compute, devices[i]);
+        }
+    } else {
+        open->count = 0;
+        device_list_close(&open->list);
     }
-    if (open->is_open) open->renderers = memory_allocate_zeroed(open->devices.count, sizeof(Renderer *));
+    free(listed);
     return open->is_open;
+}
+
+void render_devices_drop(RenderDevices *open, size_t index)
+{
+    char *failure = compute_failure_text(open->items[index].compute);
+    fprintf(stderr, "glint: warning: the other devices continue without it: %s\n", failure);
+    free(failure);
+    open->items[index].is_dropped = true;
+}
+
+// Closes a device that no renderer uses. Later devices move up.
+static void device_remove(RenderDevices *open, size_t index)
+{
+    compute_close(open->items[index].compute);
+    free(open->items[index].compute);
+    open->count--;
+    memmove(&open->items[index], &open->items[index + 1], (open->count - index) * sizeof *open->items);
 }
 
 // Prints why devices cannot render the image, and that the others render their share.
@@ -35,16 +72,14 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
                           const Ranks *ranks, MessageList *messages)
 {
     Renderer **renderers = open->renderers;
-    OpenDevices *devices = &open->devices;
-    const size_t count = devices->count;
+    const size_t count = open->count;
     Compute **computes = memory_allocate(count, sizeof *computes);
     MessageList *of_each = memory_allocate_zeroed(count, sizeof *of_each), unfit = {0};
     open->is_unfit = false;
     for (size_t i = 0; i < count; i++) {
-        computes[i] = devices->items[i].compute;
+        computes[i] = open->items[i].compute;
         if (settings->precision == PRECISION_CERTIFIED &&
-            !reference_open(computes[i], &devices->devices, open->reference_selector) &&
-            open->reference_selector) {
+            !reference_open(computes[i], &open->list, open->reference_selector) && open->reference_selector) {
             open->is_unfit = true;
             free(computes);
             free(of_each);
@@ -56,15 +91,15 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
     for (size_t i = 0, kept = 0; i < count; i++) {
         Renderer *renderer = renderers[i];
         const bool fits = message_count(&of_each[i], MESSAGE_ERROR) == 0;
-        const bool is_dispensable = is_done && devices->count > 1 && (fits || devices->are_all);
+        const bool is_dispensable = is_done && open->count > 1 && (fits || open->are_all);
         message_list_move(renderer || !is_dispensable ? messages : &unfit, &of_each[i]);
         if (renderer || !is_dispensable) {
             open->is_unfit = open->is_unfit || !fits;
             renderers[kept++] = renderer;
             is_done = is_done && renderer;
         } else {
-            if (fits) devices_drop(devices, kept);
-            devices_remove(devices, kept);
+            if (fits) render_devices_drop(open, kept);
+            device_remove(open, kept);
         }
     }
     unfit_print(&unfit);
@@ -75,13 +110,12 @@ bool render_devices_start(RenderDevices *open, const Scene *scene, const RenderS
 
 void render_devices_rest(RenderDevices *open)
 {
-    OpenDevices *devices = &open->devices;
     size_t kept = 0;
-    for (size_t i = 0, count = devices->count; i < count; i++) {
+    for (size_t i = 0, count = open->count; i < count; i++) {
         Renderer *renderer = open->renderers[i];
-        if (devices->items[kept].is_dropped) {
+        if (open->items[kept].is_dropped) {
             renderer_close(renderer);
-            devices_remove(devices, kept);
+            device_remove(open, kept);
         } else {
             renderer_release_scene(renderer);
             open->renderers[kept++] = renderer;
@@ -91,16 +125,20 @@ void render_devices_rest(RenderDevices *open)
 
 bool render_devices_work(const RenderDevices *open)
 {
-    for (size_t i = 0; i < open->devices.count; i++)
-        if (!open->devices.items[i].is_dropped && !compute_ok(open->devices.items[i].compute)) return false;
+    for (size_t i = 0; i < open->count; i++)
+        if (!open->items[i].is_dropped && !compute_ok(open->items[i].compute)) return false;
     return true;
 }
 
 int render_devices_close(RenderDevices *open, int status)
 {
     if (!open->is_open) return status;
-    for (size_t i = 0; i < open->devices.count; i++)
+    for (size_t i = 0; i < open->count; i++)
         renderer_close(open->renderers[i]);
+    for (; open->count > 0; device_remove(open, 0))
+        if (!open->items[0].is_dropped) status = compute_end(open->items[0].compute, status);
     free(open->renderers);
-    return devices_close(&open->devices, status);
+    free(open->items);
+    device_list_close(&open->list);
+    return status;
 }

@@ -64,8 +64,8 @@ static bool band_receive(void *context, const Film *band)
 
 static void device_drop(void *context, size_t index)
 {
-    OpenDevices *devices = &((ImageRender *)context)->open->devices;
-    if (index < devices->count) devices_drop(devices, index); // else a rank, which has printed the reason
+    RenderDevices *open = ((ImageRender *)context)->open;
+    if (index < open->count) render_devices_drop(open, index); // else a rank, which has printed the reason
 }
 
 // Opens the checkpoint. Returns true if none is requested, and false with messages if it cannot be opened.
@@ -187,8 +187,8 @@ static int precision_choose(ImageRender *render, Pilot *pilot)
 {
     const RenderOptions *options = render->options;
     progress_flag_signals();
-    const bool chosen = pilot_run(pilot, &options->budget, render->open->devices.items[0].compute,
-                                  render->scene, &render->settings, &render->messages);
+    const bool chosen = pilot_run(pilot, &options->budget, render->open->items[0].compute, render->scene,
+                                  &render->settings, &render->messages);
     const bool is_unfit = render->messages.count > 0;
     messages_print_once(&render->messages, render->printed, NULL);
     if (!chosen) return is_unfit ? EXIT_USER : progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
@@ -225,8 +225,8 @@ static int time_render(ImageRender *render)
     if (!ranks || ranks->begin(ranks, settings, aovs, options->common.device, &render->messages)) {
         const bool has_started =
             render_devices_start(render->open, scene, settings, ranks, &render->messages);
-        render->origin = (ImageOrigin){
-            options->scene, scene, settings, render->open->renderers, render->open->devices.count, ranks};
+        render->origin = (ImageOrigin){options->scene,      scene, settings, render->open->renderers,
+                                       render->open->count, ranks};
         const bool can_start = has_started && checkpoint_start(render);
         if (ranks) ranks->start(can_start);
         if (can_start) status = image_render(render);
@@ -301,10 +301,9 @@ static int scene_render(ImageRender *render)
     if (options->frame_count > 0 && !render->scene->is_animated && !open->has_warned_of_frames)
         fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options->scene);
     open->has_warned_of_frames = true;
-    open->reference_selector = options->common.reference_device;
     stage_begin(render->times->stage, "opening the devices", NULL, 0);
     if (!render_devices_open(open, &options->common)) return EXIT_USER;
-    if (options->common.capture_folder && open->devices.count > 1) {
+    if (options->common.capture_folder && open->count > 1) {
         option_usage_fault("render", "--capture needs a single device");
         return EXIT_USER;
     }

@@ -82,8 +82,8 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     char marker[MARKER_BYTES] = "";
     const uint64_t own = command ? files_hash(command, call) : 0;
     uint64_t hash = own;
-    const bool can_render =
-        command && !uses_standard_streams(command) && render_command_open_devices(command);
+    const bool can_render = command && !uses_standard_streams(command) &&
+                            render_devices_open(&command->open, &command->options.common);
     if (is_first) {
         progress_hold_signals(); // so that the marker is removed in any case
         marker_make(command, marker);

@@ -33,7 +33,7 @@ static bool band_send(void *ended, const Film *band)
 typedef struct {
     int rank;
     size_t local_rank;
-    OpenDevices devices;
+    OpenDevice device;
     bool is_open;
     Renderer *renderer; // NULL: cannot render, for a reason in `messages` or the device
     MessageList messages;
@@ -44,7 +44,10 @@ static void device_close_quietly(RankRenderer *worker)
 {
     renderer_close(worker->renderer);
     worker->renderer = NULL;
-    if (worker->is_open) devices_abandon(&worker->devices);
+    if (worker->is_open) {
+        compute_close(&worker->device.compute);
+        device_list_close(&worker->device.devices);
+    }
     worker->is_open = false;
 }
 
@@ -54,14 +57,22 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
     Rank *own = &worker->own;
     *own = (Rank){0};
     gethostname(own->host, sizeof own->host - 1);
-    if (worker->is_open && !compute_ok(worker->devices.items[0].compute)) device_close_quietly(worker);
-    if (!worker->is_open)
-        worker->is_open = devices_open_one(&worker->devices, selector, worker->local_rank, &worker->messages);
+    Compute *compute = &worker->device.compute;
+    if (worker->is_open && !compute_ok(compute)) device_close_quietly(worker);
+    if (!worker->is_open) {
+        device_list_open(&worker->device.devices, &device_warnings);
+        const Device *device =
+            device_choose_numbered(&worker->device.devices, selector, worker->local_rank, &worker->messages);
+        worker->is_open = device != NULL;
+        if (device)
+            compute_open(compute, device);
+        else
+            device_list_close(&worker->device.devices);
+    }
     if (!worker->is_open) {
         snprintf(own->failure, sizeof own->failure, "%s", worker->messages.items[0].text);
         return;
     }
-    Compute *compute = worker->devices.items[0].compute;
     const RenderSettings settings = settings_of_job(&job->settings);
     worker->renderer = renderer_open_empty(compute, &settings, worker->renderer, &worker->messages);
     rank_set_device(own, compute->device);
@@ -92,7 +103,7 @@ static void worker_render(RankRenderer *worker, unsigned aovs)
     bool has_ended = false;
     const BandQueue queue = {
         .acquire = rows_acquire, .deliver = band_send, .has_ended = end_received, .context = &has_ended};
-    const Compute *compute = worker->devices.items[0].compute;
+    const Compute *compute = &worker->device.compute;
     if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
     if (worker->messages.count > 0) {
         snprintf(failure, sizeof failure, "%s", worker->messages.items[0].text);
