@@ -51,9 +51,11 @@ typedef struct {
     const AgainstOptions *options;
     VariantSet *set;
     const char *programs[2]; // this program and the other
-    Series *ratios;          // per row, the logarithms of the ratios, one per pair
-    Series *frames[2];       // per row, the seconds of all runs of this program and of the other
-    RowComparison *comparisons;
+    struct {
+        Series ratios;    // the logarithms of the ratios, one per pair
+        Series frames[2]; // the seconds of all runs of this program and of the other
+    } * rows;
+    RowComparison *comparisons; // of the rows
 } Against;
 
 static const char not_available[] = "not available on this device";
@@ -205,13 +207,12 @@ static bool pair_measure(Against *against, MeasuredProgram *workers, size_t pair
                 if (seconds[i] == 0 && !against->comparisons[i].why_not)
                     against->comparisons[i].why_not = not_available;
                 series_add(&times[2 * i + which], seconds[i]);
-                series_add(&against->frames[which][i], seconds[i]);
+                series_add(&against->rows[i].frames[which], seconds[i]);
             }
         }
-    for (size_t i = 0; i < 2 * row_count; i++) {
-        if (i % 2 == 0 && whole && !against->comparisons[i / 2].why_not)
-            series_add(&against->ratios[i / 2], comparison_log_ratio(&times[i], &times[i + 1]));
-    }
+    for (size_t i = 0; i < row_count && whole; i++)
+        if (!against->comparisons[i].why_not)
+            series_add(&against->rows[i].ratios, comparison_log_ratio(&times[2 * i], &times[2 * i + 1]));
     for (size_t i = 0; i < 2 * row_count; i++)
         series_free(&times[i]);
     free(times);
@@ -244,7 +245,7 @@ static bool rows_classify(Against *against, size_t look)
     for (size_t i = 0; i < against->set->count; i++) {
         RowComparison *comparison = &against->comparisons[i];
         if (comparison->why_not) continue;
-        comparison->frame = comparison_of_pairs(comparison->frame, &against->ratios[i], look,
+        comparison->frame = comparison_of_pairs(comparison->frame, &against->rows[i].ratios, look,
                                                 against->set->count, against->options->tolerance);
         comparison->verdict = comparison->frame.verdict;
         decided = decided && comparison->verdict != VERDICT_UNDECIDED;
@@ -281,13 +282,13 @@ static Json *against_json(const Against *against, const Device *device)
         key_json(json, &against->set->rows[i].key);
         comparison_json(json, &against->comparisons[i]);
         if (!against->comparisons[i].why_not) {
-            summary_json(json, "frame_ms", series_summarize(&against->frames[0][i]));
-            summary_json(json, "against_frame_ms", series_summarize(&against->frames[1][i]));
-            samples_json(json, "frame_samples_ms", &against->frames[0][i]);
-            samples_json(json, "against_frame_samples_ms", &against->frames[1][i]);
+            summary_json(json, "frame_ms", series_summarize(&against->rows[i].frames[0]));
+            summary_json(json, "against_frame_ms", series_summarize(&against->rows[i].frames[1]));
+            samples_json(json, "frame_samples_ms", &against->rows[i].frames[0]);
+            samples_json(json, "against_frame_samples_ms", &against->rows[i].frames[1]);
             json_begin_array(json, "pair_ratios");
-            for (size_t pair = 0; pair < against->ratios[i].count; pair++)
-                json_number(json, NULL, exp(against->ratios[i].items[pair]));
+            for (size_t pair = 0; pair < against->rows[i].ratios.count; pair++)
+                json_number(json, NULL, exp(against->rows[i].ratios.items[pair]));
             json_end(json);
         }
         json_end(json);
@@ -307,7 +308,7 @@ static void against_print_text(const Against *against, const Device *device)
                key->width, key->height, key->precision, key->lanes, text_plural(key->lanes), key->bvh,
                key->samples, text_plural(key->samples), key->bounces, text_plural(key->bounces),
                key->variant && key->variant[0] ? ", " : "", key->variant ? key->variant : "",
-               against->ratios[i].count, text_plural(against->ratios[i].count));
+               against->rows[i].ratios.count, text_plural(against->rows[i].ratios.count));
         comparison_print(&against->comparisons[i], stdout);
     }
 }
@@ -323,9 +324,7 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
         .options = options,
         .set = set,
         .programs = {program, options->other},
-        .ratios = memory_allocate_zeroed(set->count, sizeof *against.ratios),
-        .frames = {memory_allocate_zeroed(set->count, sizeof *against.ratios),
-                   memory_allocate_zeroed(set->count, sizeof *against.ratios)},
+        .rows = memory_allocate_zeroed(set->count, sizeof *against.rows),
         .comparisons = memory_allocate_zeroed(set->count, sizeof *against.comparisons),
     };
     variant_set_fit_lanes(set, device);
@@ -345,13 +344,11 @@ int bench_against(const AgainstOptions *options, VariantSet *set, const Device *
     }
     if (status == EXIT_INTERRUPTED) fputs("glint: interrupted\n", stderr);
     for (size_t i = 0; i < set->count; i++) {
-        series_free(&against.ratios[i]);
-        series_free(&against.frames[0][i]);
-        series_free(&against.frames[1][i]);
+        series_free(&against.rows[i].ratios);
+        series_free(&against.rows[i].frames[0]);
+        series_free(&against.rows[i].frames[1]);
     }
-    free(against.ratios);
-    free(against.frames[0]);
-    free(against.frames[1]);
+    free(against.rows);
     free(against.comparisons);
     return status;
 }

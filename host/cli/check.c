@@ -20,20 +20,24 @@
 typedef struct {
     CommonOptions common;
     CommandOperands scenes;
-    bool as_json;
     uint32_t object; // UINT32_MAX if not given
 } CheckOptions;
 
 static const Option options_own[] = {
     {"object", "ID", "print one object and its line; IDs are those of glint trace", option_count,
-     offsetof(CheckOptions, object), NUMBERS(0, UINT32_MAX - 1)},
-    {"json", NULL, "print JSON", option_flag, offsetof(CheckOptions, as_json)}};
+     offsetof(CheckOptions, object), NUMBERS(0, UINT32_MAX - 1)}};
+
+static bool prints_json(const CheckOptions *options)
+{
+    return options->common.report.format == FORMAT_JSON;
+}
 
 static const char *options_check(void *check_options)
 {
     const CheckOptions *options = check_options;
-    if (options->as_json && options->object != UINT32_MAX) return "--object cannot be combined with --json";
-    if (options->scenes.count > 1 && (options->as_json || options->object != UINT32_MAX))
+    if (prints_json(options) && options->object != UINT32_MAX)
+        return "--object cannot be combined with --json";
+    if (options->scenes.count > 1 && (prints_json(options) || options->object != UINT32_MAX))
         return "--json and --object take one scene, but several are given";
     return NULL;
 }
@@ -43,7 +47,8 @@ static const CommandLine command_line = {
     .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
              "ignored. For several scenes it prints one line each.\n",
-    .groups = {OPTIONS(options_own), OPTIONS(set_options), OPTION(common_options[COMMON_LENIENT])},
+    .groups = {OPTIONS(options_own), OPTION(report_options[REPORT_JSON]), OPTIONS(set_options),
+               OPTION(common_options[COMMON_LENIENT])},
     OPERANDS(SCENES, CheckOptions, scenes),
     .check = options_check};
 
@@ -218,7 +223,7 @@ static bool scene_check(const CheckOptions *options, const char *path)
     MessageList messages = {0};
     const SceneOptions scene_options = scene_options_of(&options->common);
     bool loaded = scene_load(&scene, path, &scene_options, &messages) && scene_renders(&scene, &messages);
-    if (options->as_json) {
+    if (prints_json(options)) {
         json_report(path, &scene, loaded, &messages);
         message_list_free(&messages);
     } else {

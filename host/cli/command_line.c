@@ -149,7 +149,7 @@ static size_t name_find(const Option *option, const char *name)
 bool option_choice(const Option *option, const char *value, void *options)
 {
     const size_t index = value ? name_find(option, value) : 0;
-    if (index == option->name_count) return names_fault(option, value, "");
+    if (value && index == option->name_count) return names_fault(option, value, "");
     *(unsigned *)option_field(option, options) = option->values ? option->values[index] : (unsigned)index;
     return true;
 }

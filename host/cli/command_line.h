@@ -99,7 +99,7 @@ OptionReader option_count;      // uint32_t: an integer from `low` to `high`
 OptionReader option_number;     // double, from `low` to `high`
 OptionReader option_size;       // uint32_t[2]: WxH pixels
 OptionReader option_work_group; // uint32_t[2]: WxH work-items
-OptionReader option_choice;     // an enum or uint32_t; the first name if an optional value is missing
+OptionReader option_choice;     // an enum or uint32_t: of the name, or of the first if there is no value
 OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
 
 enum { OPTION_TEXTS_MAX = 64 };

@@ -14,19 +14,18 @@
 
 typedef struct {
     CommonOptions common;
-    bool as_json, probes;
+    bool probes;
 } DevicesOptions;
 
 static const Option options_own[] = {
-    {"probe", NULL, "measure the arithmetic now", option_flag, offsetof(DevicesOptions, probes)},
-    {"json", NULL, "print JSON", option_flag, offsetof(DevicesOptions, as_json)}};
+    {"probe", NULL, "measure the arithmetic now", option_flag, offsetof(DevicesOptions, probes)}};
 
 static const CommandLine command_line = {
     .command = "devices",
     .usage = "usage: glint devices [OPTIONS]\n\n"
              "Lists every OpenCL device of every platform; * marks the default. Then prints\n"
              "what the arithmetic of each device really does, if that was measured.\n",
-    .groups = {OPTIONS(options_own), OPTIONS(keep_kernels_option)}};
+    .groups = {OPTIONS(options_own), OPTION(report_options[REPORT_JSON]), OPTIONS(keep_kernels_option)}};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {
@@ -145,11 +144,12 @@ int command_devices(int argument_count, char **arguments)
     MessageList messages = {0};
     const Device *chosen = device_choose(&list, device_selector(NULL), &messages);
     const bool is_probed = passports_find(&list, options.probes);
-    if (options.as_json)
+    const bool as_json = options.common.report.format == FORMAT_JSON;
+    if (as_json)
         devices_print_json(&list, chosen);
     else if (list.count > 0)
         devices_print_table(&list, chosen);
-    for (size_t i = 0; i < list.count && !options.as_json; i++)
+    for (size_t i = 0; i < list.count && !as_json; i++)
         passports_print(&list.items[i]);
     char *failure = device_list_failure_text(&list);
     if (chosen && failure) message_warning(&messages, "%s", failure);

@@ -15,12 +15,7 @@
 static const char *const format_names[FORMAT_COUNT] = {"text",     "json",  "csv",
                                                        "markdown", "junit", "benchmark"};
 
-static bool json_choose(const Option *option, const char *value, void *options)
-{
-    (void)option, (void)value;
-    ((CommonOptions *)options)->report.format = FORMAT_JSON;
-    return true;
-}
+static const unsigned json_format[] = {FORMAT_JSON};
 
 // The file of the report, of which a command writes one.
 static OutputFile report_file;
@@ -42,7 +37,8 @@ const Option report_options[] = {{"format", "F",
                                  {"output", "FILE", "write the report to a file and print the text",
                                   option_text, offsetof(CommonOptions, report.output),
                                   .effect = report_file_open},
-                                 {"json", NULL, "print JSON", json_choose, 0}};
+                                 {"json", NULL, "print JSON", option_choice,
+                                  offsetof(CommonOptions, report.format), .values = json_format}};
 
 static ReportFormat format_of_ending(const char *path)
 {

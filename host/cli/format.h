@@ -47,7 +47,8 @@ typedef struct {
 // Returns the heading of a column.
 ShortText column_heading(const char *column);
 
-extern const Option report_options[3];
+enum { REPORT_FORMAT, REPORT_OUTPUT, REPORT_JSON, REPORT_OPTION_COUNT };
+extern const Option report_options[REPORT_OPTION_COUNT];
 // Chooses the format by the file's ending if no other is given. Finds an ending that gives none, and a format
 // for times if the command has no times.
 OptionCheck report_options_check;

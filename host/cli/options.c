@@ -86,8 +86,8 @@ const Option driver_options[] = {
     {"work-group", "WxH",
      "width and height of a work-group in work-items (default: 8x8, 1x1 for lanes on a CPU, or fewer)",
      option_work_group, FIELD(work_group)},
-    {"build-options", "OPTIONS", "passed to the driver's compiler, such as \"-cl-opt-disable\"", option_text,
-     FIELD(build_options)}};
+    {"build-options", "OPTIONS", "options for the driver's compiler, such as \"-cl-opt-disable\"",
+     option_text, FIELD(build_options)}};
 const Option keep_kernels_option[] = {{"keep-kernels", "FOLDER",
                                        "write the text and the build log of each kernel that is built",
                                        option_text, FIELD(kernel_folder), .effect = effect_folder}};
@@ -202,14 +202,14 @@ const Device *device_choose_numbered(const DeviceList *devices, const char *sele
     return device;
 }
 
-void devices_apply_options(DeviceList *list, const CommonOptions *common)
+void devices_apply_options(DeviceList *devices, const CommonOptions *common)
 {
-    for (size_t i = 0; i < list->count; i++) {
-        list->items[i].build_options = common->build_options;
-        list->items[i].work_group[0] = common->work_group[0];
-        list->items[i].work_group[1] = common->work_group[1];
-        list->items[i].kernel_folder = common->kernel_folder;
-        list->items[i].capture_folder = common->capture_folder;
+    for (size_t i = 0; i < devices->count; i++) {
+        devices->items[i].build_options = common->build_options;
+        devices->items[i].work_group[0] = common->work_group[0];
+        devices->items[i].work_group[1] = common->work_group[1];
+        devices->items[i].kernel_folder = common->kernel_folder;
+        devices->items[i].capture_folder = common->capture_folder;
     }
 }
 
