@@ -1,7 +1,6 @@
 #include "host/cli/bench_report.h"
 
 #include "host/api/version.h"
-#include "host/base/fault.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/measure/baseline.h"
@@ -12,74 +11,6 @@
 #include <sys/utsname.h>
 #include <time.h>
 #include <unistd.h>
-
-RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
-                          double tolerance)
-{
-    const size_t count = row_count * (is_cpu ? 2 : 1);
-    RowComparison row = {.has_processor = is_cpu,
-                         .frame = comparison_of_reports(newer->wall, older->wall, count, tolerance)};
-    row.verdict = row.frame.verdict;
-    if (!is_cpu) return row;
-    row.processor = comparison_of_reports(newer->processor, older->processor, count, tolerance);
-    row.verdict = verdict_of_row(row.frame.verdict, row.processor.verdict);
-    return row;
-}
-
-static void ratio_print(const char *of_what, const Comparison *result, FILE *stream)
-{
-    fprintf(stream, "    new over old %s time: %.3f", of_what, result->ratio);
-    if (isfinite(result->high)) fprintf(stream, " (%.3f to %.3f)", result->low, result->high);
-    switch (result->verdict) {
-    case VERDICT_UNDECIDED:
-        fputs(": too noisy to decide\n", stream);
-        break;
-    case VERDICT_SAME:
-        fprintf(stream, ": same within %.1f%%\n", 100 * fmax(result->high - 1, 1 / result->low - 1));
-        break;
-    case VERDICT_SLOWER:
-        fprintf(stream, ": slower by at least %.1f%%\n", 100 * (result->low - 1));
-        break;
-    case VERDICT_FASTER:
-        fprintf(stream, ": faster by at least %.1f%%\n", 100 * (1 / result->high - 1));
-        break;
-    }
-}
-
-void comparison_print(const RowComparison *comparison, FILE *stream)
-{
-    if (comparison->why_not) {
-        fprintf(stream, "    %s\n", comparison->why_not);
-        return;
-    }
-    ratio_print("frame", &comparison->frame, stream);
-    if (comparison->has_processor) ratio_print("processor", &comparison->processor, stream);
-}
-
-int comparisons_status(const RowComparison *comparisons, size_t count, const char *other)
-{
-    size_t counts[VERDICT_FASTER + 1] = {0}, compared = 0;
-    for (size_t i = 0; i < count; i++) {
-        if (comparisons[i].why_not) continue;
-        compared++;
-        counts[comparisons[i].verdict]++;
-    }
-    if (compared == 0) {
-        fprintf(stderr, "glint bench: %s has none of these rows\n", other);
-        return EXIT_USER;
-    }
-    if (counts[VERDICT_SLOWER] > 0) {
-        fprintf(stderr, "glint bench: %zu of %zu rows are slower than %s\n", counts[VERDICT_SLOWER], compared,
-                other);
-        return EXIT_CHECK;
-    }
-    if (counts[VERDICT_UNDECIDED] > 0) {
-        fprintf(stderr, "glint bench: too noisy to compare %zu of %zu rows with %s\n",
-                counts[VERDICT_UNDECIDED], compared, other);
-        return EXIT_UNDECIDED;
-    }
-    return EXIT_DONE;
-}
 
 const ResultTable bench_table = {
     .command = "bench",
@@ -272,28 +203,6 @@ static void launches_json(Json *json, const RenderReport *report)
         json_number(json, "host_ms", 1e3 * time->host_seconds);
         command_json(json, report, time);
         json_end(json);
-    }
-    json_end(json);
-}
-
-static void verdict_json(Json *json, const Comparison *comparison, Verdict verdict)
-{
-    json_text(json, "verdict", verdict_names[verdict]);
-    ratio_json(json, comparison);
-}
-
-void comparison_json(Json *json, const RowComparison *comparison)
-{
-    json_begin_object(json, "comparison");
-    if (comparison->why_not) {
-        unavailable_json(json, comparison->why_not);
-    } else {
-        verdict_json(json, &comparison->frame, comparison->verdict);
-        if (comparison->has_processor) {
-            json_begin_object(json, "processor");
-            verdict_json(json, &comparison->processor, comparison->processor.verdict);
-            json_end(json);
-        }
     }
     json_end(json);
 }

@@ -1,0 +1,33 @@
+// Compares rows of glint bench with those of another report, or of another program.
+#pragma once
+
+#include "host/base/json.h"
+#include "host/measure/comparison.h"
+#include <stdio.h>
+
+// The comparison of a row, or the reason why there is none.
+typedef struct {
+    Comparison frame;     // compares frame times
+    Comparison processor; // compares the processes' processor times
+    bool has_processor;   // true for two reports with a CPU device
+    Verdict verdict;      // follows from both
+    const char *why_not;  // NULL if there are comparisons
+} RowComparison;
+
+// The times that a report has for a row.
+typedef struct {
+    ReportTimes wall, processor;
+} RowTimes;
+
+// Compares a row of two reports, one of `row_count` that are compared. `is_cpu` is whether the device is one,
+// so that the process's processor time counts.
+RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
+                          double tolerance);
+
+void comparison_print(const RowComparison *comparison, FILE *stream);
+void comparison_json(Json *json, const RowComparison *comparison); // adds the object "comparison"
+// Adds the verdict, the ratio and its interval.
+void verdict_json(Json *json, const Comparison *comparison, Verdict verdict);
+// Returns the exit status that follows from the comparisons, and prints a message unless nothing is slower.
+// `other` names what the rows were compared with.
+int comparisons_status(const RowComparison *comparisons, size_t count, const char *other);
