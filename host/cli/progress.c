@@ -26,9 +26,16 @@ static void interrupt_record(int signal_number)
     interrupted = 1;
 }
 
+static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
+
+void progress_ignore_signals(void)
+{
+    for (size_t i = 0; i < COUNT_OF(signals); i++)
+        signal(signals[i], SIG_IGN);
+}
+
 void progress_catch_signals(void)
 {
-    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
     const struct sigaction action = {.sa_handler = interrupt_record};
     for (size_t i = 0; i < COUNT_OF(signals); i++) {
         struct sigaction before;

@@ -13,6 +13,8 @@ typedef struct {
 // Makes SIGINT, SIGTERM and SIGHUP end the process with EXIT_INTERRUPTED, except for signals that the parent
 // ignores, as nohup and a shell's background jobs do. Must be called first.
 void progress_catch_signals(void);
+// Ignores these signals, in a process whose parent handles them.
+void progress_ignore_signals(void);
 // Opens the progress. Afterwards the signals set a flag, and the third signal ends the process.
 void progress_open(Progress *progress, bool quiet);
 // Returns the remaining time, extrapolated from the fraction that is done (above 0, at most 1), or a negative

@@ -1,6 +1,7 @@
 #include "host/cli/verify_journal.h"
 
 #include "host/base/clock.h"
+#include "host/cli/progress.h"
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -52,9 +53,7 @@ void child_end_with(pid_t parent)
 static void child_begin(VerifyJournal *journal, pid_t parent)
 {
     child_end_with(parent);
-    signal(SIGINT, SIG_IGN);
-    signal(SIGTERM, SIG_IGN);
-    signal(SIGHUP, SIG_IGN);
+    progress_ignore_signals();
     fault_record_crashes(journal->crash);
 }
 

@@ -1,11 +1,10 @@
 #include "host/mpi/other_rank.h"
 
-#include "host/base/array.h"
 #include "host/base/memory.h"
 #include "host/cli/options.h"
+#include "host/cli/progress.h"
 #include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -131,17 +130,9 @@ static void job_run(RankRenderer *worker, const Job *job)
     message_list_free(&worker->messages);
 }
 
-// Ignores interrupts, which reach all ranks. The first rank ends the render and the job.
-static void signals_ignore(void)
-{
-    static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
-    for (size_t i = 0; i < COUNT_OF(signals); i++)
-        signal(signals[i], SIG_IGN);
-}
-
 void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments)
 {
-    signals_ignore();
+    progress_ignore_signals(); // which reach all ranks: the first ends the render and the job
     RankRenderer worker = {.rank = rank, .local_rank = local_rank};
     Job job;
     while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.type != JOB_END) {
