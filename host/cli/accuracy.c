@@ -65,7 +65,8 @@ typedef struct {
     VariantSet set;
     Film reference; // of the current scene, or of the only scene if it is read from a file
     AccuracyScene *scenes;
-    OutputFile page; // opened before measuring, so that a failure shows early
+    AccuracyReport report; // of these scenes
+    OutputFile page;       // opened before measuring, so that a failure shows early
     MessageList messages;
 } Accuracy;
 
@@ -150,24 +151,10 @@ static bool is_reference(const AccuracyScene *scene, const AccuracyVariant *vari
            variant->row->kernel_hash == scene->reference.kernel_hash;
 }
 
-static AccuracyReport report_of(const Accuracy *accuracy)
-{
-    const CommonOptions *common = &accuracy->options.variants.common;
-    return (AccuracyReport){
-        .device = accuracy->open.compute.device,
-        .perturb_seed = common->perturb_seed,
-        .perturb_scale = common->perturb_scale,
-        .scenes = accuracy->scenes,
-        .scene_count = accuracy->set.scene_count,
-        .folder = accuracy->options.folder,
-    };
-}
-
 static bool film_keep(Accuracy *accuracy, size_t scene, const AccuracyVariant *variant, const Film *film)
 {
     if (!accuracy->options.folder) return true;
-    const AccuracyReport report = report_of(accuracy);
-    Text prefix = accuracy_saved_prefix(&report, scene, variant);
+    Text prefix = accuracy_saved_prefix(&accuracy->report, scene, variant);
     bool saved = film_save(film, text_c(&prefix), &accuracy->messages);
     text_free(&prefix);
     return saved;
@@ -236,11 +223,18 @@ static int scene_run(Accuracy *accuracy, size_t scene_index, size_t first, Progr
     return status;
 }
 
-// Sorts the variants into scenes.
+// Sorts the variants into scenes, which the report describes.
 static void scenes_prepare(Accuracy *accuracy)
 {
     const VariantSet *set = &accuracy->set;
+    const CommonOptions *common = &accuracy->options.variants.common;
     accuracy->scenes = memory_allocate_zeroed(set->scene_count, sizeof *accuracy->scenes);
+    accuracy->report = (AccuracyReport){.device = accuracy->open.compute.device,
+                                        .perturb_seed = common->perturb_seed,
+                                        .perturb_scale = common->perturb_scale,
+                                        .scenes = accuracy->scenes,
+                                        .scene_count = set->scene_count,
+                                        .folder = accuracy->options.folder};
     for (size_t i = 0; i < set->count; i++) {
         AccuracyScene *scene = &accuracy->scenes[set->variants[i].scene - set->scenes];
         if (!scene->variants) {
@@ -277,11 +271,12 @@ static bool has_reference(Accuracy *accuracy)
         accuracy->open.compute.device->name, device_fp64_hint(accuracy->open.compute.device));
 }
 
-static bool page_commit(Accuracy *accuracy, const AccuracyReport *report)
+static bool page_commit(Accuracy *accuracy)
 {
     if (!accuracy->options.page_path) return true;
     Text page = {0};
-    page_append(&page, "page.html", accuracy_json(report), accuracy_page_extras(report));
+    page_append(&page, "page.html", accuracy_json(&accuracy->report),
+                accuracy_page_extras(&accuracy->report));
     bool written = output_write(&accuracy->page, page.items, page.count, &accuracy->messages) &&
                    output_commit(&accuracy->page, &accuracy->messages);
     text_free(&page);
@@ -307,11 +302,11 @@ static int accuracy_run(Accuracy *accuracy)
     if (status == EXIT_INTERRUPTED && compute_ok(&accuracy->open.compute))
         fputs("glint: interrupted\n", stderr);
     if (status != EXIT_DONE) return status;
-    const AccuracyReport report = report_of(accuracy);
+    const AccuracyReport *report = &accuracy->report;
     const ReportOptions *options = &accuracy->options.variants.common.report;
-    if (report_has_text(options)) accuracy_print_text(&report, stdout);
-    if (options->format != FORMAT_TEXT && !report_write(accuracy_json(&report), options)) return EXIT_USER;
-    if (!page_commit(accuracy, &report)) return EXIT_USER;
+    if (report_has_text(options)) accuracy_print_text(report, stdout);
+    if (options->format != FORMAT_TEXT && !report_write(accuracy_json(report), options)) return EXIT_USER;
+    if (!page_commit(accuracy)) return EXIT_USER;
     if (variant_set_any_measured(set)) return EXIT_DONE;
     fputs("glint accuracy: no variant could be rendered\n", stderr);
     return EXIT_USER;

@@ -52,18 +52,20 @@ static const CommandLine command_line = {
     OPERANDS(SCENE, CertifyOptions, scene)};
 
 typedef struct {
+    bool measured;
+    char *failure; // why a requested precision is not measured, or NULL
+    CertifyErrors errors;
+    CertifyUncertified uncertified; // only at `certified`
+} CertifyRow;
+
+typedef struct {
     const CertifyOptions *options;
     const Scene *scene;
     Compute *compute;
     CertifySample sample;
     size_t uncertain_count; // pixels that the reference leaves uncertain
     double reference_seconds;
-    struct {
-        bool measured;
-        char *failure; // why a requested precision is not measured, or NULL
-        CertifyErrors errors;
-        CertifyUncertified uncertified; // only at `certified`
-    } rows[PRECISION_COUNT];
+    CertifyRow rows[PRECISION_COUNT];
 } Certification;
 
 static void certified_print(const CertifyErrors *errors, const CertifyUncertified *uncertified)
@@ -98,25 +100,32 @@ static void text_print(const Certification *certification)
     puts("\n                         wrong                 largest error of color        largest margin\n"
          "  precision   object  shadow    path   color   right     wrong     at         of a wrong pixel");
     for (unsigned i = 0; i < PRECISION_COUNT; i++) {
-        const char *failure = certification->rows[i].failure;
-        if (failure) printf("  %-9s  unavailable: %s\n", precision_names[i], failure);
-        if (!certification->rows[i].measured) continue;
-        const CertifyErrors *errors = &certification->rows[i].errors;
+        const CertifyRow *row = &certification->rows[i];
+        const CertifyErrors *errors = &row->errors;
+        if (row->failure) printf("  %-9s  unavailable: %s\n", precision_names[i], row->failure);
+        if (!row->measured) continue;
         printf("  %-9s  %7zu %7zu %7zu %7zu   %-9.2g %-9.2g %u,%u", precision_names[i], errors->object,
                errors->shadow, errors->path, errors->color, errors->right_color, errors->wrong_color,
                errors->worst[0], errors->worst[1]);
         if (errors->object + errors->shadow + errors->path + errors->color > 0)
             printf("    %.2g of the distance", errors->margin);
         putchar('\n');
-        if (i == PRECISION_CERTIFIED) certified_print(errors, &certification->rows[i].uncertified);
+        if (i == PRECISION_CERTIFIED) certified_print(errors, &row->uncertified);
     }
 }
 
-static void row_json(Json *json, Precision precision, const CertifyErrors *errors,
-                     const CertifyUncertified *uncertified)
+static void row_json(Json *json, Precision precision, const CertifyRow *row)
 {
+    const CertifyErrors *errors = &row->errors;
+    const CertifyUncertified *uncertified = &row->uncertified;
+    if (!row->measured && !row->failure) return;
     json_begin_object(json, NULL);
     json_text(json, "precision", precision_names[precision]);
+    if (row->failure) {
+        unavailable_json(json, row->failure);
+        json_end(json);
+        return;
+    }
     json_count(json, "compared", errors->compared);
     json_begin_object(json, "wrong");
     json_count(json, "object", errors->object);
@@ -169,15 +178,8 @@ static Json *certify_json(const Certification *certification)
     json_number(json, "reference_ms", 1e3 * certification->reference_seconds);
     json_count(json, "reference_uncertain", certification->uncertain_count);
     json_begin_array(json, "precisions");
-    for (unsigned i = 0; i < PRECISION_COUNT; i++) {
-        if (certification->rows[i].measured)
-            row_json(json, (Precision)i, &certification->rows[i].errors, &certification->rows[i].uncertified);
-        if (!certification->rows[i].failure) continue;
-        json_begin_object(json, NULL);
-        json_text(json, "precision", precision_names[i]);
-        unavailable_json(json, certification->rows[i].failure);
-        json_end(json);
-    }
+    for (unsigned i = 0; i < PRECISION_COUNT; i++)
+        row_json(json, (Precision)i, &certification->rows[i]);
     json_end(json);
     return json;
 }
@@ -188,11 +190,12 @@ static Json *certify_json(const Certification *certification)
 static int precision_compare(Certification *certification, RenderSettings settings, Precision precision)
 {
     settings.precision = precision;
+    CertifyRow *row = &certification->rows[precision];
     MessageList messages = {0};
     Renderer *renderer = renderer_open(certification->compute, certification->scene, &settings, &messages);
     const bool is_unfit = !renderer && messages.count > 0;
     if (is_unfit && !certification->options->common.precisions) {
-        certification->rows[precision].failure = memory_copy_text(messages.items[0].text);
+        row->failure = memory_copy_text(messages.items[0].text);
         message_list_free(&messages);
         return EXIT_DONE;
     }
@@ -201,10 +204,10 @@ static int precision_compare(Certification *certification, RenderSettings settin
     Film film;
     const bool whole = renderer && renderer_render_film(renderer, aovs, &film);
     if (whole) {
-        certification->rows[precision].measured = true;
-        certification->rows[precision].errors = certify_compare(&certification->sample, &film);
+        row->measured = true;
+        row->errors = certify_compare(&certification->sample, &film);
         if (precision == PRECISION_CERTIFIED)
-            certification->rows[precision].uncertified =
+            row->uncertified =
                 certify_uncertified(certification->scene, &film, certification->options->pixels / 10 + 1,
                                     path_of(certification->options), progress_interrupted);
         film_free(&film);

@@ -116,9 +116,10 @@ static void pilot_print(const Pilot *pilot)
 static void rerenders_print(RerenderCounts counts, const RenderSettings *settings)
 {
     if (settings->precision != PRECISION_CERTIFIED) return;
-    fprintf(stderr, "certified: %llu sample%s re-rendered in double, %llu uncertified\n",
-            (unsigned long long)counts.rerendered, text_plural(counts.rerendered),
-            (unsigned long long)counts.uncertified);
+    Text text = {0};
+    counts_describe(&text, &counts);
+    fprintf(stderr, "certified: %s\n", text_c(&text));
+    text_free(&text);
 }
 
 static void text_print(const ImageOrigin *origin, const HostTimes *host)
