@@ -4,7 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
-#include "host/cli/progress.h"
+#include "host/cli/interrupts.h"
 #include "host/import/load.h"
 #include "host/import/mesh/assimp_process.h"
 #include <errno.h>
@@ -100,7 +100,7 @@ int main(int argument_count, char **arguments)
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
     signal(SIGCHLD, SIG_DFL); // if it is ignored, the system keeps no exit status
-    progress_catch_signals();
+    interrupts_catch();
     fault_catch_crashes();
     int status = command_run(argument_count, arguments);
     // a report that did not get out whole must not look like one that did

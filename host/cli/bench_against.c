@@ -5,6 +5,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/bench_report.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include <errno.h>
@@ -77,7 +78,7 @@ static int worker_close(MeasuredProgram *worker)
     if (worker->errors) {
         char line[512];
         fseek(worker->errors, 0, SEEK_SET);
-        while (status != EXIT_DONE && !progress_interrupted() && fgets(line, sizeof line, worker->errors))
+        while (status != EXIT_DONE && !is_interrupted() && fgets(line, sizeof line, worker->errors))
             fputs(line, stderr);
         fclose(worker->errors);
     }
@@ -116,10 +117,10 @@ static bool worker_spawn(MeasuredProgram *worker, const AgainstOptions *options,
 
 // Returns whether the user interrupted. Every process receives the signal, so the worker may have exited
 // before this process has noticed.
-static bool is_interrupted(const MeasuredProgram *worker)
+static bool worker_is_interrupted(const MeasuredProgram *worker)
 {
     siginfo_t ended = {0};
-    if (progress_interrupted()) return true;
+    if (is_interrupted()) return true;
     if (!feof(worker->replies) || waitid(P_PID, (id_t)worker->process, &ended, WEXITED | WNOWAIT) != 0)
         return false;
     return ended.si_code == CLD_EXITED ? ended.si_status == EXIT_INTERRUPTED : ended.si_status == SIGINT;
@@ -130,7 +131,7 @@ static bool worker_greets(MeasuredProgram *worker, size_t row_count)
     char line[80], expected[80];
     snprintf(expected, sizeof expected, greeting, row_count);
     if (fgets(line, sizeof line, worker->replies) && strcmp(line, expected) == 0) return true;
-    if (!is_interrupted(worker))
+    if (!worker_is_interrupted(worker))
         fprintf(stderr, "glint bench: '%s' does not answer as a glint with bench --against does\n",
                 worker->program);
     return false;
@@ -174,7 +175,7 @@ static bool worker_run(MeasuredProgram *worker, double *seconds, size_t row_coun
     fputc('\n', worker->requests);
     fflush(worker->requests);
     bool whole = reply_read(worker->replies, seconds, row_count);
-    if (!whole && !is_interrupted(worker))
+    if (!whole && !worker_is_interrupted(worker))
         fprintf(stderr, "glint bench: '%s' exited early\n", worker->program);
     return whole;
 }
@@ -202,7 +203,7 @@ static bool pair_measure(Against *against, MeasuredProgram *workers, size_t pair
          round++)
         for (size_t turn = 0; turn < 2 && whole; turn++) {
             size_t which = (turn + other_is_first(pair + round)) % 2;
-            whole = worker_run(&workers[which], seconds, row_count) && !progress_interrupted();
+            whole = worker_run(&workers[which], seconds, row_count) && !is_interrupted();
             for (size_t i = 0; i < row_count && whole; i++) {
                 if (seconds[i] == 0 && !against->comparisons[i].why_not)
                     against->comparisons[i].why_not = not_available;
@@ -236,7 +237,7 @@ static int pair_run(Against *against, size_t pair)
         int ended = worker_close(&workers[which]);
         if (was_started && ended == EXIT_MACHINE) status = EXIT_MACHINE;
     }
-    return progress_interrupted() ? EXIT_INTERRUPTED : status;
+    return is_interrupted() ? EXIT_INTERRUPTED : status;
 }
 
 static bool rows_classify(Against *against, size_t look)

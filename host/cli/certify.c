@@ -7,9 +7,9 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/format.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
-#include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/compile/features.h"
 #include <stdio.h>
@@ -209,14 +209,11 @@ static int precision_compare(Certification *certification, RenderSettings settin
         if (precision == PRECISION_CERTIFIED)
             row->uncertified =
                 certify_uncertified(certification->scene, &film, certification->options->pixels / 10 + 1,
-                                    path_of(certification->options), progress_interrupted);
+                                    path_of(certification->options), is_interrupted);
         film_free(&film);
     }
     renderer_close(renderer);
-    return is_unfit                 ? EXIT_USER
-           : progress_interrupted() ? EXIT_INTERRUPTED
-           : whole                  ? EXIT_DONE
-                                    : EXIT_MACHINE;
+    return is_unfit ? EXIT_USER : is_interrupted() ? EXIT_INTERRUPTED : whole ? EXIT_DONE : EXIT_MACHINE;
 }
 
 // Returns EXIT_CHECK with a message if `certified` is wrong at a pixel that it decided.
@@ -264,7 +261,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     const RenderSettings settings = settings_of_scene(&options->common, scene);
     const double start = clock_seconds();
     if (!certify_sample_open(&certification.sample, scene, settings.width, settings.height, options->pixels,
-                             path_of(options), progress_interrupted))
+                             path_of(options), is_interrupted))
         return EXIT_INTERRUPTED;
     certification.reference_seconds = clock_seconds() - start;
     for (size_t i = 0; i < certification.sample.count; i++)
@@ -296,7 +293,7 @@ int command_certify(int argument_count, char **arguments)
     OpenDevice open;
     status = EXIT_USER;
     if (scene_open(&scene, options.scene, &options.common) && device_open(&open, &options.common)) {
-        progress_flag_signals();
+        interrupts_flag();
         status = device_close(&open, scene_certify(&options, &scene, &open));
     }
     scene_free(&scene);

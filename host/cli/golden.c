@@ -8,8 +8,8 @@
 #include "host/cli/commands.h"
 #include "host/cli/format.h"
 #include "host/cli/golden_file.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/cli/progress.h"
 #include "host/cli/report_json.h"
 #include "host/image/image.h"
 #include <stdio.h>
@@ -188,7 +188,7 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
     settings.bounce_count = golden->bounces;
     settings.shift_to_eye = true;
     settings.hashes_scene = true;
-    settings.stop = progress_stops;
+    settings.stop = interrupts_stop;
     unsigned aovs = 0;
     for (size_t i = 0; i < HASHED_COUNT; i++)
         if (hashed_layers[i] != LAYER_COLOR) aovs |= 1U << hashed_layers[i];
@@ -197,7 +197,7 @@ static int golden_render(GoldenLine *golden, Film *film, const GoldenOptions *op
     messages_print(&messages, golden->scene);
     int status = renderer ? EXIT_DONE : EXIT_USER;
     if (renderer && !renderer_render_film(renderer, aovs, film))
-        status = progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
+        status = is_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
     if (status == EXIT_DONE) {
         golden->scene_hash = renderer_scene_hash(renderer);
         for (size_t i = 0; i < HASHED_COUNT; i++)
@@ -336,7 +336,7 @@ int command_golden(int argument_count, char **arguments)
     OpenDevice open;
     status = EXIT_USER;
     if (is_read && device_open(&open, &options.common)) {
-        progress_flag_signals();
+        interrupts_flag();
         status = options.writes ? scenes_write(&file, &options, &open.compute)
                                 : scenes_check(&file, &options, &open.compute);
         status = device_close(&open, status);

@@ -4,7 +4,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
-#include "host/cli/progress.h"
+#include "host/cli/interrupts.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -166,7 +166,7 @@ RenderSettings settings_of_scene(const CommonOptions *common, const Scene *scene
     scene_choose_image_size(scene, &width, &height);
     RenderSettings settings = settings_whole(common, width, height);
     settings.shift_to_eye = true;
-    settings.stop = progress_stops;
+    settings.stop = interrupts_stop;
     return settings;
 }
 

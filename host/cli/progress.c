@@ -1,75 +1,19 @@
 #include "host/cli/progress.h"
 
-#include "host/base/array.h"
 #include "host/base/clock.h"
-#include "host/base/fault.h"
 #include "host/base/text.h"
-#include <signal.h>
+#include "host/cli/interrupts.h"
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
 #include <unistd.h>
-
-static volatile sig_atomic_t interrupted, is_flag_read, is_held;
-
-// Two signals often arrive together, one for the process and one for its group. Only a third is a second
-// request of the user.
-static void interrupt_record(int signal_number)
-{
-    if (!is_flag_read && !is_held) {
-        static const char text[] = "glint: interrupted\n";
-        ssize_t ignored = write(STDERR_FILENO, text, sizeof text - 1);
-        (void)ignored;
-        _exit(EXIT_INTERRUPTED);
-    }
-    if (interrupted) signal(signal_number, SIG_DFL);
-    interrupted = 1;
-}
-
-static const int signals[] = {SIGINT, SIGTERM, SIGHUP};
-
-void progress_ignore_signals(void)
-{
-    for (size_t i = 0; i < COUNT_OF(signals); i++)
-        signal(signals[i], SIG_IGN);
-}
-
-void progress_catch_signals(void)
-{
-    const struct sigaction action = {.sa_handler = interrupt_record};
-    for (size_t i = 0; i < COUNT_OF(signals); i++) {
-        struct sigaction before;
-        if (sigaction(signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
-            sigaction(signals[i], &action, NULL);
-    }
-}
 
 void progress_open(Progress *progress, bool quiet)
 {
     double now = clock_seconds();
     *progress =
         (Progress){.visible = !quiet && isatty(STDERR_FILENO), .opened_seconds = now, .shown_seconds = now};
-    progress_flag_signals();
-}
-
-void progress_hold_signals(void)
-{
-    is_held = 1;
-}
-
-void progress_release_signals(void)
-{
-    is_held = 0;
-}
-
-void progress_flag_signals(void)
-{
-    is_flag_read = 1;
-}
-
-void progress_end_at_once(void)
-{
-    is_flag_read = 0;
+    interrupts_flag();
 }
 
 double progress_seconds_left(Progress *progress, double fraction_done)
@@ -118,24 +62,4 @@ void progress_step(Progress *progress, double fraction_done, const char *format,
 void progress_close(Progress *progress)
 {
     if (progress->visible) fputs("\r\033[K", stderr);
-}
-
-static bool (*other_interrupts)(void *context);
-static void *other_context;
-
-void progress_set_interrupt(bool (*interrupts)(void *context), void *context)
-{
-    other_interrupts = interrupts;
-    other_context = context;
-}
-
-bool progress_interrupted(void)
-{
-    return interrupted != 0 || (other_interrupts && other_interrupts(other_context));
-}
-
-bool progress_stops(void *context)
-{
-    (void)context;
-    return progress_interrupted();
 }

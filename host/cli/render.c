@@ -4,7 +4,7 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
-#include "host/cli/progress.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/render_image.h"
 #include "host/import/load.h"
 #include <stdio.h>
@@ -127,8 +127,8 @@ int render_command_run(RenderCommand *command, size_t index, Ranks *ranks)
     if (options->frame_count > 0) options->common.frame = options->first_frame + (double)index;
     if (options->skips_existing && image_exists(options, command->paths[index])) return EXIT_DONE;
     render_devices_rest(open);
-    progress_end_at_once(); // nothing checks the flag while a scene is read
-    if (progress_interrupted()) return EXIT_INTERRUPTED;
+    interrupts_end_at_once(); // nothing checks the flag while a scene is read
+    if (is_interrupted()) return EXIT_INTERRUPTED;
     RenderOptions of_image = *options;
     char *checkpoint = options->checkpoint && options->frame_count > 0
                            ? frame_name_make(options->checkpoint, options->first_frame + (uint32_t)index)

@@ -2,6 +2,7 @@
 #include "host/cli/render_image.h"
 #include "host/base/clock.h"
 #include "host/cli/checkpoint_key.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/progress.h"
 #include "host/cli/shutter.h"
 #include "host/import/load.h"
@@ -45,7 +46,7 @@ static bool band_receive(void *context, const Film *band)
     ImageRender *render = context;
     Shutter *shutter = &render->shutter;
     bool is_taken = true;
-    if (progress_interrupted()) return false;
+    if (is_interrupted()) return false;
     if (shutter->time_count == 1) {
         is_taken = image_output_write(render->output, band, &render->messages);
     } else if (render->output) {
@@ -85,9 +86,9 @@ static bool checkpoint_start(ImageRender *render)
 // Prints what an interrupted or failed render has left.
 static void rest_print(const RenderOptions *options)
 {
-    if (progress_interrupted() && options->has_format)
+    if (is_interrupted() && options->has_format)
         fprintf(stderr, "glint: interrupted: the image on standard output is incomplete\n");
-    else if (progress_interrupted())
+    else if (is_interrupted())
         fprintf(stderr, "glint: interrupted: no image was written; an earlier %s is unchanged\n",
                 options->output.path);
     if (options->checkpoint)
@@ -176,22 +177,22 @@ static int image_render(ImageRender *render)
         fprintf(stderr, "glint: --timing=trace covers only the first rank's devices\n");
     if (is_whole && is_last && options->timing != TIMING_NONE)
         timing_print(options->timing, &render->origin, render->times);
-    return is_whole                 ? EXIT_DONE
-           : is_faulty              ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
-           : progress_interrupted() ? EXIT_INTERRUPTED
-                                    : EXIT_MACHINE;
+    return is_whole           ? EXIT_DONE
+           : is_faulty        ? (options->has_format ? EXIT_MACHINE : EXIT_USER)
+           : is_interrupted() ? EXIT_INTERRUPTED
+                              : EXIT_MACHINE;
 }
 
 // Stores the precision that --max-error chooses in the settings.
 static int precision_choose(ImageRender *render, Pilot *pilot)
 {
     const RenderOptions *options = render->options;
-    progress_flag_signals();
+    interrupts_flag();
     const bool chosen = pilot_run(pilot, &options->budget, render->open->items[0].compute, render->scene,
                                   &render->settings, &render->messages);
     const bool is_unfit = render->messages.count > 0;
     messages_print_once(&render->messages, render->printed, NULL);
-    if (!chosen) return is_unfit ? EXIT_USER : progress_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
+    if (!chosen) return is_unfit ? EXIT_USER : is_interrupted() ? EXIT_INTERRUPTED : EXIT_MACHINE;
     render->settings.precision = pilot->chosen;
     if (options->quiet) return EXIT_DONE;
     Text line = {0};
@@ -278,8 +279,8 @@ static int shutter_render(ImageRender *render)
     int status = shutter_fits(shutter, render->options) ? EXIT_DONE : EXIT_USER;
     while (status == EXIT_DONE && shutter->time < shutter->time_count) {
         if (shutter->time > 0) {
-            progress_end_at_once(); // nothing checks the flag while a scene is read
-            if (progress_interrupted()) {
+            interrupts_end_at_once(); // nothing checks the flag while a scene is read
+            if (is_interrupted()) {
                 status = EXIT_INTERRUPTED;
                 break;
             }

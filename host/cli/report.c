@@ -7,6 +7,7 @@
 #include "host/base/fault.h"
 #include "host/base/memory.h"
 #include "host/cli/commands.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/cli/progress.h"
 #include "host/cli/report_scrub.h"
@@ -217,7 +218,7 @@ static bool process_wait(pid_t process, double seconds, Progress *progress, doub
     const double limit = clock_seconds() + seconds;
     bool is_stopped = false;
     while (waitpid(process, status, WNOHANG) == 0) {
-        if (!is_stopped && (progress_interrupted() || clock_seconds() > limit)) {
+        if (!is_stopped && (is_interrupted() || clock_seconds() > limit)) {
             is_stopped = true;
             kill(process, SIGKILL);
         }
@@ -387,11 +388,11 @@ static int report_make(const ReportChoice *choice, const char *folder, OutputFil
     file_add(&archive, "versions.txt", &versions);
     variables_set(folder);
     progress_open(&progress, false);
-    for (size_t i = 0; i < STEP_COUNT && !progress_interrupted(); i++)
+    for (size_t i = 0; i < STEP_COUNT && !is_interrupted(); i++)
         results[i] = step_run(&steps[i], choice, folder, &progress, (double)i / STEP_COUNT);
     progress_close(&progress);
     int status = EXIT_INTERRUPTED;
-    if (!progress_interrupted()) {
+    if (!is_interrupted()) {
         MessageList messages = {0};
         for (size_t i = 0; i < STEP_COUNT; i++)
             if (results[i].failure)

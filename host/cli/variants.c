@@ -1,4 +1,5 @@
 #include "host/cli/variants.h"
+#include "host/cli/interrupts.h"
 
 #include "host/base/clock.h"
 #include "host/base/hash.h"
@@ -182,7 +183,7 @@ bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Pr
 {
     variant_set_fit_lanes(set, compute->device);
     for (size_t i = 0; i < set->count; i++) {
-        if (progress_interrupted()) return false;
+        if (is_interrupted()) return false;
         if (set->rows[i].failure) continue;
         const double done = variants_opened_fraction * (double)i / (double)set->count;
         if (progress)

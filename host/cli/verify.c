@@ -6,6 +6,7 @@
 #include "host/base/text.h"
 #include "host/cli/commands.h"
 #include "host/cli/format.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/progress.h"
@@ -364,7 +365,7 @@ static int verification_work(void *context)
     if (!device_open(&open, &verification->options->common)) return EXIT_USER;
     verification->compute = &open.compute;
     progress_open(&verification->progress, false);
-    progress_end_at_once();
+    interrupts_end_at_once();
     return device_close(&open, device_verify(verification, &open.compute));
 }
 

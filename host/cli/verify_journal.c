@@ -1,7 +1,7 @@
 #include "host/cli/verify_journal.h"
 
 #include "host/base/clock.h"
-#include "host/cli/progress.h"
+#include "host/cli/interrupts.h"
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
@@ -53,7 +53,7 @@ void child_end_with(pid_t parent)
 static void child_begin(VerifyJournal *journal, pid_t parent)
 {
     child_end_with(parent);
-    progress_ignore_signals();
+    interrupts_ignore();
     fault_record_crashes(journal->crash);
 }
 

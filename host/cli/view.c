@@ -2,8 +2,8 @@
 #include "host/base/fault.h"
 #include "host/cli/commands.h"
 #include "host/cli/image_output.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/cli/progress.h"
 #include "host/view/keys.h"
 #include "host/view/window.h"
 #include <stdio.h>
@@ -83,12 +83,12 @@ static int window_show(ViewOptions *options, const Device *device)
                    .save_context = options},
         .size = {options->common.size[0], options->common.size[1]},
         .writes_camera = options->writes_camera,
-        .stop = progress_interrupted,
+        .stop = is_interrupted,
     };
     window.frames.settings.sample_count = options->sample_count;
     window.frames.settings.shift_to_eye = true;
     window.frames.settings.moves = true;
-    progress_flag_signals();
+    interrupts_flag();
     switch (window_run(&window)) {
     case WINDOW_CLOSED:
         return EXIT_DONE;

@@ -2,8 +2,8 @@
 
 #include "host/base/fault.h"
 #include "host/base/memory.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/cli/progress.h"
 #include "host/cli/render.h"
 #include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
@@ -220,7 +220,7 @@ static void ranks_serve(void *context, Scheduler *scheduler, size_t first_worker
             const size_t index = (size_t)status.MPI_SOURCE - 1;
             message_process(ranks, &states[index], scheduler, first_worker + index, &status);
         }
-        if (progress_interrupted()) scheduler_end(scheduler);
+        if (is_interrupted()) scheduler_end(scheduler);
         done_count = 0;
         for (size_t i = 0; i < ranks->remote.count; i++) {
             is_busy |= rank_answer(&states[i], scheduler, first_worker + i, (int)i + 1);
@@ -246,7 +246,7 @@ int first_rank_run(size_t other_count, int argument_count, char **arguments)
                    .start = ranks_start};
     signal(SIGPIPE, SIG_IGN);
     signal(SIGXFSZ, SIG_IGN);
-    progress_catch_signals();
+    interrupts_catch();
     fault_catch_crashes();
     int status = EXIT_USER;
     if (argument_count < 2 || strcmp(arguments[1], "render") != 0) {

@@ -3,8 +3,8 @@
 #include "host/base/array.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/cli/progress.h"
 #include "host/mpi/messages.h"
 #include <pthread.h>
 #include <stdio.h>
@@ -85,7 +85,7 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     const bool can_render = command && !uses_standard_streams(command) &&
                             render_devices_open(&command->open, &command->options.common);
     if (is_first) {
-        progress_hold_signals(); // so that the marker is removed in any case
+        interrupts_hold(); // so that the marker is removed in any case
         marker_make(command, marker);
     }
     broadcast(marker, sizeof marker, MPI_COMM_WORLD);
@@ -93,7 +93,7 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     int sees = can_render && own == hash && marker[0] != '\0' && access(marker, F_OK) == 0, all_see;
     MPI_Allreduce(&sees, &all_see, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     if (is_first && marker[0] != '\0') unlink(marker);
-    if (is_first) progress_release_signals();
+    if (is_first) interrupts_release();
     return all_see;
 }
 
@@ -215,7 +215,7 @@ static void frames_serve(Deal *deal, size_t other_count)
         MPI_Status status;
         bool is_busy = has_message(MPI_ANY_SOURCE, TAG_FRAME_DONE, &status);
         if (is_busy) frame_done_receive(deal, &states[status.MPI_SOURCE - 1], status.MPI_SOURCE);
-        if (progress_interrupted()) deal_end(deal);
+        if (is_interrupted()) deal_end(deal);
         over_count = 0;
         for (size_t i = 0; i < other_count; i++) {
             is_busy |= frame_send(deal, &states[i], (int)i + 1);
@@ -238,7 +238,7 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
                  .end = whole * worker_count,
                  .workers = worker_count};
     pthread_t thread;
-    progress_hold_signals(); // also while the thread reads a scene
+    interrupts_hold(); // also while the thread reads a scene
     const bool has_thread = pthread_create(&thread, NULL, own_frames_render, &deal) == 0;
     if (!has_thread) {
         fprintf(stderr, "glint: warning: cannot start a thread: the other ranks render the frames\n");
@@ -246,12 +246,12 @@ size_t frames_deal(RenderCommand *command, size_t other_count, int argument_coun
     }
     frames_serve(&deal, other_count);
     if (has_thread) pthread_join(thread, NULL);
-    progress_release_signals();
+    interrupts_release();
     free(deal.again.items);
     if (deal.workers == 0) {
         fprintf(stderr, "glint: no rank is left that can render\n");
         render_command_record(command, EXIT_MACHINE);
-    } else if (progress_interrupted() && (deal.next < deal.end || deal.again.count > 0)) {
+    } else if (is_interrupted() && (deal.next < deal.end || deal.again.count > 0)) {
         render_command_record(command, EXIT_INTERRUPTED);
     }
     return deal.end;
@@ -270,13 +270,13 @@ void frames_work(size_t local_rank, int argument_count, char **arguments)
     if (files_are_shared(command, (Call){argument_count, arguments}, false)) {
         bool has_ended = false;
         status = EXIT_DONE;
-        progress_set_interrupt(end_received, &has_ended);
+        interrupts_set_source(end_received, &has_ended);
         for (size_t frame;; status = frame_render(command, frame)) {
             send_bytes(&status, sizeof status, 0, TAG_FRAME_DONE);
             receive_bytes(&frame, sizeof frame, 0, TAG_FRAME);
             if (frame == NO_FRAME) break;
         }
-        progress_set_interrupt(NULL, NULL);
+        interrupts_set_source(NULL, NULL);
         end_await(&has_ended);
         render_command_drop_devices(command);
     }

@@ -1,8 +1,8 @@
 #include "host/mpi/other_rank.h"
 
 #include "host/base/memory.h"
+#include "host/cli/interrupts.h"
 #include "host/cli/options.h"
-#include "host/cli/progress.h"
 #include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
 #include <stdio.h>
@@ -132,7 +132,7 @@ static void job_run(RankRenderer *worker, const Job *job)
 
 void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments)
 {
-    progress_ignore_signals(); // which reach all ranks: the first ends the render and the job
+    interrupts_ignore(); // which reach all ranks: the first ends the render and the job
     RankRenderer worker = {.rank = rank, .local_rank = local_rank};
     Job job;
     while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.type != JOB_END) {

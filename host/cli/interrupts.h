@@ -1,0 +1,23 @@
+// Handles the signals by which the user interrupts a command: SIGINT, SIGTERM and SIGHUP.
+#pragma once
+
+#include <stdbool.h>
+
+// Makes the signals end the process with EXIT_INTERRUPTED, except for those that the parent ignores, as nohup
+// and a shell's background jobs do. Must be called first.
+void interrupts_catch(void);
+// Ignores the signals, in a process whose parent handles them.
+void interrupts_ignore(void);
+// Makes the signals set a flag, which is_interrupted returns. The third signal ends the process.
+void interrupts_flag(void);
+// Makes the signals end the process at once, until interrupts_flag is called.
+void interrupts_end_at_once(void);
+// Makes the signals set the flag until they are released, even if interrupts_end_at_once is called.
+void interrupts_hold(void);
+void interrupts_release(void);
+// Makes is_interrupted return true also if `interrupts` does, which may be NULL.
+void interrupts_set_source(bool (*interrupts)(void *context), void *context);
+
+bool is_interrupted(void);
+// Returns is_interrupted(). A renderer's `stop` function, which ignores its context.
+bool interrupts_stop(void *context);
