@@ -4,6 +4,7 @@
 #include "host/cli/bench_against.h"
 #include "host/cli/bench_report.h"
 #include "host/cli/commands.h"
+#include "host/cli/open_device.h"
 #include "host/cli/variants.h"
 #include "host/measure/baseline.h"
 #include <ctype.h>

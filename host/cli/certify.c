@@ -8,7 +8,7 @@
 #include "host/cli/commands.h"
 #include "host/cli/format.h"
 #include "host/cli/interrupts.h"
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/compile/features.h"

@@ -9,7 +9,7 @@
 #include "host/cli/format.h"
 #include "host/cli/golden_file.h"
 #include "host/cli/interrupts.h"
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/cli/report_json.h"
 #include "host/image/image.h"
 #include <stdio.h>

@@ -1,7 +1,7 @@
 // The devices of a command's images, with a renderer on each.
 #pragma once
 
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/cli/ranks.h"
 
 typedef struct {

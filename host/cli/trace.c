@@ -5,7 +5,7 @@
 #include "host/base/output.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/image/image.h"
 #include "host/import/report.h"
 #include <float.h>

@@ -3,7 +3,7 @@
 #include "host/cli/commands.h"
 #include "host/cli/image_output.h"
 #include "host/cli/interrupts.h"
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/view/keys.h"
 #include "host/view/window.h"
 #include <stdio.h>

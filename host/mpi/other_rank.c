@@ -2,7 +2,7 @@
 
 #include "host/base/memory.h"
 #include "host/cli/interrupts.h"
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/mpi/frames.h"
 #include "host/mpi/messages.h"
 #include <stdio.h>

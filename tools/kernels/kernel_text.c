@@ -1,6 +1,6 @@
 // Prints the text of the kernel that renders a scene with one ray per work-item, as on a GPU, except that
 // HAS_FMA and REPAIRS_DIVIDE are those of the default device.
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include <stdio.h>
 #include <stdlib.h>
 
