@@ -31,9 +31,9 @@ struct Option {
     double low, high;
     bool is_above;
     const char *const *names;
-    const unsigned *values; // what option_choice stores for each name, or NULL for its index
     size_t name_count;
-    char letter; // of the short form, or '\0'
+    const unsigned *values; // what option_choice stores for each name, or NULL for its index
+    char letter;            // of the short form, or '\0'
 };
 
 #define NUMBERS(least, most)       .low = (least), .high = (most)

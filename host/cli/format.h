@@ -49,8 +49,8 @@ ShortText column_heading(const char *column);
 
 enum { REPORT_FORMAT, REPORT_OUTPUT, REPORT_JSON, REPORT_OPTION_COUNT };
 extern const Option report_options[REPORT_OPTION_COUNT];
-// Chooses the format by the file's ending if no other is given. Finds an ending that gives none, and a format
-// for times if the command has no times.
+// Chooses the format by the file's ending if no other is given. It is a mistake if the ending gives none, or
+// if the format is for times and the command has none.
 OptionCheck report_options_check;
 // The group of the options of CommonOptions.report, which must follow those of options that create folders,
 // since the file may be in one.

@@ -7,26 +7,22 @@
 // JOB_IMAGE: all ranks render bands of one image.
 // 1. The first rank broadcasts the device selector. Each other rank opens a device and answers with its Rank.
 // 2. The first rank broadcasts Orders: ORDER_SCENE with each variant of the scene that a rank needs, followed
-// by
-//    the compiled scene for the ranks that need it, and then ORDER_START. ORDER_CANCEL ends the job instead
-//    if a rank has no device or the image cannot be rendered.
+//    by the compiled scene for the ranks that need it, and then ORDER_START. ORDER_CANCEL ends the job
+//    instead if a rank has no device or the image cannot be rendered.
 // 3. Each other rank sends TAG_REQUEST, receives TAG_ROWS and sends the band of these rows as TAG_BAND and
 //    TAG_LAYERS, until it receives no rows or TAG_END or its device fails. Then it sends TAG_DONE.
-// 4. The first rank sends each other rank TAG_END once: when all rows are rendered, when the user interrupts,
-// or
-//    after that rank's TAG_DONE. The rank then waits for the next Job.
+// 4. The first rank sends TAG_END to each other rank once: when all rows are rendered, when the user
+//    interrupts, or after that rank's TAG_DONE. The rank then waits for the next Job.
 // A rank that reports a failure, or sends anything but its rows, is dropped with a warning: the others render
 // its rows, its bands are discarded, and its requests are answered with no rows.
 //
 // JOB_FRAMES: each rank renders whole frames alone.
 // 1. The first rank broadcasts the name of a marker file and a hash of the arguments and files. All ranks
-// learn
-//    whether all see both. If not, the job ends, and all ranks render the frames together.
+//    learn whether all see both. If not, the job ends, and all ranks render the frames together.
 // 2. Each other rank sends TAG_FRAME_DONE and receives TAG_FRAME, until it receives NO_FRAME.
-// 3. The first rank sends each other rank TAG_END once, before NO_FRAME: when all frames are rendered, when
-// the
-//    user interrupts, which stops a frame that is being rendered, or when that rank's device has failed.
-//    Other ranks render its frame.
+// 3. The first rank sends TAG_END to each other rank once, before NO_FRAME: when all frames are rendered,
+//    when the user interrupts, which stops a frame that is being rendered, or when that rank's device has
+//    failed. Other ranks then render its frame.
 #pragma once
 
 #include "host/cli/ranks.h"
