@@ -41,12 +41,13 @@ void broadcast(void *bytes, size_t size, MPI_Comm ranks)
 
 void send_bytes(const void *bytes, size_t size, int rank, int tag)
 {
-    size_t done = 0;
-    do {
-        const int count = message_size(size - done);
-        MPI_Send((const char *)bytes + done, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD);
-        done += (size_t)count;
-    } while (done < size);
+    for (;;) {
+        const int count = message_size(size);
+        MPI_Send(bytes, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD);
+        size -= (size_t)count;
+        if (size == 0) return;
+        bytes = (const char *)bytes + count;
+    }
 }
 
 bool has_message(int rank, int tag, MPI_Status *status)
@@ -58,15 +59,16 @@ bool has_message(int rank, int tag, MPI_Status *status)
 
 void receive_bytes(void *bytes, size_t size, int rank, int tag)
 {
-    size_t done = 0;
-    do {
-        const int count = message_size(size - done);
+    for (;;) {
+        const int count = message_size(size);
         MPI_Status status;
         while (!has_message(rank, tag, &status))
             rest();
-        MPI_Recv((char *)bytes + done, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
-        done += (size_t)count;
-    } while (done < size);
+        MPI_Recv(bytes, count, MPI_BYTE, rank, tag, MPI_COMM_WORLD, MPI_STATUS_IGNORE);
+        size -= (size_t)count;
+        if (size == 0) return;
+        bytes = (char *)bytes + count;
+    }
 }
 
 bool end_received(void *received)
