@@ -31,15 +31,15 @@ static bool budgets_read(const Option *option, const char *value, void *options)
 
 static const Option options_own[] = {
     {"reference", "FILE",
-     "linear colors to compare with, .exr or .npy, of the images' size or a multiple, then averaged "
+     "compare with these linear colors, .exr or .npy, of the images' size or a multiple, which is averaged "
      "(default: the image at double)",
      option_text, offsetof(AccuracyOptions, reference_path)},
     {"budget", "LIST",
-     "errors to allow: report the fastest configuration within each (default: 1e-2,1e-4,1e-6)", budgets_read,
+     "report the fastest configuration within each of these errors (default: 1e-2,1e-4,1e-6)", budgets_read,
      0, NUMBERS_ABOVE(0, INFINITY)},
     {"save", "FOLDER", "write all compared arrays there, as .npy", option_text,
      offsetof(AccuracyOptions, folder), .effect = effect_folder},
-    {"html", "FILE", "self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
+    {"html", "FILE", "write a self-contained HTML report", option_text, offsetof(AccuracyOptions, page_path)},
     PRECISIONS_OPTION("the first three")};
 
 static const char *options_check(void *accuracy_options)

@@ -26,7 +26,7 @@ typedef struct {
 } BenchOptions;
 
 static const Option options_own[] = {
-    {"against", "GLINT", "compare with another build, run alternately; default of --seconds: 30 per row",
+    {"against", "GLINT", "compare with another build, run alternately (default of --seconds: 30 per row)",
      option_text, offsetof(BenchOptions, against)},
     {"compare", "FILE", "compare with an earlier report (--json); claims less than --against", option_text,
      offsetof(BenchOptions, baseline)},
@@ -39,7 +39,8 @@ static const Option options_own[] = {
     {"no-build-times", NULL, "take kernels from the cache instead of timing their builds", option_flag,
      offsetof(BenchOptions, variants.no_build_times)},
     {"variant", "OPTIONS",
-     "rows with these options, as in \"--lanes 8 --work-group 8x8\"; any of --precision, --lanes, --bvh, "
+     "add rows with these options, such as \"--lanes 8 --work-group 8x8\"; any of --precision, --lanes, "
+     "--bvh, "
      "--samples, --bounces, --work-group and --build-options; may be repeated. A row is compared with the "
      "first variant's row of the same precision, lanes, BVH and samples, unless the variants differ in these",
      option_texts, offsetof(BenchOptions, variant_texts)}};

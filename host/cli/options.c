@@ -42,7 +42,7 @@ const Option device_option[] = {
      option_text, FIELD(device)}};
 const Option devices_option[] = {
     {"device", "LIST",
-     "the devices: all, or a list with commas, each by its index, part of its name, its place on the PCI "
+     "the devices: all, or a comma-separated list, each by its index, part of its name, its place on the PCI "
      "bus, cpu or gpu (default: GLINT_DEVICE, else a GPU, else a CPU)",
      option_text, FIELD(device)}};
 const Option reference_option[] = {
@@ -70,8 +70,9 @@ const Option ray_options[] = {
     [RAY_MIN_CONTRIBUTION] = {"min-contribution", "W",
                               "trace no bounced ray whose weight in its pixel is below W (default: 0)",
                               option_number, FIELD(min_contribution), NUMBERS(0, 1)}};
-const Option set_options[] = {{"set", "PATH=VALUE", "set a value in YAML, such as camera.fov=60; repeatable",
-                               option_texts, FIELD(overrides)},
+const Option set_options[] = {{"set", "PATH=VALUE",
+                               "set a value in YAML, such as camera.fov=60; may be repeated", option_texts,
+                               FIELD(overrides)},
                               {"camera", "FILE", "use the camera of this scene", camera_read, FIELD(camera)}};
 const Option perturb_option[] = {{"perturb", "SEED[:SCALE]",
                                   "inject the rounding error that OpenCL permits, times SCALE (default: 1)",

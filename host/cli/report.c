@@ -54,7 +54,7 @@ static const Option archive_options[] = {{"output", "FILE", "the archive (defaul
                                           NUMBERS_ABOVE(0, SECONDS_MAX)}};
 static const Option precision_own[] = {PRECISION_OPTION(
     "single, strict or double (default: all for verify, single for bench)", ARITHMETIC_COUNT)};
-static const Option page_option[] = {{"html", "FILE", "self-contained HTML page of this comparison",
+static const Option page_option[] = {{"html", "FILE", "write a self-contained HTML page of this comparison",
                                       option_text, offsetof(ReportChoice, page)}};
 
 // Lists the options for verify and bench.
