@@ -15,7 +15,6 @@
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdio.h>
-#include <string.h>
 
 typedef struct {
     CommonOptions common;

@@ -4,7 +4,7 @@
 #include "host/base/json.h"
 #include "host/base/text.h"
 #include "host/cli/commands.h"
-#include "host/cli/options.h"
+#include "host/cli/open_device.h"
 #include "host/cli/passport_report.h"
 #include "host/cli/report_json.h"
 #include "host/cli/table.h"

@@ -5,7 +5,6 @@
 #include "host/base/output.h"
 #include "host/base/text.h"
 #include "host/cli/options.h"
-#include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -4,7 +4,6 @@
 #include "host/base/text.h"
 #include "host/cli/interrupts.h"
 #include <stdarg.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <unistd.h>
 

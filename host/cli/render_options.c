@@ -1,7 +1,6 @@
 #include "host/cli/render_options.h"
 
 #include "host/base/file.h"
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>

@@ -5,7 +5,6 @@
 #include "host/base/array.h"
 #include "host/base/clock.h"
 #include "host/base/fault.h"
-#include "host/base/memory.h"
 #include "host/cli/commands.h"
 #include "host/cli/interrupts.h"
 #include "host/cli/options.h"

@@ -6,7 +6,6 @@
 #include "host/base/memory.h"
 #include "host/base/text.h"
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
