@@ -7,11 +7,6 @@ typedef struct {
     Vector3 origin, direction;
 } RandomRay;
 
-static inline Vector3 vector_from(const double parts[3])
-{
-    return (Vector3){parts[0], parts[1], parts[2]};
-}
-
 // Returns a point of the cube from -half to half.
 Vector3 random_cube_point(Random *random, double half);
 

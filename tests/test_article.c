@@ -75,16 +75,12 @@ static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
     ReferenceHit expected = reference_hit(scene, &ray);
     assert_true(expected.found);
 
-    const TraceRay probe = {{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
-                            {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
-                            0,
-                            FLT_MAX};
+    const TraceRay probe = {quad3_rounded(ray.origin), quad3_rounded(ray.direction), 0, FLT_MAX};
     TraceHit hit = {0};
     assert_true(probe_trace(scene, PRECISION_SINGLE, 0, &probe, 1, &hit));
     assert_int_equal(hit.object, expected.object);
     assert_true(fabs((double)(hit.t - expected.t)) <= 8 * reference_ulp(expected.t, 24));
-    Vector3 normal = {hit.normal[0], hit.normal[1], hit.normal[2]};
-    assert_true(reference_distance(normal, expected.normal) <= 0x1p-20);
+    assert_true(reference_distance(hit.normal, expected.normal) <= 0x1p-20);
     return expected;
 }
 

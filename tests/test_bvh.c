@@ -100,7 +100,7 @@ static Vector3 delicate_point(const Scene *scene)
 
 static TraceRay ray_of(Vector3 origin, Vector3 direction)
 {
-    return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    return (TraceRay){origin, direction, 0, INFINITY};
 }
 
 // Makes rays. A quarter each are arbitrary, run along an axis with components of exactly 0 or -0, aim at a
@@ -158,8 +158,8 @@ TEST(no_hit_depends_on_the_tree)
             print_error(
                 "%s, ray %zu from %.9g %.9g %.9g along %.9g %.9g %.9g: object %d at %.17g with the tree, "
                 "%d (a %s) at %.17g without\n",
-                precision_names[runs[run].precision], i, ray->origin[0], ray->origin[1], ray->origin[2],
-                ray->direction[0], ray->direction[1], ray->direction[2], (int)on[i].object, on[i].t,
+                precision_names[runs[run].precision], i, ray->origin.x, ray->origin.y, ray->origin.z,
+                ray->direction.x, ray->direction.y, ray->direction.z, (int)on[i].object, on[i].t,
                 (int)off[i].object,
                 off[i].object == UINT32_MAX ? "miss" : shape_names[scene.objects.items[off[i].object].type],
                 off[i].t);

@@ -15,7 +15,7 @@ typedef struct {
 
 static void ray_set(TraceRay *ray, Vector3 origin, Vector3 direction)
 {
-    *ray = (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    *ray = (TraceRay){origin, direction, 0, INFINITY};
 }
 
 static void hit_check(const ReferenceScene *reference, const TraceRay *ray, const TraceHit *hit,
@@ -25,9 +25,8 @@ static void hit_check(const ReferenceScene *reference, const TraceRay *ray, cons
         counts->uncertain++;
         return;
     }
-    const double *o = ray->origin, *d = ray->direction;
-    const ReferenceRay exact_ray = reference_ray((Vector3){o[0], o[1], o[2]}, (Vector3){d[0], d[1], d[2]});
-    ReferenceRay traced = exact_ray;
+    const Vector3 o = ray->origin, d = ray->direction;
+    ReferenceRay traced = reference_ray(o, d);
     traced.tmax = isfinite(ray->tmax) ? (Quad)ray->tmax : (Quad)LDBL_MAX;
     const ReferenceHit exact = reference_scene_hit(reference, &traced, UINT32_MAX);
     counts->certain += hit->certainty == TRACE_CERTAIN;
@@ -35,8 +34,8 @@ static void hit_check(const ReferenceScene *reference, const TraceRay *ray, cons
     counts->hits += exact.found;
     if (hit->object != exact.object ||
         (exact.found && !((Quad)hit->low <= exact.t && exact.t <= (Quad)hit->high)))
-        fail_msg("(%a %a %a) + t (%a %a %a): object %u, t %a in %a .. %a, exact %u at %a", o[0], o[1], o[2],
-                 d[0], d[1], d[2], hit->object, hit->t, hit->low, hit->high, exact.object, (double)exact.t);
+        fail_msg("(%a %a %a) + t (%a %a %a): object %u, t %a in %a .. %a, exact %u at %a", o.x, o.y, o.z, d.x,
+                 d.y, d.z, hit->object, hit->t, hit->low, hit->high, exact.object, (double)exact.t);
 }
 
 static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
@@ -141,7 +140,7 @@ TEST(least_and_largest_numbers)
             vector_scale(random_in_sphere(&random), exp2(random_between(&random, -1000, 1000)));
         ray_set(&rays[i], vector_scale(random_in_sphere(&random), size), direction);
         if (i % 4 == 0) // about the distance of the plane y = 0
-            rays[i].tmax = -rays[i].origin[1] / direction.y * (1 + random_between(&random, -1e-15, 1e-15));
+            rays[i].tmax = -rays[i].origin.y / direction.y * (1 + random_between(&random, -1e-15, 1e-15));
         if (!(rays[i].tmax > 0)) rays[i].tmax = INFINITY;
         scaled[i] = trace_ray_scaled(rays[i], PRECISION_CERTIFIED, &exponents[i]);
     }

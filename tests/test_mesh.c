@@ -503,7 +503,7 @@ static void rays_down(TraceRay *rays)
         double x = (double)column / 50 - 0.125, y = (double)row / 50 - 0.125;
         double along = 0.1 + 0.6 * (double)i / (GRID * GRID);
         rays[i] = (TraceRay){{x, y, 4}, {0.0625, 0.03125, -1}, 0, INFINITY};
-        if (i % 2 == 1) memcpy(rays[i].direction, (double[3]){along - x, along - y, -3}, sizeof(double[3]));
+        if (i % 2 == 1) rays[i].direction = (Vector3){along - x, along - y, -3};
     }
 }
 

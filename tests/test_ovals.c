@@ -63,13 +63,13 @@ static void rays_prepare(const RandomShape *shape, const Affine *affine, TraceRa
         const RandomRay given = random_ray(shape, random);
         const Vector3 from = affine_point(affine, given.origin),
                       way = affine_direction(affine, given.direction);
-        rays[i] = (TraceRay){{from.x, from.y, from.z}, {way.x, way.y, way.z}, 0, 1e30};
+        rays[i] = (TraceRay){from, way, 0, 1e30};
     }
 }
 
 static ReferenceHit exact_hit(const Object *object, const TraceRay *ray, bool is_double)
 {
-    const Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
+    const Vector3 origin = ray->origin, direction = ray->direction;
     const ReferenceRay exact =
         is_double ? reference_ray(origin, direction) : reference_ray_rounded(origin, direction);
     return reference_hit_object(object, &exact);
@@ -97,14 +97,13 @@ static void hit_compare(const Object *object, const TraceRay *ray, const TraceHi
     const ReferenceSurface surface = reference_surface(object, quad3(object->as.oval.center));
     double least, most;
     oval_stretches(object, &least, &most);
-    const double length = vector_length(vector_from(ray->direction)), stretch = most / least,
-                 distance = vector_length(vector_subtract(vector_from(ray->origin), surface.center));
+    const double length = vector_length(ray->direction), stretch = most / least,
+                 distance = vector_length(vector_subtract(ray->origin, surface.center));
     double size = surface.bounding_radius;
     if (!oval_is_bounded(object)) size = fmax(size, distance);
     if (exact.found && !oval_is_bounded(object)) size = fmax(size, (double)exact.t * length);
     // rounding turns a ray along the axis to either side
-    const Vector3 way = vector_normalize(vector_from(ray->direction)),
-                  axis = vector_normalize(object->as.oval.axes[2]);
+    const Vector3 way = vector_normalize(ray->direction), axis = vector_normalize(object->as.oval.axes[2]);
     if (!oval_is_bounded(object) && vector_length(vector_cross(way, axis)) < 1e-3) return;
     // rays far away are moved before they are mapped, at compensated forms without loss
     const double moved = u * ((precision == PRECISION_SINGLE ? 2 * distance : 0) + 4 * stretch * size);
@@ -120,8 +119,8 @@ static void hit_compare(const Object *object, const TraceRay *ray, const TraceHi
     const double normal_bound =
         16 * u * stretch +
         4 * u * (distance + stretch * size) / ((double)exact.cosine * (double)exact.curvature_radius);
-    tally_add(&tally->normal, reference_distance(vector_from(hit->normal), exact.normal) / normal_bound);
-    const Vector3 place = vector_from(hit->position);
+    tally_add(&tally->normal, reference_distance(hit->normal, exact.normal) / normal_bound);
+    const Vector3 place = hit->position;
     const ReferenceSurface there = reference_surface(object, quad3(place));
     const double place_bound =
         u * (24 * stretch * size + 8 * vector_length(place) + 4 * length * (double)exact.t);
@@ -134,12 +133,11 @@ static void leaving_rays_miss(const Scene *scene, Precision precision, TraceRay 
     static TraceHit next[RAYS];
     size_t count = 0;
     for (size_t i = 0; i < RAYS; i++) {
-        const Vector3 from = vector_from(rays[i].origin), way = vector_from(hits[i].normal),
-                      start = vector_from(hits[i].reflected_origin),
+        const Vector3 from = rays[i].origin, way = hits[i].normal, start = hits[i].reflected_origin,
                       outward = vector_subtract(start, scene->objects.items[0].as.oval.center);
         if (hits[i].object != 0 || vector_dot(way, outward) < 0) continue;
         assert_true(vector_dot(way, vector_subtract(from, start)) > 0);
-        rays[count++] = (TraceRay){{start.x, start.y, start.z}, {way.x, way.y, way.z}, 0, 1e30};
+        rays[count++] = (TraceRay){start, way, 0, 1e30};
     }
     assert_true(count > RAYS / 20);
     assert_true(probe_trace(scene, precision, 0, rays, count, next));
@@ -247,13 +245,12 @@ TEST(ellipsoids_follow_the_textbook)
             const Vector3 from = vector_scale(random_unit_vector(&random), 9),
                           to = vector_add(center, random_cube_point(&random, 2)),
                           way = vector_normalize(vector_subtract(to, from));
-            rays[i] = (TraceRay){{from.x, from.y, from.z}, {way.x, way.y, way.z}, 0, 1e30};
+            rays[i] = (TraceRay){from, way, 0, 1e30};
         }
         assert_true(probe_trace(&scene, PRECISION_DOUBLE, 1, rays, RAYS, hits));
         size_t found = 0;
         for (size_t i = 0; i < RAYS; i++) {
-            const Vector3 f = vector_subtract(vector_from(rays[i].origin), center),
-                          d = vector_from(rays[i].direction);
+            const Vector3 f = vector_subtract(rays[i].origin, center), d = rays[i].direction;
             const double semi[3] = {semi_axes.x, semi_axes.y, semi_axes.z};
             double a = 0, b = 0, c = -1;
             for (int k = 0; k < 3; k++) {
@@ -275,7 +272,7 @@ TEST(ellipsoids_follow_the_textbook)
                 gradient =
                     vector_add(gradient, vector_scale(axis, vector_dot(p, axis) / (semi[k] * semi[k])));
             }
-            const Vector3 error = vector_subtract(vector_normalize(gradient), vector_from(hits[i].normal));
+            const Vector3 error = vector_subtract(vector_normalize(gradient), hits[i].normal);
             assert_true(vector_length(error) < 1e-7);
         }
         assert_true(found > RAYS / 10);

@@ -125,7 +125,7 @@ TEST(transformed_objects_are_hit_where_plain_ones_are)
             const Vector3 from = vector_scale(vector_normalize(random_cube_point(&random, 1)), 6),
                           to = random_cube_point(&random, 2),
                           way = vector_normalize(vector_subtract(to, from));
-            rays[i] = (TraceRay){{from.x, from.y, from.z}, {way.x, way.y, way.z}, 0, 1e30};
+            rays[i] = (TraceRay){from, way, 0, 1e30};
         }
         for (int k = 0; k < 2; k++)
             assert_true(probe_trace(&scenes[k], PRECISION_DOUBLE, 1, rays, RAYS, hits[k]));

@@ -94,7 +94,7 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
     const Tolerance *tolerance = &tolerances[precision];
     const int bits = bits_of(precision);
     const double u = ldexp(1, -bits);
-    Vector3 origin = vector_from(ray->origin), direction = vector_from(ray->direction);
+    Vector3 origin = ray->origin, direction = ray->direction;
     double distance = vector_length(vector_subtract(origin, trial->center)) + trial->radius;
     // A plane may be hit far beyond the radius.
     if (expected->found) distance = fmax(distance, fabs((double)expected->t) * vector_length(direction));
@@ -122,7 +122,7 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
     tally->t = fmax(tally->t, (double)((hit->t - expected->t) / t_bound));
     tally->t = fmax(tally->t, (double)((expected->t - hit->t) / t_bound));
 
-    Vector3 normal = vector_from(hit->normal);
+    Vector3 normal = hit->normal;
     double normal_bound =
         8 * u + tolerance->turn * u * distance / (cosine * (double)expected->curvature_radius);
     tally->normal = fmax(tally->normal, reference_distance(normal, expected->normal) / normal_bound);
@@ -141,8 +141,7 @@ static RandomRay move_next_to_surface(const RandomRay *given, const Scene *scene
     Quad3 p = reference_point(&ray, hit.t);
     double side = random_between(random, -1, 1) < 0 ? -1 : 1;
     double height = side * radius * pow(10, random_between(random, -5, -2));
-    Vector3 normal = {(double)hit.normal.x, (double)hit.normal.y, (double)hit.normal.z};
-    Vector3 place = {(double)p.x, (double)p.y, (double)p.z};
+    Vector3 normal = quad3_rounded(hit.normal), place = quad3_rounded(p);
     return (RandomRay){vector_add(place, vector_scale(normal, height)), random_in_sphere(random)};
 }
 
@@ -161,8 +160,8 @@ static void prepare(Trial *trial, const Scene *scene, const RandomShape *aims, s
         // one in three also looks behind its start
         if (i % 3 == 2) ray.tmin = -0x1p10;
         trial->rays[i] = (TraceRay){
-            {(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
-            {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
+            quad3_rounded(ray.origin),
+            quad3_rounded(ray.direction),
             (double)ray.tmin,
             (double)ray.tmax,
         };
@@ -283,8 +282,8 @@ TEST(hits_from_next_to_the_side)
 static bool same_bits(const TraceHit *a, const TraceHit *b)
 {
     return a->object == b->object &&
-           (a->object == UINT32_MAX ||
-            (memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0));
+           (a->object == UINT32_MAX || (memcmp(&a->t, &b->t, sizeof a->t) == 0 &&
+                                        memcmp(&a->normal, &b->normal, sizeof a->normal) == 0));
 }
 
 TEST(gives_the_same_bits_at_every_width)

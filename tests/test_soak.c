@@ -141,13 +141,12 @@ static uint64_t rays_hash(Renderer *renderer, Random *random, uint64_t hash)
     TraceHit hits[RAYS];
     for (size_t i = 0; i < RAYS; i++) {
         const Vector3 origin = random_point(random, 0, 12), direction = random_unit_vector(random);
-        rays[i] =
-            (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+        rays[i] = (TraceRay){origin, direction, 0, INFINITY};
     }
     must(renderer_trace(renderer, rays, RAYS, hits), "renderer_trace");
     for (size_t i = 0; i < RAYS; i++) {
         hash = hash_bytes(hash, &hits[i].light, sizeof hits[i].light);
-        if (hits[i].object != UINT32_MAX) hash = hash_bytes(hash, hits[i].position, sizeof hits[i].position);
+        if (hits[i].object != UINT32_MAX) hash = hash_bytes(hash, &hits[i].position, sizeof hits[i].position);
     }
     return hash;
 }

@@ -12,7 +12,8 @@ enum { ALL_HITS_SIZE_MIN = offsetof(GlintAllHits, position) + sizeof(double *) }
 // A hit of a batch's ray.
 typedef struct {
     uint32_t ray, object;
-    double t, normal[3], position[3];
+    double t;
+    Vector3 normal, position;
 } BatchHit;
 
 typedef ARRAY_OF(BatchHit) BatchHits;
@@ -61,10 +62,7 @@ static bool batch_trace(Batch *batch, Renderer *renderer, size_t count, size_t h
             batch->rays[left].tmin = hit.t;
             batch->indices[left++] = index;
             trace_hit_unscale(&hit, batch->exponents[index]);
-            BatchHit own = {.ray = index, .object = hit.object, .t = hit.t};
-            memcpy(own.normal, hit.normal, sizeof own.normal);
-            memcpy(own.position, hit.position, sizeof own.position);
-            array_push(batch->hits, own);
+            array_push(batch->hits, ((BatchHit){index, hit.object, hit.t, hit.normal, hit.position}));
         }
         count = left;
     }
@@ -92,8 +90,8 @@ static void batch_append(Batch *batch, size_t first, size_t count, GlintAllHits 
         all->ray[at] = first + hit->ray;
         all->object[at] = hit->object;
         all->t[at] = hit->t;
-        memcpy(all->normal + 3 * at, hit->normal, sizeof hit->normal);
-        memcpy(all->position + 3 * at, hit->position, sizeof hit->position);
+        memcpy(all->normal + 3 * at, &hit->normal, sizeof hit->normal);
+        memcpy(all->position + 3 * at, &hit->position, sizeof hit->position);
     }
     all->count = after;
 }

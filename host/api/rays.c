@@ -49,8 +49,8 @@ static void reals_read(double *values, size_t count, GlintReal real, const void 
 static void ray_read(TraceRay *ray, const GlintRays *rays, size_t index)
 {
     *ray = (TraceRay){.tmax = INFINITY};
-    reals_read(ray->origin, 3, rays->real, rays->origins, 3 * index);
-    reals_read(ray->direction, 3, rays->real, rays->directions, 3 * index);
+    reals_read(&ray->origin.x, 3, rays->real, rays->origins, 3 * index);
+    reals_read(&ray->direction.x, 3, rays->real, rays->directions, 3 * index);
     if (rays->tmin) reals_read(&ray->tmin, 1, rays->real, rays->tmin, index);
     if (rays->tmax) reals_read(&ray->tmax, 1, rays->real, rays->tmax, index);
 }
@@ -101,10 +101,10 @@ bool rays_scale(TraceRay *scaled, int *exponents, const GlintRays *rays, size_t 
     return !batch.reason || message_error(messages, "ray %zu: %s", batch.wrong, batch.reason);
 }
 
-static void vector_write(double *vectors, size_t index, const double vector[3], bool is_hit)
+static void vector_write(double *vectors, size_t index, Vector3 vector, bool is_hit)
 {
     for (size_t axis = 0; axis < 3 && vectors; axis++)
-        vectors[3 * index + axis] = is_hit ? vector[axis] : 0;
+        vectors[3 * index + axis] = is_hit ? (&vector.x)[axis] : 0;
 }
 
 // The caller's arrays, or NULL where not wanted.

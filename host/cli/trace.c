@@ -138,8 +138,8 @@ static void hit_print(const TraceHit *hit, Precision precision, FILE *file)
     const int digits = precision < PRECISION_DOUBLE ? 9 : 17;
     const bool is_hit = hit->object != UINT32_MAX;
     if (is_hit)
-        fprintf(file, "%u,%.*g,%.*g,%.*g,%.*g", hit->object, digits, hit->t, digits, hit->normal[0], digits,
-                hit->normal[1], digits, hit->normal[2]);
+        fprintf(file, "%u,%.*g,%.*g,%.*g,%.*g", hit->object, digits, hit->t, digits, hit->normal.x, digits,
+                hit->normal.y, digits, hit->normal.z);
     else
         fputs(",,,,", file);
     if (precision == PRECISION_CERTIFIED) {

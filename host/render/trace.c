@@ -25,10 +25,11 @@ static double scalar_at(const void *scalars, size_t index, bool is_double)
     return is_double ? ((const double *)scalars)[index] : (double)((const float *)scalars)[index];
 }
 
-static void vector_at(const void *scalars, size_t index, bool is_double, double unit, double vector[3])
+static Vector3 vector_at(const void *scalars, size_t index, bool is_double, double unit)
 {
-    for (size_t axis = 0; axis < 3; axis++)
-        vector[axis] = unit * scalar_at(scalars, index + axis, is_double);
+    const Vector3 stored = {scalar_at(scalars, index, is_double), scalar_at(scalars, index + 1, is_double),
+                            scalar_at(scalars, index + 2, is_double)};
+    return vector_scale(stored, unit);
 }
 
 // Returns how many scalars a kernel stores per ray.
@@ -41,10 +42,10 @@ static void bounces_read(TraceHit *hit, const void *scalars, size_t index, bool 
 {
     hit->transmission = scalar_at(scalars, index + RESULT_REFRACTED_WEIGHT, is_double);
     hit->light = scalar_at(scalars, index + RESULT_TRANSMITTANCE, is_double);
-    vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, unit, hit->reflected_origin);
-    vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, 1, hit->reflected_direction);
-    vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, unit, hit->refracted_origin);
-    vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, 1, hit->refracted_direction);
+    hit->reflected_origin = vector_at(scalars, index + RESULT_REFLECTED_ORIGIN, is_double, unit);
+    hit->reflected_direction = vector_at(scalars, index + RESULT_REFLECTED_DIRECTION, is_double, 1);
+    hit->refracted_origin = vector_at(scalars, index + RESULT_REFRACTED_ORIGIN, is_double, unit);
+    hit->refracted_direction = vector_at(scalars, index + RESULT_REFRACTED_DIRECTION, is_double, 1);
 }
 
 // Reads the hits `begin` to `end` - 1 of a TraceBatch.
@@ -63,8 +64,8 @@ static void hits_read(void *context, size_t begin, size_t end)
         hit->t = unit * scalar_at(scalars, index + RESULT_T, is_double);
         hit->low = unit * scalar_at(scalars, index + RESULT_LOW, is_double);
         hit->high = unit * scalar_at(scalars, index + RESULT_HIGH, is_double);
-        vector_at(scalars, index + RESULT_NORMAL, is_double, 1, hit->normal);
-        vector_at(scalars, index + RESULT_POSITION, is_double, unit, hit->position);
+        hit->normal = vector_at(scalars, index + RESULT_NORMAL, is_double, 1);
+        hit->position = vector_at(scalars, index + RESULT_POSITION, is_double, unit);
         const bool is_certain = certifies && scalar_at(scalars, index + RESULT_UNCERTAIN, is_double) == 0;
         hit->certainty = is_certain ? certainty : TRACE_UNCERTAIN;
         if (batch->type == KERNEL_TRACE) bounces_read(hit, scalars, index, is_double, unit);
@@ -80,7 +81,7 @@ static void rays_write(void *context, size_t begin, size_t end)
     const double unit = pass->scene.compiled.unit, farthest = is_double ? DBL_MAX : (double)FLT_MAX;
     void *scalars = batch->ray_scalars;
     for (size_t i = begin; i < end; i++) {
-        const double *origin = batch->rays[i].origin, *direction = batch->rays[i].direction;
+        const double *origin = &batch->rays[i].origin.x, *direction = &batch->rays[i].direction.x;
         // the kernel bounds the hits of rays that have no end; ends_apply applies tmax
         const double tmax = certifies ? INFINITY : batch->rays[i].tmax;
         const double ray[RAY_SCALARS] = {

@@ -3,6 +3,7 @@
 
 #include "host/compile/settings.h"
 #include "host/opencl/device.h"
+#include "host/scene/vector.h"
 #include <stdint.h>
 
 // A ray whose numbers a renderer rounds to its precision. t is measured in lengths of `direction`, which need
@@ -10,7 +11,8 @@
 // A direction whose squared length is 0 at the precision (in float, a length below 1e-22) hits nothing. A
 // direction whose squared length is infinite (a length above 1e19) may hit something.
 typedef struct {
-    double origin[3], direction[3], tmin, tmax;
+    Vector3 origin, direction;
+    double tmin, tmax;
 } TraceRay;
 
 // The certainty of a hit or miss at `certified`, where tmin is 0 and `light` is undefined. A certain hit has
@@ -24,13 +26,13 @@ typedef enum {
 typedef struct {
     uint32_t object; // UINT32_MAX on a miss, where only `light` is valid
     TraceCertainty certainty;
-    double t;           // in lengths of the ray's direction
-    double low, high;   // bounds on t, if it is certain
-    double normal[3];   // geometric, unit, facing the ray
-    double position[3]; // the hit point, moved onto the surface
+    double t;         // in lengths of the ray's direction
+    double low, high; // bounds on t, if it is certain
+    Vector3 normal;   // geometric, unit, facing the ray
+    Vector3 position; // the hit point, moved onto the surface
     // undefined where only the closest hit was asked for
-    double reflected_origin[3], reflected_direction[3]; // of the reflected ray
-    double refracted_origin[3], refracted_direction[3]; // of the refracted ray
+    Vector3 reflected_origin, reflected_direction; // of the reflected ray
+    Vector3 refracted_origin, refracted_direction; // of the refracted ray
     double transmission; // the refracted ray's weight; 0 at total internal reflection
     double light;        // transmittance along the ray from tmin to tmax
 } TraceHit;

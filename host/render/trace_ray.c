@@ -17,24 +17,20 @@ static double farthest_of(Precision precision)
 
 const char *trace_ray_fault(const TraceRay *ray, Precision precision)
 {
-    bool is_within = isfinite(ray->tmin) && !isnan(ray->tmax), has_direction = false;
-    for (int axis = 0; axis < 3; axis++) {
-        is_within &= fabs(ray->origin[axis]) <= farthest_of(precision) && isfinite(ray->direction[axis]);
-        has_direction |= ray->direction[axis] != 0;
-    }
-    if (!is_within)
+    if (!vector_is_within(ray->origin, farthest_of(precision)) ||
+        !vector_is_within(ray->direction, DBL_MAX) || !isfinite(ray->tmin) || isnan(ray->tmax))
         return "a number is not finite or beyond the precision's range; only tmax may be infinite";
-    if (!has_direction) return "a ray's direction cannot be 0 0 0";
+    if (vector_is_zero(ray->direction)) return "a ray's direction cannot be 0 0 0";
     return precision == PRECISION_CERTIFIED && ray->tmin != 0 ? "at certified, tmin must be 0" : NULL;
 }
 
 TraceRay trace_ray_scaled(TraceRay ray, Precision precision, int *exponent)
 {
-    double *d = ray.direction;
-    frexp(fmax(fmax(fabs(d[0]), fabs(d[1])), fabs(d[2])), exponent);
+    frexp(vector_largest(ray.direction), exponent);
     const double power = ldexp(1, *exponent), inverse = ldexp(1, -*exponent);
-    for (int axis = 0; axis < 3; axis++)
-        d[axis] = scale_by_power(d[axis], -*exponent, inverse);
+    ray.direction = (Vector3){scale_by_power(ray.direction.x, -*exponent, inverse),
+                              scale_by_power(ray.direction.y, -*exponent, inverse),
+                              scale_by_power(ray.direction.z, -*exponent, inverse)};
     ray.tmin = scale_by_power(ray.tmin, *exponent, power);
     ray.tmax = fmin(scale_by_power(ray.tmax, *exponent, power), farthest_of(precision));
     return ray;

@@ -13,6 +13,12 @@ typedef struct {
     double x, y, z;
 } Vector3;
 
+// Returns the vector of three numbers in a row, such as a pixel's in a film.
+static inline Vector3 vector_from(const double parts[3])
+{
+    return (Vector3){parts[0], parts[1], parts[2]};
+}
+
 static inline Vector3 vector_all(double component)
 {
     return (Vector3){component, component, component};

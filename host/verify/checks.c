@@ -74,7 +74,7 @@ static void check_distance(VerifyRun *run, const ReferenceHit *exact, double t, 
 ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, size_t pixel)
 {
     const Vector3 eye = {0, 0, 0};
-    ReferenceRay ray = reference_ray(eye, verify_vector(&image->ray[3 * pixel]));
+    ReferenceRay ray = reference_ray(eye, vector_from(&image->ray[3 * pixel]));
     return reference_hit_object(&target->object, &ray);
 }
 
@@ -84,7 +84,7 @@ ReferenceHit verify_check_pixel(VerifyRun *run, const VerifyTarget *target, cons
     if (verify_pixel_found(image, pixel) != exact.found) {
         run->result->wrong += !is_open(run, target, &exact);
     } else if (exact.found) {
-        double length = vector_length(verify_vector(&image->ray[3 * pixel]));
+        double length = vector_length(vector_from(&image->ray[3 * pixel]));
         check_distance(run, &exact, image->t[pixel], bound_of(run, target, &exact, length, NULL));
     }
     return exact;
@@ -92,7 +92,7 @@ ReferenceHit verify_check_pixel(VerifyRun *run, const VerifyTarget *target, cons
 
 ReferenceRay verify_reference_ray(const TraceRay *ray)
 {
-    ReferenceRay exact = reference_ray(verify_vector(ray->origin), verify_vector(ray->direction));
+    ReferenceRay exact = reference_ray(ray->origin, ray->direction);
     exact.tmin = ray->tmin;
     return exact;
 }
@@ -106,13 +106,13 @@ VerifyExpected verify_expected(const VerifyRun *run, const Object *object, const
                                ReferenceHit exact)
 {
     const VerifyRay *required = &test->required;
-    VerifyTarget target = target_from(object, verify_vector(test->ray.origin));
+    VerifyTarget target = target_from(object, test->ray.origin);
     VerifyExpected expected = {exact, is_open(run, &target, &exact), 0};
     if (!exact.found && required->tangent_t != 0) {
         expected.exact.found = true;
         expected.exact.t = required->tangent_t;
     }
-    double length = vector_length(verify_vector(test->ray.direction));
+    double length = vector_length(test->ray.direction);
     if (expected.exact.found)
         expected.bound = bound_of(run, &target, &expected.exact, length, required->limits);
     return expected;
@@ -149,8 +149,7 @@ void verify_check_ray(VerifyRun *run, const Object *objects, size_t count, const
 static double surface_bound(const VerifyRun *run, const TraceRay *ray, double t, double length,
                             double bounding_radius)
 {
-    const double u = verify_roundoff(run), *o = ray->origin;
-    double start = fmax(fabs(o[0]), fmax(fabs(o[1]), fabs(o[2])));
+    const double u = verify_roundoff(run), start = vector_largest(ray->origin);
     if (run->tier == TIER_B) return 16 * u * (start + t * length + bounding_radius);
     return 2 * verify_ulp(run, t) * length + 8 * u * bounding_radius;
 }
@@ -167,16 +166,15 @@ static double turned_by(Quad3 normal, Quad3 exact)
 void verify_check_surface(VerifyRun *run, const Object *object, const TraceRay *ray, const TraceHit *hit)
 {
     if (run->tier == TIER_A || !verify_is_hit(hit)) return;
-    Vector3 origin = verify_vector(ray->origin), direction = verify_vector(ray->direction);
-    Quad3 point = quad3_add(quad3(origin), quad3_scale(quad3(direction), hit->t));
-    ReferenceSurface surface = reference_surface(object, point);
+    const ReferenceRay exact = verify_reference_ray(ray);
+    const ReferenceSurface surface = reference_surface(object, reference_point(&exact, hit->t));
     Quad distance = reference_surface_distance(&surface);
-    double bound = surface_bound(run, ray, hit->t, vector_length(direction), surface.bounding_radius);
+    double bound = surface_bound(run, ray, hit->t, vector_length(ray->direction), surface.bounding_radius);
     run->result->off_surface += !(distance <= bound);
     run->result->worst_position_ratio = fmax(run->result->worst_position_ratio, (double)distance / bound);
 
     // at an edge the normal may be that of any adjacent sheet
-    Quad3 normal = quad3(verify_vector(hit->normal));
+    Quad3 normal = quad3(hit->normal);
     double least_part = INFINITY;
     for (int i = 0; i < surface.count; i++) {
         const ReferenceSheet *sheet = &surface.sheets[i];

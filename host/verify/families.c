@@ -40,7 +40,7 @@ static unsigned random_choice(unsigned seed, uint64_t index, unsigned dimension,
 
 static Vector3 unit(Vector3 a)
 {
-    double length = sqrt(a.x * a.x + a.y * a.y + a.z * a.z);
+    double length = sqrt(vector_dot(a, a));
     return (Vector3){a.x / length, a.y / length, a.z / length};
 }
 
@@ -66,7 +66,7 @@ const Vector3 sliver_corners[3] = {{1, 2, 3}, {8.5, 5.7, -4.5}, {7.5, 5.8, -3.6}
 
 static TraceRay ray_along(Vector3 origin, Vector3 direction)
 {
-    return (TraceRay){{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    return (TraceRay){origin, direction, 0, INFINITY};
 }
 
 static TraceRay ray_toward(Vector3 origin, Vector3 target)
@@ -111,7 +111,7 @@ TraceRay family_in_room(uint64_t i)
         target[k] = random_at(5, i, 1 + k) < 0.5 ? 1 : -1;
     if (i % 3 != 1) target[axis] = random_symmetric(5, i, 4);
     if (i % 3 == 2) target[(axis + 1) % 3] = random_symmetric(5, i, 5);
-    return ray_toward((Vector3){0.1, 0.2, 0.3}, (Vector3){target[0], target[1], target[2]});
+    return ray_toward((Vector3){0.1, 0.2, 0.3}, vector_from(target));
 }
 
 // Alternates rays from inside toward a rim with rays from outside slightly inward of it, so that none miss.
@@ -204,7 +204,7 @@ static Vector3 jittered(Vector3 vertex)
         state = mixed(state + bits);
     }
     double size = 1 + 0.2 * (2 * part_of_one(state) - 1);
-    return (Vector3){size * vertex.x, size * vertex.y, size * vertex.z};
+    return vector_scale(vertex, size);
 }
 
 typedef struct {

@@ -105,8 +105,7 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     for (size_t i = 0; i < COUNT; i++) {
         inner[i] = rays[i];
         if (first[i].object == 1)
-            inner[i] = verify_ray(run, verify_vector(first[i].refracted_origin),
-                                  verify_vector(first[i].refracted_direction));
+            inner[i] = verify_ray(run, first[i].refracted_origin, first[i].refracted_direction);
     }
     verify_trace_opened(run, opened, inner, COUNT, second);
     renderer_close(opened);
@@ -114,19 +113,18 @@ static void check_straight_rays(VerifyRun *run, const char *object, unsigned see
     size_t entered = 0;
     for (size_t i = 0; i < COUNT; i++) {
         if (first[i].object != 1) continue;
-        Quad3 d = quad3_unit(quad3(verify_vector(rays[i].direction)));
-        if (quad_absolute(quad3_dot(d, quad3(verify_vector(first[i].normal)))) < 1e-4) continue;
+        Quad3 d = quad3_unit(quad3(rays[i].direction));
+        if (quad_absolute(quad3_dot(d, quad3(first[i].normal))) < 1e-4) continue;
         entered++;
         if (second[i].object != 1) {
             run->result->leaks++;
             continue;
         }
-        Quad3 refracted = quad3(verify_vector(second[i].refracted_direction));
+        Quad3 refracted = quad3(second[i].refracted_direction);
         Vector3 off = quad3_rounded(quad3_subtract(refracted, d));
-        double largest = fmax(fabs(off.x), fmax(fabs(off.y), fabs(off.z)));
         // an error of two cosines with a root each, and of a unit vector with a root and a quotient
         double bound = run->inexact ? 4 + 6 + 6 + 6 + 4 : 4;
-        verify_record(run, largest / verify_roundoff(run), bound, "u");
+        verify_record(run, vector_largest(off) / verify_roundoff(run), bound, "u");
     }
     // most of the targets lie within the body
     run->result->wrong += entered < COUNT / 2;

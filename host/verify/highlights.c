@@ -40,9 +40,7 @@ void verify_highlights(VerifyRun *run)
             scene.camera.half_tangent = fmin(0.25, 0.6 / sqrt(power + 1));
         }
         Film image = verify_render(run, &scene, false, 96, 96);
-        Quad3 to_light =
-            quad3_unit((Quad3){-verify_rounded(run, direction.x), -verify_rounded(run, direction.y),
-                               -verify_rounded(run, direction.z)});
+        Quad3 to_light = quad3_unit(quad3(verify_rounded_vector(run, vector_scale(direction, -1))));
         size_t seen = 0;
         double brightest = 0;
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
@@ -51,8 +49,8 @@ void verify_highlights(VerifyRun *run)
             seen += image.object[i] == 0;
             brightest = fmax(brightest, value);
             if (run->tier == TIER_A || image.object[i] != 0 || power > power_max) continue;
-            Quad3 normal = quad3_unit(quad3(verify_vector(image.normal + 3 * i)));
-            Quad3 ray = quad3_unit(quad3(verify_vector(image.ray + 3 * i)));
+            Quad3 normal = quad3_unit(quad3(vector_from(image.normal + 3 * i)));
+            Quad3 ray = quad3_unit(quad3(vector_from(image.ray + 3 * i)));
             Quad facing = quad3_dot(normal, to_light);
             // whether grazing light reaches the surface is for the shadow tests
             if (quad_absolute(facing) < 16 * verify_roundoff(run)) continue;

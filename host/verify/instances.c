@@ -60,15 +60,13 @@ static void check_hit(VerifyRun *run, const Scene *scene, const TraceRay *ray, c
         run->result->leaks++;
         return;
     }
-    const Vector3 origin = verify_vector(ray->origin), direction = verify_vector(ray->direction);
-    const Quad3 at_t = quad3_add(quad3(origin), quad3_scale(quad3(direction), hit->t));
+    const ReferenceRay exact = verify_reference_ray(ray);
     // 32 u of the numbers times the transform's condition, at most 3 here
-    const double bound = 96 * verify_roundoff(run) * (vector_length(origin) + hit->t + size);
+    const double bound = 96 * verify_roundoff(run) * (vector_length(ray->origin) + hit->t + size);
     if (run->tier == TIER_A) return;
-    run->result->off_surface +=
-        fabs(height_within(scene, hit->object, quad3(verify_vector(hit->position)))) > bound;
-    run->result->wrong += fabs(height_within(scene, hit->object, at_t)) > bound;
-    run->result->leaks += height_within(scene, hit->object, quad3(verify_vector(hit->reflected_origin))) <= 0;
+    run->result->off_surface += fabs(height_within(scene, hit->object, quad3(hit->position))) > bound;
+    run->result->wrong += fabs(height_within(scene, hit->object, reference_point(&exact, hit->t))) > bound;
+    run->result->leaks += height_within(scene, hit->object, quad3(hit->reflected_origin)) <= 0;
 }
 
 // Checks that no ray from inside an instance of a ball leaves it, directly or after reflections.
@@ -105,8 +103,7 @@ void verify_instances(VerifyRun *run)
             for (size_t i = 0; i < COUNT; i++) {
                 check_hit(run, &scene, &rays[i], &hits[i], placed[which].size);
                 if (verify_is_hit(&hits[i]))
-                    rays[i] = verify_ray(run, verify_vector(hits[i].reflected_origin),
-                                         verify_vector(hits[i].reflected_direction));
+                    rays[i] = verify_ray(run, hits[i].reflected_origin, hits[i].reflected_direction);
             }
         }
         scene_free(&scene);

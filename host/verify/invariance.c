@@ -115,7 +115,7 @@ void verify_scaled_scenes(VerifyRun *run)
 }
 
 // Returns whether a ray, or one turned by a few roundings, hits the object.
-static bool hits_nearby(VerifyRun *run, Renderer *opened, const double direction[3], uint32_t object)
+static bool hits_nearby(VerifyRun *run, Renderer *opened, Vector3 direction, uint32_t object)
 {
     enum { COUNT = 27 };
     // A tier leaves 4 u times distance over radius, or 16 u, of 1 - (l / radius)^2 open (is_open). As an
@@ -125,11 +125,9 @@ static bool hits_nearby(VerifyRun *run, Renderer *opened, const double direction
     TraceRay rays[COUNT];
     TraceHit hits[COUNT];
     for (int i = 0; i < COUNT; i++) {
-        const int steps[] = {i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
-        rays[i] = (TraceRay){.tmax = INFINITY};
-        for (size_t axis = 0; axis < 3; axis++)
-            rays[i].direction[axis] = direction[axis] + turn * steps[axis];
-        verify_round_ray(run, &rays[i]);
+        const int x = i % 3 - 1, y = i / 3 % 3 - 1, z = i / 9 - 1;
+        const Vector3 offset = vector_scale((Vector3){x, y, z}, turn);
+        rays[i] = verify_ray(run, (Vector3){0, 0, 0}, vector_add(direction, offset));
     }
     verify_trace_opened(run, opened, rays, COUNT, hits);
     for (int i = 0; i < COUNT; i++)
@@ -153,7 +151,9 @@ static void check_turned(VerifyRun *run, Renderer *opened, const Film *image, co
 {
     for (size_t i = 0; i < film_pixel_count(image); i++) {
         bool same = image->object[i] == turned->object[i];
-        if (!same) run->result->wrong += !hits_nearby(run, opened, &image->ray[3 * i], turned->object[i]);
+        if (!same)
+            run->result->wrong +=
+                !hits_nearby(run, opened, vector_from(&image->ray[3 * i]), turned->object[i]);
         for (size_t light = 0; light < image->light_count && same; light++) {
             size_t k = i * image->light_count + light;
             if (image->shadow[k] == turned->shadow[k]) continue;

@@ -75,14 +75,11 @@ void verify_within_triangle(VerifyRun *run)
     scene_free(&scene);
     for (size_t i = 0; i < COUNT; i++) {
         if (!verify_is_hit(&hits[i])) continue;
-        const double *o = rays[i].origin, *d = rays[i].direction;
+        const Vector3 origin = rays[i].origin, direction = rays[i].direction;
         double nearest = INFINITY, farthest = -INFINITY;
         for (size_t k = 0; k < 3; k++) {
-            Vector3 v = sliver_corners[k];
-            double along = (verify_rounded(run, v.x) - o[0]) * d[0] +
-                           (verify_rounded(run, v.y) - o[1]) * d[1] +
-                           (verify_rounded(run, v.z) - o[2]) * d[2];
-            double t = along / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+            Vector3 toward = vector_subtract(verify_rounded_vector(run, sliver_corners[k]), origin);
+            double t = vector_dot(toward, direction) / vector_dot(direction, direction);
             nearest = fmin(nearest, t);
             farthest = fmax(farthest, t);
         }
@@ -107,8 +104,7 @@ void verify_facing_triangle(VerifyRun *run)
     verify_trace(run, &scene, false, rays, COUNT, hits);
     scene_free(&scene);
     for (size_t i = 0; i < COUNT; i++) {
-        const double *o = rays[i].origin;
-        Quad t = 1 - ((Quad)o[0] + 2 * (Quad)o[1] + 2 * (Quad)o[2]) / 9;
+        Quad t = 1 - quad3_dot(quad3(rays[i].origin), (Quad3){1, 2, 2}) / 9;
         run->result->leaks += !verify_is_hit(&hits[i]);
         if (verify_is_hit(&hits[i]) && run->tier > TIER_B)
             verify_record_error(run, (double)quad_absolute(hits[i].t - t) / verify_ulp(run, (double)t), 4);
@@ -217,15 +213,15 @@ static void m6_rays(const VerifyRun *run, const Scene *scene, uint64_t first, co
         if (i % 4 == 1) {
             double parts[] = {0, 0, 0};
             parts[i / 4 % 3] = i / 16 % 2 ? 1 : -1;
-            direction = verify_vector(parts);
+            direction = vector_from(parts);
             origin = vector_subtract(corner, vector_scale(direction, 3 * random_at(69, i, 7)));
         }
         if (i % 4 == 2 && i / 4 % 2)
             origin = m6_point_in_plane(scene->objects.items[triangle].as.triangle.vertices, i);
         if (i % 4 == 2) direction = vector_subtract(corner, origin);
         if (i % 4 == 3 && reflected && verify_is_hit(&reflected[i - first - 3])) {
-            origin = verify_vector(reflected[i - first - 3].reflected_origin);
-            direction = verify_vector(reflected[i - first - 3].reflected_direction);
+            origin = reflected[i - first - 3].reflected_origin;
+            direction = reflected[i - first - 3].reflected_direction;
         }
         rays[i - first] = verify_ray(run, origin, direction);
     }

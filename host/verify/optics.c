@@ -33,14 +33,14 @@ void verify_critical_angle(VerifyRun *run)
     scene_free(&scene);
     const double u = verify_roundoff(run);
     for (size_t i = 0; i < ANGLES; i++) {
-        const double *refracted = hits[i].refracted_direction;
+        const Vector3 refracted = hits[i].refracted_direction;
         if (!verify_is_hit(&hits[i])) {
             run->result->leaks++;
             continue;
         }
         run->result->unsound += hits[i].transmission != 0 && hits[i].transmission != 1;
         if (run->tier == TIER_A) continue;
-        long double x = rays[i].direction[0], z = rays[i].direction[2];
+        long double x = rays[i].direction.x, z = rays[i].direction.z;
         double squared = (double)(1 - 2.25L * (x * x) / (x * x + z * z));
         if (fabs(squared) <= 16 * u) continue;
         bool total = hits[i].transmission == 0;
@@ -49,11 +49,9 @@ void verify_critical_angle(VerifyRun *run)
             continue;
         }
         if (total) continue;
-        double length =
-            sqrt(refracted[0] * refracted[0] + refracted[1] * refracted[1] + refracted[2] * refracted[2]);
-        run->result->unsound += fabs(length - 1) > 4 * u;
+        run->result->unsound += fabs(vector_length(refracted) - 1) > 4 * u;
         double cosine = sqrt(squared), ulp = verify_ulp(run, cosine);
-        verify_record_error(run, fabs(refracted[2] - cosine) / ulp, 8 * u / cosine / ulp);
+        verify_record_error(run, fabs(refracted.z - cosine) / ulp, 8 * u / cosine / ulp);
     }
     free(rays);
     free(hits);

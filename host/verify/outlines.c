@@ -119,7 +119,7 @@ void verify_apex(VerifyRun *run)
             if (k == 0) run->result->wrong += !verify_pixel_found(&image, i) || !(image.color[3 * i] > 0);
             if (!verify_pixel_found(&image, i)) continue;
             const double u = verify_roundoff(run);
-            double length = vector_length(verify_vector(image.normal + 3 * i));
+            double length = vector_length(vector_from(image.normal + 3 * i));
             // + 6 u: a root off by 3 ulp; + 4 u: a quotient off by 2
             verify_record(run, fabs(length - 1) / u, run->inexact ? 4 + 6 + 4 : 4, "u");
         }
@@ -165,7 +165,7 @@ void verify_tangent_circle(VerifyRun *run)
     verify_trace(run, &scene, false, rays, COUNT, hits);
     for (size_t i = 0; i < COUNT; i++) {
         if (!verify_is_hit(&hits[i])) continue;
-        Quad3 point = {-5 + (Quad)hits[i].t, 0, rays[i].origin[2]};
+        Quad3 point = {-5 + (Quad)hits[i].t, 0, rays[i].origin.z};
         ReferenceSurface surface = reference_surface(&scene.objects.items[0], point);
         run->result->off_surface += reference_surface_distance(&surface) > 16 * verify_roundoff(run);
     }

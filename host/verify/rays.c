@@ -33,15 +33,13 @@ static double nudged(const VerifyRun *run, double value, double toward)
 static void test_ray_add(VerifyTestRays *tests, const VerifyRun *run, const VerifyRays *set,
                          const VerifyRay *given)
 {
-    VerifyTestRay item = {{.tmin = given->tmin, .tmax = INFINITY}, *given};
-    memcpy(item.ray.origin, given->origin, sizeof item.ray.origin);
-    memcpy(item.ray.direction, given->direction, sizeof item.ray.direction);
+    VerifyTestRay item = {{given->origin, given->direction, given->tmin, INFINITY}, *given};
     verify_round_ray(run, &item.ray);
     if (!item.required.decided_tiers) item.required.decided_tiers = set->decided_tiers;
     if (!item.required.limits) item.required.limits = set->limits;
     array_push(*tests, item);
     item.required.decided_tiers = NULL;
-    double *const moved[] = {&item.ray.origin[0], &item.ray.direction[0]};
+    double *const moved[] = {&item.ray.origin.x, &item.ray.direction.x};
     for (size_t k = 0; k < 2; k++) {
         double x = *moved[k];
         if (x == 0) continue;

@@ -17,7 +17,8 @@ typedef struct {
 // A ray in decimal numbers, each rounded once to the precision. It stands for up to five rays: itself and,
 // for the x of its origin and that of its direction, the next number farther from 0 and the next one nearer.
 typedef struct {
-    double origin[3], direction[3], tmin;
+    Vector3 origin, direction;
+    double tmin;
     const char *decided_tiers;  // NULL: those of the set
     const VerifyLimits *limits; // NULL: those of the set
     double tangent_t;           // not 0: t of a tangent, which counts as a hit

@@ -62,6 +62,7 @@ size_t verify_part(const VerifyRun *run, size_t count);
 double verify_roundoff(const VerifyRun *run); // half a unit in the last place of 1
 double verify_ulp(const VerifyRun *run, double value);
 double verify_rounded(const VerifyRun *run, double value); // to the precision at work
+Vector3 verify_rounded_vector(const VerifyRun *run, Vector3 vector);
 // Rounds the ray's numbers as the renderer does, so that exact answers are for the same ray. A tmax beyond
 // the precision's range becomes the largest number in it.
 void verify_round_ray(const VerifyRun *run, TraceRay *ray);
@@ -101,9 +102,4 @@ Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
 static inline bool verify_pixel_found(const Film *image, size_t pixel)
 {
     return image->object[pixel] != UINT32_MAX;
-}
-
-static inline Vector3 verify_vector(const double *parts)
-{
-    return (Vector3){parts[0], parts[1], parts[2]};
 }

@@ -27,8 +27,7 @@ void verify_plane_acne(VerifyRun *run)
             scene.camera = verify_camera(eye, point, 60);
             Film image = verify_render(run, &scene, false, 128, 128);
             Vector3 direction = vector_normalize(scene.lights.items[0].direction);
-            Quad3 stored = {verify_rounded(run, direction.x), verify_rounded(run, direction.y),
-                            verify_rounded(run, direction.z)};
+            Quad3 stored = quad3(verify_rounded_vector(run, direction));
             Quad cosine = -quad3_dot(quad3_unit(quad3(normal)), stored);
             double least = INFINITY, most = 0;
             for (size_t i = 0; i < film_pixel_count(&image); i++) {
@@ -113,7 +112,7 @@ void verify_contact_shadow(VerifyRun *run)
         VerifyTarget targets[] = {verify_target(run, &scene.objects.items[0], eye),
                                   verify_target(run, &scene.objects.items[1], eye)};
         for (size_t i = 0; i < film_pixel_count(&image); i++) {
-            Quad3 direction = quad3(verify_vector(image.ray + 3 * i));
+            Quad3 direction = quad3(vector_from(image.ray + 3 * i));
             bool dark = image.shadow[i];
             ReferenceHit plane = verify_pixel_hit(&targets[0], &image, i);
             ReferenceHit sphere = verify_pixel_hit(&targets[1], &image, i);

@@ -126,7 +126,7 @@ static void triangle_resize(Object *object, double size)
 static void check_pixel(VerifyRun *run, const Object *object, double band, bool is_ground, const Film *image,
                         size_t pixel)
 {
-    const Quad3 direction = quad3(verify_vector(&image->ray[3 * pixel]));
+    const Quad3 direction = quad3(vector_from(&image->ray[3 * pixel]));
     const ReferenceRay ray = {quad3(eye), direction, 0, DBL_MAX};
     const ReferenceHit exact = reference_hit_object(object, &ray);
     const bool found = verify_pixel_found(image, pixel);

@@ -22,8 +22,7 @@ void verify_scaled_directions(VerifyRun *run)
         rays[0][i] = verify_ray(run, origin, vector_subtract(target, origin));
         for (size_t k = 1; k < 3; k++) {
             rays[k][i] = rays[0][i];
-            for (size_t axis = 0; axis < 3; axis++)
-                rays[k][i].direction[axis] = ldexp(rays[0][i].direction[axis], exponents[k]);
+            rays[k][i].direction = vector_scale(rays[0][i].direction, ldexp(1, exponents[k]));
         }
     }
     Scene scene = verify_scene("objects:\n  - sphere: {center: [0, 0, 0], radius: 1}\n");
@@ -44,13 +43,12 @@ static Scene spheres_of_all_sizes(const VerifyRun *run, unsigned group)
     Scene scene = scene_empty();
     for (uint64_t i = 0; i < SPHERES; i++) {
         uint64_t index = group * SPHERES + i;
-        double center[3];
+        Object object = {.type = SHAPE_SPHERE};
         for (unsigned k = 0; k < 3; k++) {
             double size = pow(10, 4 * random_symmetric(62, index, k));
-            center[k] = verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
+            (&object.as.sphere.center.x)[k] =
+                verify_rounded(run, random_at(62, index, 3 + k) < 0.5 ? size : -size);
         }
-        Object object = {.type = SHAPE_SPHERE};
-        object.as.sphere.center = verify_vector(center);
         object.as.sphere.radius = verify_rounded(run, pow(10, 4 * random_symmetric(62, index, 6)));
         array_push(scene.objects, object);
     }
@@ -90,10 +88,9 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, s
     static TraceHit hits[2 * DIRECTIONS];
     for (uint64_t i = 0; i < DIRECTIONS; i++) {
         Vector3 direction = random_unit(64, sphere * DIRECTIONS + i, 0);
-        if (vector_dot(direction, verify_vector(first->normal)) < 0) direction = vector_scale(direction, -1);
-        rays[i] = verify_ray(run, verify_vector(first->reflected_origin), direction);
-        rays[DIRECTIONS + i] =
-            verify_ray(run, verify_vector(first->refracted_origin), vector_scale(direction, -1));
+        if (vector_dot(direction, first->normal) < 0) direction = vector_scale(direction, -1);
+        rays[i] = verify_ray(run, first->reflected_origin, direction);
+        rays[DIRECTIONS + i] = verify_ray(run, first->refracted_origin, vector_scale(direction, -1));
     }
     verify_trace_opened(run, opened, rays, 2 * (size_t)DIRECTIONS, hits);
     for (size_t i = 0; i < DIRECTIONS; i++) {
@@ -141,7 +138,7 @@ void verify_points_on_faces(VerifyRun *run)
         if (!verify_is_hit(&hits[i])) continue;
         size_t on_face = 0;
         for (size_t axis = 0; axis < 3; axis++)
-            if (fabs(hits[i].normal[axis]) == 1) on_face += fabs(hits[i].position[axis]) == 1;
+            if (fabs((&hits[i].normal.x)[axis]) == 1) on_face += fabs((&hits[i].position.x)[axis]) == 1;
         run->result->wrong += on_face != 1;
     }
     free(rays);

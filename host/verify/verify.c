@@ -103,31 +103,35 @@ double verify_rounded(const VerifyRun *run, double value)
     return single;
 }
 
+Vector3 verify_rounded_vector(const VerifyRun *run, Vector3 vector)
+{
+    return (Vector3){verify_rounded(run, vector.x), verify_rounded(run, vector.y),
+                     verify_rounded(run, vector.z)};
+}
+
 void verify_round_ray(const VerifyRun *run, TraceRay *ray)
 {
-    for (size_t axis = 0; axis < 3; axis++) {
-        ray->origin[axis] = verify_rounded(run, ray->origin[axis]);
-        ray->direction[axis] = verify_rounded(run, ray->direction[axis]);
-    }
+    ray->origin = verify_rounded_vector(run, ray->origin);
+    ray->direction = verify_rounded_vector(run, ray->direction);
     ray->tmin = verify_rounded(run, ray->tmin);
     ray->tmax = fmin(ray->tmax, verify_is_double(run) ? DBL_MAX : (double)FLT_MAX);
 }
 
 TraceRay verify_ray(const VerifyRun *run, Vector3 origin, Vector3 direction)
 {
-    TraceRay ray = {{origin.x, origin.y, origin.z}, {direction.x, direction.y, direction.z}, 0, INFINITY};
+    TraceRay ray = {origin, direction, 0, INFINITY};
     verify_round_ray(run, &ray);
     return ray;
 }
 
-static bool is_finite(const double vector[3])
+static bool is_finite(Vector3 vector)
 {
-    return isfinite(vector[0]) && isfinite(vector[1]) && isfinite(vector[2]);
+    return vector_is_within(vector, DBL_MAX);
 }
 
-static bool is_unit(const VerifyRun *run, const double v[3])
+static bool is_unit(const VerifyRun *run, Vector3 vector)
 {
-    return fabs(sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - 1) <= 4 * verify_roundoff(run);
+    return fabs(vector_length(vector) - 1) <= 4 * verify_roundoff(run);
 }
 
 static bool is_sound(const VerifyRun *run, const TraceRay *ray, const TraceHit *hit)
@@ -169,12 +173,12 @@ static void hash_hit(VerifyRun *run, const TraceHit *hit)
     hash_numbers(run, &hit->light, 1);
     if (!verify_is_hit(hit)) return;
     hash_numbers(run, &hit->t, 1);
-    hash_numbers(run, hit->normal, 3);
-    hash_numbers(run, hit->position, 3);
-    hash_numbers(run, hit->reflected_origin, 3);
-    hash_numbers(run, hit->reflected_direction, 3);
-    hash_numbers(run, hit->refracted_origin, 3);
-    hash_numbers(run, hit->refracted_direction, 3);
+    hash_numbers(run, &hit->normal.x, 3);
+    hash_numbers(run, &hit->position.x, 3);
+    hash_numbers(run, &hit->reflected_origin.x, 3);
+    hash_numbers(run, &hit->reflected_direction.x, 3);
+    hash_numbers(run, &hit->refracted_origin.x, 3);
+    hash_numbers(run, &hit->refracted_direction.x, 3);
     hash_numbers(run, &hit->transmission, 1);
 }
 
@@ -245,12 +249,12 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *
 
 static bool is_pixel_sound(const VerifyRun *run, const Film *image, size_t i)
 {
-    const double *color = &image->color[3 * i], *normal = &image->normal[3 * i];
-    if (!is_finite(color) || color[0] < 0 || color[1] < 0 || color[2] < 0) return false;
-    if (!is_finite(&image->ray[3 * i])) return false;
+    const Vector3 color = vector_from(&image->color[3 * i]), normal = vector_from(&image->normal[3 * i]);
+    if (!is_finite(color) || color.x < 0 || color.y < 0 || color.z < 0) return false;
+    if (!is_finite(vector_from(&image->ray[3 * i]))) return false;
     if (image->object[i] == UINT32_MAX) return isinf(image->t[i]);
     if (!(image->t[i] > 0) || !isfinite(image->t[i])) return false;
-    if (!is_finite(normal) || !is_finite(&image->position[3 * i])) return false;
+    if (!is_finite(normal) || !is_finite(vector_from(&image->position[3 * i]))) return false;
     return run->tier == TIER_A || is_unit(run, normal);
 }
 
@@ -283,7 +287,7 @@ Film verify_render(VerifyRun *run, const Scene *scene, bool bvh, uint32_t width,
 bool verify_same_bits(const TraceHit *a, const TraceHit *b)
 {
     if (a->object != b->object || !verify_is_hit(a)) return a->object == b->object;
-    return memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(a->normal, b->normal, sizeof a->normal) == 0;
+    return memcmp(&a->t, &b->t, sizeof a->t) == 0 && memcmp(&a->normal, &b->normal, sizeof a->normal) == 0;
 }
 
 void verify_record(VerifyRun *run, double error, double bound, const char *unit)

@@ -20,13 +20,6 @@ typedef struct {
     TraceRay ray;
 } Branch;
 
-static TraceRay ray_from(const double origin[3], const double direction[3])
-{
-    return (TraceRay){.origin = {origin[0], origin[1], origin[2]},
-                      .direction = {direction[0], direction[1], direction[2]},
-                      .tmax = INFINITY};
-}
-
 static void branch_write(PathText *tree, const Branch *branch);
 
 // Writes the secondary rays of a hit (kernels/shading/bounce.h). At total internal reflection or by
@@ -38,10 +31,13 @@ static void branches_write(PathText *tree, const Branch *branch, const Material 
     const bool is_total = material->transmission > 0 && hit->transmission == 0;
     const double kept = is_total || material->fresnel ? material->transmission - hit->transmission : 0;
     const Branch reflected = {is_total ? "totally reflected" : "reflected",
-                              branch->weight * (material->reflection + kept), branch->depth + 1,
-                              ray_from(hit->reflected_origin, hit->reflected_direction)};
-    const Branch refracted = {"refracted", branch->weight * hit->transmission, branch->depth + 1,
-                              ray_from(hit->refracted_origin, hit->refracted_direction)};
+                              branch->weight * (material->reflection + kept),
+                              branch->depth + 1,
+                              {hit->reflected_origin, hit->reflected_direction, 0, INFINITY}};
+    const Branch refracted = {"refracted",
+                              branch->weight * hit->transmission,
+                              branch->depth + 1,
+                              {hit->refracted_origin, hit->refracted_direction, 0, INFINITY}};
     branch_write(tree, &reflected);
     branch_write(tree, &refracted);
 }
@@ -69,10 +65,9 @@ static void branch_write(PathText *tree, const Branch *branch)
     }
     text_appendf(&tree->text, ", t %.6g\n", hit.t);
     if (branch->depth == 0) {
-        const Vector3 eye = view->scene->camera.position;
-        text_appendf(&tree->text, "  at %.6g %.6g %.6g, normal %.4g %.4g %.4g\n", hit.position[0] + eye.x,
-                     hit.position[1] + eye.y, hit.position[2] + eye.z, hit.normal[0], hit.normal[1],
-                     hit.normal[2]);
+        const Vector3 point = vector_add(hit.position, view->scene->camera.position);
+        text_appendf(&tree->text, "  at %.6g %.6g %.6g, normal %.4g %.4g %.4g\n", point.x, point.y, point.z,
+                     hit.normal.x, hit.normal.y, hit.normal.z);
     }
     const uint32_t material = object_material(view->scene, object, primitive);
     branches_write(tree, branch, &view->scene->materials.items[material], &hit);
@@ -83,9 +78,7 @@ char *pixel_facts(const PixelView *view, uint32_t x, uint32_t y)
     PathText tree = {.view = view};
     const CameraRay ray = camera_ray(&view->scene->camera, view->size, x, y);
     const Vector3 origin = vector_subtract(ray.origin, view->scene->camera.position); // as seen from the eye
-    const Branch first = {NULL, 1, 0,
-                          ray_from((double[]){origin.x, origin.y, origin.z},
-                                   (double[]){ray.direction.x, ray.direction.y, ray.direction.z})};
+    const Branch first = {NULL, 1, 0, {origin, ray.direction, 0, INFINITY}};
     text_appendf(&tree.text, "pixel %u,%u: ", x, y);
     branch_write(&tree, &first);
     return tree.text.items;

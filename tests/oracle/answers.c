@@ -68,9 +68,9 @@ static void object_print(const Object *object)
 static void ray_print(const TraceRay *ray)
 {
     printf("{");
-    numbers_print("origin", ray->origin, 3);
+    numbers_print("origin", &ray->origin.x, 3);
     printf(", ");
-    numbers_print("direction", ray->direction, 3);
+    numbers_print("direction", &ray->direction.x, 3);
     printf(", \"start\": %.17g", ray->tmin);
 }
 
@@ -144,8 +144,7 @@ static void shapes_print(const ShapeForm *form, uint64_t seed, size_t samples)
         object_print(&shape.object);
         for (size_t k = 0; k < samples; k++) {
             RandomRay given = random_ray(&shape, &random);
-            Vector3 o = given.origin, d = given.direction;
-            TraceRay ray = {{o.x, o.y, o.z}, {d.x, d.y, d.z}, 0, INFINITY};
+            TraceRay ray = {given.origin, given.direction, 0, INFINITY};
             ReferenceRay exact_ray = verify_reference_ray(&ray);
             ReferenceHit hit = reference_hit_object(&shape.object, &exact_ray);
             ray_print(&ray);

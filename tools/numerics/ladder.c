@@ -97,9 +97,7 @@ static Rays rays_make(const Object *object, const RandomShape *shape, double run
         RandomRay given = ladder_ray(shape, rung, random);
         ReferenceRay ray = is_double ? reference_ray(given.origin, given.direction)
                                      : reference_ray_rounded(given.origin, given.direction);
-        rays.rays[i] = (TraceRay){{(double)ray.origin.x, (double)ray.origin.y, (double)ray.origin.z},
-                                  {(double)ray.direction.x, (double)ray.direction.y, (double)ray.direction.z},
-                                  (double)ray.tmin,
+        rays.rays[i] = (TraceRay){quad3_rounded(ray.origin), quad3_rounded(ray.direction), (double)ray.tmin,
                                   (double)ray.tmax};
         rays.hits[i] = reference_hit_object(object, &ray);
     }
@@ -128,7 +126,7 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
     const Tier *tier = &tiers[precision];
     const int bits = precision == PRECISION_DOUBLE ? 53 : 24;
     const double u = ldexp(1, -bits);
-    Vector3 origin = vector_from(rays->rays[i].origin), direction = vector_from(rays->rays[i].direction);
+    Vector3 origin = rays->rays[i].origin, direction = rays->rays[i].direction;
     double distance = vector_length(vector_subtract(origin, shape->center)) + shape->radius;
     // a plane may be hit far beyond the reach
     if (expected->found) distance = fmax(distance, (double)expected->t * vector_length(direction));
@@ -207,10 +205,7 @@ static double test_seconds(Compute *compute, const RandomShape *shape, Precision
     for (int rung = 0; rung < RUNG_COUNT; rung++)
         for (int i = 0; i < TIMED_RAYS / RUNG_COUNT; i++) {
             RandomRay ray = ladder_ray(shape, rungs[rung], &random);
-            all.rays[all.count++] = (TraceRay){{ray.origin.x, ray.origin.y, ray.origin.z},
-                                               {ray.direction.x, ray.direction.y, ray.direction.z},
-                                               0,
-                                               (double)FLT_MAX};
+            all.rays[all.count++] = (TraceRay){ray.origin, ray.direction, 0, (double)FLT_MAX};
         }
     double seconds[2];
     for (int many = 0; many < 2; many++) {
