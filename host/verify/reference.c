@@ -82,6 +82,15 @@ Object reference_object_from(const Object *object, Vector3 eye)
     return result;
 }
 
+void reference_grow_object(Object *object, const Object *start, const Object *growth, double size)
+{
+    const double *from = (const double *)(const void *)&start->as,
+                 *rate = (const double *)(const void *)&growth->as;
+    double *numbers = (double *)(void *)&object->as;
+    for (unsigned i = 0; i < shapes[start->type]->number_count; i++)
+        numbers[i] = from[i] + size * rate[i];
+}
+
 ReferenceHit reference_miss(void)
 {
     return (ReferenceHit){.object = UINT32_MAX, .margin = UNBOUNDED};

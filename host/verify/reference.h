@@ -39,6 +39,8 @@ ReferenceRay reference_ray_rounded(Vector3 origin, Vector3 direction);
 Object reference_round_object(const Object *object);
 // Returns an object relative to an eye, which is subtracted in double.
 Object reference_object_from(const Object *object, Vector3 eye);
+// Sets every number of an object to that of `start` plus `size` times that of `growth`.
+void reference_grow_object(Object *object, const Object *start, const Object *growth, double size);
 
 // Returns the nearest hit of one object, with `object` 0. Misses of round shapes farther away than 2^40
 // radii depend on roots that have cancelled, and are unreliable.
