@@ -3,6 +3,7 @@
 // with the right answer on the same `.cfg` scene.
 //
 // run_tests: sanitize-long-only
+#include "host/base/ulp.h"
 #include "host/verify/reference_color.h"
 #include "tests/check.h"
 #include "tests/probe.h"
@@ -79,7 +80,7 @@ static ReferenceHit hit_of_both(Scene *scene, Vector3 origin, Vector3 direction)
     TraceHit hit = {0};
     assert_true(probe_trace(scene, PRECISION_SINGLE, 0, &probe, 1, &hit));
     assert_int_equal(hit.object, expected.object);
-    assert_true(fabs((double)(hit.t - expected.t)) <= 8 * reference_ulp(expected.t, 24));
+    assert_true(fabs((double)(hit.t - expected.t)) <= 8 * ulp_of((double)expected.t, 24));
     assert_true(reference_distance(hit.normal, expected.normal) <= 0x1p-20);
     return expected;
 }

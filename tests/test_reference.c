@@ -1,4 +1,5 @@
 // Compares the reference itself with roots known by hand or from certified interval arithmetic.
+#include "host/base/ulp.h"
 #include "host/compile/camera_basis.h"
 #include "host/verify/certify.h"
 #include "host/verify/reference_color.h"
@@ -395,8 +396,8 @@ TEST(finds_the_nearest)
     assert_true(hit.t == 4 && hit.margin == 0);
     ray.tmin = 4;
     assert_true(reference_hit(&scene, &ray).t == 6);
-    assert_near(reference_ulp(1, 24), 0x1p-23, 0);
-    assert_near(reference_ulp(-3, 53), 0x1p-51, 0);
+    assert_near(ulp_of(1, 24), 0x1p-23, 0);
+    assert_near(ulp_of(-3, 53), 0x1p-51, 0);
 }
 
 // A ray from a distance of 1 hits a shape of size 1e-6 within 1e-31 of its surface.

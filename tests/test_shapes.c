@@ -1,5 +1,6 @@
 // Compares every shape at every precision with the reference: hit or miss, distance and normal.
 // run_tests: sanitize-long-only
+#include "host/base/ulp.h"
 #include "host/compile/compile.h"
 #include "host/verify/reference.h"
 #include "tests/check.h"
@@ -113,7 +114,7 @@ static void compare(const Trial *trial, size_t index, const TraceHit *hit, const
     if (!expected->found) return;
 
     double cosine = (double)expected->cosine;
-    double t_bound = tolerance->ulps * reference_ulp(expected->t, bits);
+    double t_bound = tolerance->ulps * ulp_of((double)expected->t, bits);
     const Vector3 point = vector_add(origin, vector_scale(direction, (double)expected->t));
     const double moved =
         tolerance->slack * scale + moved_beyond(&scene->objects.items[hit->object], expected, point,

@@ -2,6 +2,7 @@
 
 #include "host/base/memory.h"
 #include "host/base/percentile.h"
+#include "host/base/ulp.h"
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -173,20 +174,10 @@ static bool path_compare(const FilmComparison *comparison, size_t pixel)
     return false;
 }
 
-// Returns the gap between neighboring numbers of a precision around a positive value.
-static double unit_in_last_place(double value, bool is_double)
-{
-    int exponent;
-    frexp(value, &exponent);
-    return ldexp(1, exponent - (is_double ? DBL_MANT_DIG : FLT_MANT_DIG));
-}
-
 // Returns the angle between two vectors of about unit length, accurately even if it is small or near pi.
-static double vector_angle(const double a[3], const double b[3])
+static double vector_angle(Vector3 a, Vector3 b)
 {
-    double cross[3] = {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    double sine = sqrt(cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2]);
-    double angle = atan2(sine, a[0] * b[0] + a[1] * b[1] + a[2] * b[2]);
+    double angle = atan2(vector_length(vector_cross(a, b)), vector_dot(a, b));
     return isfinite(angle) ? angle : INFINITY;
 }
 
@@ -196,9 +187,10 @@ static void surface_compare(const FilmComparison *comparison, size_t pixel)
     const size_t place = errors->surface_pixels++;
     const double expected = comparison->reference->t[pixel], found = comparison->variant->t[pixel];
     const double difference = value_error(expected, found), relative = difference / fabs(expected);
-    const double ulps = difference / unit_in_last_place(expected, comparison->variant->is_double);
-    const double angle =
-        vector_angle(comparison->reference->normal + 3 * pixel, comparison->variant->normal + 3 * pixel);
+    const int significant_bits = comparison->variant->is_double ? DBL_MANT_DIG : FLT_MANT_DIG;
+    const double ulps = difference / ulp_of(expected, significant_bits);
+    const double angle = vector_angle(vector_from(comparison->reference->normal + 3 * pixel),
+                                      vector_from(comparison->variant->normal + 3 * pixel));
     comparison->t_relative[place] = (float)relative;
     comparison->t_ulps[place] = (float)ulps;
     comparison->normal[place] = (float)angle;

@@ -67,8 +67,8 @@ static double bound_of(const VerifyRun *run, const VerifyTarget *target, const R
 
 static void check_distance(VerifyRun *run, const ReferenceHit *exact, double t, double bound)
 {
-    double ulp = verify_ulp(run, (double)exact->t);
-    verify_record_error(run, (double)quad_absolute(t - exact->t) / ulp, bound / ulp);
+    const double exact_t = (double)exact->t;
+    verify_record_ulps(run, (double)quad_absolute(t - exact->t), exact_t, bound / verify_ulp(run, exact_t));
 }
 
 ReferenceHit verify_pixel_hit(const VerifyTarget *target, const Film *image, size_t pixel)

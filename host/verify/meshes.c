@@ -57,8 +57,7 @@ void verify_scale_ladder(VerifyRun *run)
             continue;
         }
         run->result->differing += hit->t != ldexp(unscaled, k);
-        if (run->tier != TIER_A)
-            verify_record_error(run, fabs(hit->t - ldexp(1, k)) / verify_ulp(run, ldexp(1, k)), 8);
+        if (run->tier != TIER_A) verify_record_ulps(run, fabs(hit->t - ldexp(1, k)), ldexp(1, k), 8);
     }
 }
 
@@ -107,7 +106,7 @@ void verify_facing_triangle(VerifyRun *run)
         Quad t = 1 - quad3_dot(quad3(rays[i].origin), (Quad3){1, 2, 2}) / 9;
         run->result->leaks += !verify_is_hit(&hits[i]);
         if (verify_is_hit(&hits[i]) && run->tier > TIER_B)
-            verify_record_error(run, (double)quad_absolute(hits[i].t - t) / verify_ulp(run, (double)t), 4);
+            verify_record_ulps(run, (double)quad_absolute(hits[i].t - t), (double)t, 4);
     }
 }
 

@@ -50,8 +50,8 @@ void verify_critical_angle(VerifyRun *run)
         }
         if (total) continue;
         run->result->unsound += fabs(vector_length(refracted) - 1) > 4 * u;
-        double cosine = sqrt(squared), ulp = verify_ulp(run, cosine);
-        verify_record_error(run, fabs(refracted.z - cosine) / ulp, 8 * u / cosine / ulp);
+        double cosine = sqrt(squared), bound = 8 * u / cosine;
+        verify_record_ulps(run, fabs(refracted.z - cosine), cosine, bound / verify_ulp(run, cosine));
     }
     free(rays);
     free(hits);

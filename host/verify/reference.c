@@ -41,13 +41,6 @@ Quad3 reference_point(const ReferenceRay *ray, Quad t)
     return quad3_add(ray->origin, quad3_scale(ray->direction, t));
 }
 
-double reference_ulp(Quad value, int significant_bits)
-{
-    int exponent;
-    frexpl((long double)value, &exponent);
-    return ldexp(1, exponent - significant_bits);
-}
-
 double reference_distance(Vector3 a, Quad3 b)
 {
     return (double)quad3_length(quad3_subtract(quad3(a), b));

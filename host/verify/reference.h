@@ -86,7 +86,5 @@ Quad reference_surface_distance(const ReferenceSurface *surface); // to its near
 // Computer Generated Images", CACM 18(6), 1975), or 0 if the light is behind the surface.
 Quad reference_highlight(Quad3 normal, Quad3 to_light, Quad3 to_eye, double shininess);
 
-// Returns an ulp of a number with this many significant bits: 24 for float, 53 for double.
-double reference_ulp(Quad value, int significant_bits);
 // Returns the length of a - b. The difference is not rounded.
 double reference_distance(Vector3 a, Quad3 b);

@@ -84,8 +84,8 @@ void verify_trace(VerifyRun *run, const Scene *scene, bool bvh, const TraceRay *
                   TraceHit *hits);
 bool verify_same_bits(const TraceHit *a, const TraceHit *b); // compares object, distance and normal
 
-// Records an error of t, in ulp of t, and counts it as wrong if it exceeds the bound.
-void verify_record_error(VerifyRun *run, double error, double bound);
+// Records an error of a value in ulp of the value, and counts it as wrong if it exceeds this many.
+void verify_record_ulps(VerifyRun *run, double error, double value, double bound);
 // Records an error in the given unit, and counts it as wrong if it exceeds the bound.
 void verify_record(VerifyRun *run, double error, double bound, const char *unit);
 

@@ -37,7 +37,7 @@ void verify_plane_acne(VerifyRun *run)
                 most = fmax(most, image.color[3 * i]);
             }
             run->result->wrong += !(least > 0);
-            verify_record(run, (most - least) / verify_ulp(run, most), 2, "ulp");
+            verify_record_ulps(run, most - least, most, 2);
             const double u = verify_roundoff(run);
             verify_record(
                 run, (double)quad_maximum(quad_absolute(most - cosine), quad_absolute(least - cosine)) / u, 8,

@@ -89,7 +89,7 @@ static void check_pixel(VerifyRun *run, const Object *object, double band, bool 
     const double distance = image->t[pixel] * (double)quad3_length(direction);
     const ReferenceSurface surface = reference_surface(object, reference_point(&ray, image->t[pixel]));
     const double off = (double)reference_surface_distance(&surface);
-    verify_record_error(run, off / verify_ulp(run, distance), 4);
+    verify_record_ulps(run, off, distance, 4);
     const bool is_lit = is_ground && exact.normal.y > (Quad)0.25 && distance < 8 * eye.y;
     run->result->wrong += is_lit && !(image->color[3 * pixel] > 0);
 }

@@ -103,7 +103,7 @@ static void leave_sphere(VerifyRun *run, const Scene *scene, Renderer *opened, s
         if (run->tier == TIER_A)
             run->result->wrong += far->t < exit / 2;
         else
-            verify_record_error(run, fabs(far->t - exit) / verify_ulp(run, exit), 16);
+            verify_record_ulps(run, fabs(far->t - exit), exit, 16);
     }
 }
 

@@ -5,6 +5,7 @@
 #include "host/base/fault.h"
 #include "host/base/hash.h"
 #include "host/base/text.h"
+#include "host/base/ulp.h"
 #include "host/scene/portable.h"
 #include "host/verify/rays.h"
 #include <float.h>
@@ -91,9 +92,7 @@ double verify_roundoff(const VerifyRun *run)
 
 double verify_ulp(const VerifyRun *run, double value)
 {
-    int exponent;
-    frexp(value, &exponent);
-    return ldexp(verify_roundoff(run), exponent);
+    return ulp_of(value, verify_is_double(run) ? DBL_MANT_DIG : FLT_MANT_DIG);
 }
 
 double verify_rounded(const VerifyRun *run, double value)
@@ -304,9 +303,9 @@ void verify_record(VerifyRun *run, double error, double bound, const char *unit)
     }
 }
 
-void verify_record_error(VerifyRun *run, double error, double bound)
+void verify_record_ulps(VerifyRun *run, double error, double value, double bound)
 {
-    verify_record(run, error, bound, "ulp");
+    verify_record(run, error / verify_ulp(run, value), bound, "ulp");
 }
 
 Scene verify_scene(const char *objects)

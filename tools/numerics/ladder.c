@@ -7,6 +7,7 @@
 #include "host/base/fault.h"
 #include "host/base/json.h"
 #include "host/base/memory.h"
+#include "host/base/ulp.h"
 #include "host/compile/random_shape.h"
 #include "host/render/renderer.h"
 #include "host/verify/reference.h"
@@ -141,7 +142,7 @@ static void tally_add(Tally *tally, const RandomShape *shape, const Rays *rays, 
         return;
     }
     if (!expected->found) return;
-    double cosine = (double)expected->cosine, ulp = reference_ulp(expected->t, bits);
+    double cosine = (double)expected->cosine, ulp = ulp_of((double)expected->t, bits);
     double off = fabs((double)(hit->t - expected->t));
     Errors *errors = cosine >= 0.1 ? &tally->steep : &tally->grazing;
     // NaN and infinity exceed every bound
