@@ -70,8 +70,7 @@ static inline size_t check_image(Scene *scene, const RenderSettings *settings, c
                                  double number)
 {
     CertifySample reference;
-    assert_true(certify_sample_open(&reference, scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
-                                    (ReferencePath){.bounce_count = settings->bounce_count}, NULL));
+    assert_true(certify_sample_open(&reference, scene, settings, SMALL_SIDE * SMALL_SIDE));
     Film film = image_render(scene, settings);
     const CertifyErrors errors = certify_compare(&reference, &film);
     if (errors.wrong_decided > 0)

@@ -318,12 +318,11 @@ static void check_family(Family family)
     uint64_t rerendered = 0, uncertified = 0;
     for (unsigned seed = 0; seed < scene_count; seed++) {
         Scene scene = scene_attacking(family, seed);
-        CertifySample reference;
-        assert_true(certify_sample_open(&reference, &scene, WIDTH, HEIGHT, WIDTH * HEIGHT,
-                                        (ReferencePath){.bounce_count = bounce_counts[family]}, NULL));
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
         if (tests_are_long()) settings.extra_features = family_features[family]; // one program
         settings.bounce_count = bounce_counts[family];
+        CertifySample reference;
+        assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
         single_wrong += answer(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
         if (!tests_are_long()) settings.extra_features = CERTIFIED_FEATURES;
@@ -468,10 +467,9 @@ TEST(terminators_of_ovals_are_decided)
                        ((Light){.type = LIGHT_POINT, .color = {0.1, 0.1, 0.1}, .position = place}));
         }
         assert_int_equal(scene.lights.count, LIGHTS);
-        CertifySample reference;
-        assert_true(
-            certify_sample_open(&reference, &scene, WIDTH, HEIGHT, WIDTH * HEIGHT, (ReferencePath){0}, NULL));
         RenderSettings settings = film_settings(WIDTH, HEIGHT, PRECISION_SINGLE);
+        CertifySample reference;
+        assert_true(certify_sample_open(&reference, &scene, &settings, WIDTH * HEIGHT));
         single_wrong += answer(&scene, &reference, &settings).wrong;
         settings.precision = PRECISION_CERTIFIED;
         settings.extra_features = CERTIFIED_FEATURES;
@@ -498,8 +496,7 @@ static void picture_compare(void *context, const Scene *scene, const RenderSetti
 {
     Pictures *pictures = context;
     CertifySample reference;
-    assert_true(certify_sample_open(&reference, scene, settings->width, settings->height, 400,
-                                    (ReferencePath){.bounce_count = settings->bounce_count}, NULL));
+    assert_true(certify_sample_open(&reference, scene, settings, 400));
     RenderSettings certified = *settings;
     certified.precision = PRECISION_CERTIFIED;
     const Answer found = answer(scene, &reference, &certified);

@@ -127,13 +127,12 @@ TEST(thin_walls_are_decided)
         array_push(scene.objects, ((Object){.type = SHAPE_SPHERE, .as.sphere = {center, 1}}));
         array_push(scene.objects,
                    ((Object){.type = SHAPE_SPHERE, .material = 1, .as.sphere = {center, 1 - wall}}));
+        RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, PRECISION_SINGLE);
+        settings.bounce_count = 6;
         CertifySample reference;
-        assert_true(certify_sample_open(&reference, &scene, SMALL_SIDE, SMALL_SIDE, SMALL_SIDE * SMALL_SIDE,
-                                        (ReferencePath){.bounce_count = 6}, NULL));
+        assert_true(certify_sample_open(&reference, &scene, &settings, SMALL_SIDE * SMALL_SIDE));
         const Precision last = tests_are_long() ? PRECISION_STRICT : PRECISION_SINGLE;
-        for (Precision precision = PRECISION_SINGLE; precision <= last; precision++) {
-            RenderSettings settings = film_settings(SMALL_SIDE, SMALL_SIDE, precision);
-            settings.bounce_count = 6;
+        for (; settings.precision <= last; settings.precision++) {
             const Answer found = answer(&scene, &reference, &settings);
             assert_int_equal(found.wrong == 0, i == 0);
         }
@@ -231,11 +230,10 @@ TEST(slim_triangles_are_seldom_rerendered)
                                             .material = 1,
                                             .as.plane = {{0, 0, is_mirror ? 20 : -20}, {0.1, 0.2, 1}}}));
         point_light_add(&scene, (Vector3){3, 5, 0}, 1);
-        CertifySample reference;
-        assert_true(certify_sample_open(&reference, &scene, SIDE, SIDE, SIDE * SIDE,
-                                        (ReferencePath){.bounce_count = 2}, NULL));
         RenderSettings settings = film_settings(SIDE, SIDE, PRECISION_CERTIFIED);
         settings.bounce_count = 2;
+        CertifySample reference;
+        assert_true(certify_sample_open(&reference, &scene, &settings, SIDE * SIDE));
         const Answer found = answer(&scene, &reference, &settings);
         print_message("%zu of %u samples re-rendered\n", (size_t)found.rerendered, 3 * SIDE * SIDE);
         assert_int_equal(found.wrong_decided, 0);

@@ -16,8 +16,7 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
 {
     const RenderSettings settings = film_settings(WIDTH * scale, HEIGHT * scale, precision);
     CertifySample reference;
-    assert_true(certify_sample_open(&reference, scene, settings.width, settings.height, count,
-                                    (ReferencePath){.bounce_count = settings.bounce_count}, NULL));
+    assert_true(certify_sample_open(&reference, scene, &settings, count));
     Film film = film_render(&probe_compute, scene, &settings, AOV_OBJECT | AOV_SHADOW | AOV_PATH | AOV_FLAG);
     const CertifyErrors errors = certify_compare(&reference, &film);
     size_t uncertain = 0;
@@ -25,9 +24,7 @@ static CertifyErrors certify(const Scene *scene, Precision precision, uint32_t s
         uncertain += reference_is_uncertain(&reference.pixels[i]);
     assert_int_equal(errors.compared, reference.count - uncertain);
     assert_true(uncertain < reference.count / 10);
-    if (uncertified)
-        *uncertified = certify_uncertified(scene, &film, count / 10 + 1,
-                                           (ReferencePath){.bounce_count = settings.bounce_count}, NULL);
+    if (uncertified) *uncertified = certify_uncertified(scene, &film, &settings, count / 10 + 1);
     film_free(&film);
     certify_sample_close(&reference);
     return errors;

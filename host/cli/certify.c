@@ -157,12 +157,6 @@ static void row_json(Json *json, Precision precision, const CertifyRow *row)
     json_end(json);
 }
 
-static ReferencePath path_of(const CertifyOptions *options)
-{
-    return (ReferencePath){.bounce_count = options->common.bounce_count,
-                           .min_contribution = options->common.min_contribution};
-}
-
 static Json *certify_json(const Certification *certification)
 {
     const CertifySample *sample = &certification->sample;
@@ -207,9 +201,8 @@ static int precision_compare(Certification *certification, RenderSettings settin
         row->measured = true;
         row->errors = certify_compare(&certification->sample, &film);
         if (precision == PRECISION_CERTIFIED)
-            row->uncertified =
-                certify_uncertified(certification->scene, &film, certification->options->pixels / 10 + 1,
-                                    path_of(certification->options), is_interrupted);
+            row->uncertified = certify_uncertified(certification->scene, &film, &settings,
+                                                   certification->options->pixels / 10 + 1);
         film_free(&film);
     }
     renderer_close(renderer);
@@ -260,8 +253,7 @@ static int scene_certify(const CertifyOptions *options, const Scene *scene, Open
     Certification certification = {.options = options, .scene = scene, .compute = compute};
     const RenderSettings settings = settings_of_scene(&options->common, scene);
     const double start = clock_seconds();
-    if (!certify_sample_open(&certification.sample, scene, settings.width, settings.height, options->pixels,
-                             path_of(options), is_interrupted))
+    if (!certify_sample_open(&certification.sample, scene, &settings, options->pixels))
         return EXIT_INTERRUPTED;
     certification.reference_seconds = clock_seconds() - start;
     for (size_t i = 0; i < certification.sample.count; i++)

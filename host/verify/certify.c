@@ -21,30 +21,40 @@ static void place_choose(const CertifySample *sample, uint32_t columns, uint32_t
     }
 }
 
+static bool is_stopped(const RenderSettings *settings)
+{
+    return settings->stop && settings->stop(settings->stop_context);
+}
+
+// Computes a pixel with errors of rays by up to `blur`, from the random numbers of `seed`.
+static ReferencePixel pixel_compute(const ReferenceScene *scene, const RenderSettings *settings,
+                                    const uint32_t place[2], double blur, uint64_t seed, bool *shadows)
+{
+    const ReferencePath path = {settings->bounce_count, settings->min_contribution, blur, seed};
+    const ReferenceRay ray =
+        reference_camera_ray(&scene->scene.camera, settings->width, settings->height, place[0], place[1]);
+    return reference_pixel(scene, &ray, &path, shadows);
+}
+
 typedef struct {
     CertifySample *sample;
     const ReferenceScene *scene;
-    ReferencePath path;
-    bool (*stop)(void);
+    const RenderSettings *settings;
 } Computation;
 
 static void pixels_compute(void *context, size_t begin, size_t end)
 {
     const Computation *computation = context;
     CertifySample *sample = computation->sample;
-    for (size_t i = begin; i < end; i++) {
-        if (computation->stop && computation->stop()) return;
-        const ReferenceRay ray =
-            reference_camera_ray(&computation->scene->scene.camera, sample->width, sample->height,
-                                 sample->places[i][0], sample->places[i][1]);
-        sample->pixels[i] = reference_pixel(computation->scene, &ray, &computation->path,
-                                            sample->shadows + i * sample->light_count);
-    }
+    for (size_t i = begin; i < end && !is_stopped(computation->settings); i++)
+        sample->pixels[i] = pixel_compute(computation->scene, computation->settings, sample->places[i], 0, 0,
+                                          sample->shadows + i * sample->light_count);
 }
 
-bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
-                         size_t count, ReferencePath path, bool (*stop)(void))
+bool certify_sample_open(CertifySample *sample, const Scene *scene, const RenderSettings *settings,
+                         size_t count)
 {
+    const uint32_t width = settings->width, height = settings->height;
     const double side = sqrt((double)width * height / (double)count);
     const uint32_t columns = (uint32_t)fmin(width, fmax(1, round(width / side)));
     const uint32_t rows = (uint32_t)fmin(height, fmax(1, round(height / side)));
@@ -58,12 +68,12 @@ bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t wid
     for (size_t i = 0; i < sample->count; i++)
         place_choose(sample, columns, rows, i, sample->places[i]);
     ReferenceScene reference = reference_scene_open(scene);
-    Computation computation = {sample, &reference, path, stop};
+    Computation computation = {sample, &reference, settings};
     parallel_run(sample->count, 1, pixels_compute, &computation);
     reference_scene_close(&reference);
-    const bool stopped = stop && stop();
-    if (stopped) certify_sample_close(sample);
-    return !stopped;
+    if (!is_stopped(settings)) return true;
+    certify_sample_close(sample);
+    return false;
 }
 
 void certify_sample_close(CertifySample *sample)
@@ -154,10 +164,8 @@ typedef enum { LOOSE, CLOSE, WITNESSED } Uncertainty;
 
 typedef struct {
     const ReferenceScene *scene;
-    const Film *film;
+    const RenderSettings *settings;
     const size_t *pixels;
-    ReferencePath path;
-    bool (*stop)(void);
     Uncertainty *uncertainties;
 } Examination;
 
@@ -171,22 +179,18 @@ static bool is_other(const ReferencePixel *a, const ReferencePixel *b)
 static void pixels_examine(void *context, size_t begin, size_t end)
 {
     const Examination *examination = context;
-    const Scene *scene = &examination->scene->scene;
-    const Film *film = examination->film;
-    const size_t lights = scene->lights.count;
+    const ReferenceScene *scene = examination->scene;
+    const RenderSettings *settings = examination->settings;
+    const size_t lights = scene->scene.lights.count;
     bool *shadows = memory_allocate_zeroed(2 * lights, sizeof *shadows);
-    for (size_t i = begin; i < end; i++) {
-        if (examination->stop && examination->stop()) break;
+    for (size_t i = begin; i < end && !is_stopped(settings); i++) {
         const size_t pixel = examination->pixels[i];
-        const ReferenceRay ray =
-            reference_camera_ray(&scene->camera, film->width, film->height, (unsigned)(pixel % film->width),
-                                 (unsigned)(pixel / film->width));
-        ReferencePath path = examination->path;
-        const ReferencePixel exact = reference_pixel(examination->scene, &ray, &path, shadows);
+        const uint32_t place[2] = {(uint32_t)(pixel % settings->width), (uint32_t)(pixel / settings->width)};
+        const ReferencePixel exact = pixel_compute(scene, settings, place, 0, 0, shadows);
         examination->uncertainties[i] = exact.margin < 0x1p-49 ? CLOSE : LOOSE;
-        path.blur = 0x1p-50;
-        for (path.seed = 0; path.seed < TRIES && examination->uncertainties[i] != WITNESSED; path.seed++) {
-            const ReferencePixel other = reference_pixel(examination->scene, &ray, &path, shadows + lights);
+        for (uint64_t seed = 0; seed < TRIES && examination->uncertainties[i] != WITNESSED; seed++) {
+            const ReferencePixel other =
+                pixel_compute(scene, settings, place, 0x1p-50, seed, shadows + lights);
             if (is_other(&exact, &other) ||
                 (exact.object != UINT32_MAX && memcmp(shadows, shadows + lights, lights) != 0))
                 examination->uncertainties[i] = WITNESSED;
@@ -195,8 +199,8 @@ static void pixels_examine(void *context, size_t begin, size_t end)
     free(shadows);
 }
 
-CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, size_t most, ReferencePath path,
-                                       bool (*stop)(void))
+CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, const RenderSettings *settings,
+                                       size_t most)
 {
     CertifyUncertified found = {0};
     for (size_t i = 0; i < film_pixel_count(film); i++)
@@ -207,10 +211,10 @@ CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, siz
         if (film->flag[i] == FLAG_UNCERTIFIED && seen++ % step == 0) pixels[chosen++] = i;
     Uncertainty *uncertainties = memory_allocate(chosen, sizeof *uncertainties);
     ReferenceScene reference = reference_scene_open(scene);
-    Examination examination = {&reference, film, pixels, path, stop, uncertainties};
+    Examination examination = {&reference, settings, pixels, uncertainties};
     parallel_run(chosen, 1, pixels_examine, &examination);
     reference_scene_close(&reference);
-    found.examined = stop && stop() ? 0 : chosen;
+    found.examined = is_stopped(settings) ? 0 : chosen;
     for (size_t i = 0; i < found.examined; i++) {
         found.witnessed += uncertainties[i] == WITNESSED;
         found.close += uncertainties[i] == CLOSE;

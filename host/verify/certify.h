@@ -3,6 +3,7 @@
 #pragma once
 
 #include "host/render/film.h"
+#include "host/render/render_settings.h"
 #include "host/verify/reference_color.h"
 
 // The reference's answers for a sample of an image's pixels.
@@ -14,10 +15,11 @@ typedef struct {
     bool *shadows; // per pixel and light
 } CertifySample;
 
-// Computes one pixel, chosen by a hash, in each of about `count` equal parts of the image, or every pixel if
-// there are fewer. Uses all processors. Returns false, with nothing to close, if `stop` returned true.
-bool certify_sample_open(CertifySample *sample, const Scene *scene, uint32_t width, uint32_t height,
-                         size_t count, ReferencePath path, bool (*stop)(void));
+// Computes one pixel, chosen by a hash, in each of about `count` equal parts of the image with these
+// settings, or every pixel if there are fewer. The settings' size, bounces and stop count. Uses all
+// processors. Returns false, with nothing to close, if settings->stop returned true.
+bool certify_sample_open(CertifySample *sample, const Scene *scene, const RenderSettings *settings,
+                         size_t count);
 void certify_sample_close(CertifySample *sample);
 
 // `certified` makes this claim about each pixel that AOV_FLAG does not list as uncertified. Its object,
@@ -57,7 +59,7 @@ typedef struct {
     size_t count, examined, witnessed, close;
 } CertifyUncertified;
 
-// Examines at most about `most` pixels, spread evenly over the image, on all processors. Examines none if
-// `stop` returned true.
-CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, size_t most, ReferencePath path,
-                                       bool (*stop)(void));
+// Examines at most about `most` pixels, spread evenly over the image, on all processors. `settings` are those
+// of the sample. Examines none if settings->stop returned true.
+CertifyUncertified certify_uncertified(const Scene *scene, const Film *film, const RenderSettings *settings,
+                                       size_t most);
