@@ -58,6 +58,12 @@ static inline Quad3 quad3_cross(Quad3 a, Quad3 b)
     return (Quad3){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
+// Returns the normal, whose length is twice the triangle's area.
+static inline Quad3 quad3_triangle_normal(Quad3 a, Quad3 b, Quad3 c)
+{
+    return quad3_cross(quad3_subtract(b, a), quad3_subtract(c, a));
+}
+
 static inline Quad quad_absolute(Quad a)
 {
     return a < 0 ? -a : a;

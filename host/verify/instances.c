@@ -45,8 +45,8 @@ static double height_within(const Scene *scene, size_t part, Quad3 point)
 {
     const MeshTriangle triangle = mesh_triangle_at(scene->meshes.items, scene->objects.items, part);
     const Quad3 a = quad3(triangle.vertices[0]),
-                normal = quad3_unit(quad3_cross(quad3_subtract(quad3(triangle.vertices[1]), a),
-                                                quad3_subtract(quad3(triangle.vertices[2]), a)));
+                normal = quad3_unit(
+                    quad3_triangle_normal(a, quad3(triangle.vertices[1]), quad3(triangle.vertices[2])));
     const Vector3 center = affine_point(&scene->objects.items[0].as.mesh.transform, (Vector3){0, 0, 0});
     const Quad height = quad3_dot(normal, quad3_subtract(point, a)),
                inside = quad3_dot(normal, quad3_subtract(quad3(center), a));

@@ -37,6 +37,24 @@ void surface_add(ReferenceSurface *surface, Quad distance, Quad3 normal, Quad cu
     surface->sheets[surface->count++] = (ReferenceSheet){quad_absolute(distance), normal, curvature_radius};
 }
 
+void axes_around(Quad3 axis, Quad3 axes[3])
+{
+    axes[0] = quad3_perpendicular(axis);
+    axes[1] = quad3_cross(axis, axes[0]);
+    axes[2] = axis;
+}
+
+Quad3 axes_coordinates(const Quad3 axes[3], Quad3 vector)
+{
+    return (Quad3){quad3_dot(vector, axes[0]), quad3_dot(vector, axes[1]), quad3_dot(vector, axes[2])};
+}
+
+Quad3 axes_vector(const Quad3 axes[3], Quad3 coordinates)
+{
+    const Quad3 level = quad3_add(quad3_scale(axes[0], coordinates.x), quad3_scale(axes[1], coordinates.y));
+    return quad3_add(level, quad3_scale(axes[2], coordinates.z));
+}
+
 Quad point_line_distance(Quad3 point, Quad3 on_line, Quad3 direction)
 {
     return quad3_length(quad3_cross(quad3_subtract(point, on_line), direction)) / quad3_length(direction);

@@ -27,6 +27,13 @@ void surface_measure(ReferenceSurface *surface, Vector3 center, double bounding_
                      double feature_radius);
 void surface_add(ReferenceSurface *surface, Quad distance, Quad3 normal, Quad curvature_radius);
 
+// Sets three perpendicular unit vectors, of which the last is `axis`.
+void axes_around(Quad3 axis, Quad3 axes[3]);
+// Returns a vector's products with three axes, which are its coordinates if the axes are perpendicular units.
+Quad3 axes_coordinates(const Quad3 axes[3], Quad3 vector);
+// Returns the sum of three axes times these coordinates.
+Quad3 axes_vector(const Quad3 axes[3], Quad3 coordinates);
+
 // Sets *t to where a ray crosses the plane through `point`. Returns false for a parallel ray.
 bool plane_crossing(const ReferenceRay *ray, Quad3 point, Quad3 normal, Quad *t);
 Quad plane_cosine(const ReferenceRay *ray, Quad3 normal);

@@ -30,18 +30,10 @@ static Inverse inverse_of(const Object *object)
     return inverse;
 }
 
-static Quad3 mapped_inward(const Inverse *inverse, Quad3 v)
-{
-    return (Quad3){quad3_dot(inverse->rows[0], v), quad3_dot(inverse->rows[1], v),
-                   quad3_dot(inverse->rows[2], v)};
-}
-
 // Returns the normal of the oval and, in *length, how fast the unit shape's distance grows along it.
 static Quad3 mapped_normal(const Inverse *inverse, Quad3 normal, Quad *length)
 {
-    const Quad3 along =
-        quad3_add(quad3_add(quad3_scale(inverse->rows[0], normal.x), quad3_scale(inverse->rows[1], normal.y)),
-                  quad3_scale(inverse->rows[2], normal.z));
+    const Quad3 along = axes_vector(inverse->rows, normal);
     *length = quad3_length(along);
     return quad3_scale(along, 1 / *length);
 }
@@ -57,8 +49,8 @@ static void hit_oval(const Object *object, const ReferenceRay *ray, ReferenceHit
     const Inverse inverse = inverse_of(object);
     const Object unit = oval_unit(object);
     const Quad3 from = quad3_subtract(ray->origin, quad3(object->as.oval.center));
-    const ReferenceRay own = {mapped_inward(&inverse, from), mapped_inward(&inverse, ray->direction),
-                              ray->tmin, ray->tmax};
+    const ReferenceRay own = {axes_coordinates(inverse.rows, from),
+                              axes_coordinates(inverse.rows, ray->direction), ray->tmin, ray->tmax};
     units[unit.type]->hit(&unit, &own, hit);
     hit->margin = hit->margin == UNBOUNDED ? UNBOUNDED : hit->margin / inverse.norm;
     if (!hit->found) return;
@@ -74,7 +66,7 @@ static void surface_oval(const Object *object, Quad3 point, ReferenceSurface *su
     const Inverse inverse = inverse_of(object);
     const Object unit = oval_unit(object);
     units[unit.type]->surface(
-        &unit, mapped_inward(&inverse, quad3_subtract(point, quad3(object->as.oval.center))), surface);
+        &unit, axes_coordinates(inverse.rows, quad3_subtract(point, quad3(object->as.oval.center))), surface);
     Quad squares = 0;
     for (int i = 0; i < 3; i++)
         squares += quad3_dot(quad3(object->as.oval.axes[i]), quad3(object->as.oval.axes[i]));

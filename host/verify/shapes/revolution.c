@@ -39,12 +39,11 @@ static Revolution revolution_of(const Object *object)
 
 static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceHit *hit)
 {
-    Quad3 across = quad3_perpendicular(body->axis), beside = quad3_cross(body->axis, across);
-    Quad3 from = quad3_subtract(ray->origin, body->from);
-    Quad3 p = {quad3_dot(from, across), quad3_dot(from, beside), quad3_dot(from, body->axis)};
-    Quad3 q = {quad3_dot(ray->direction, across), quad3_dot(ray->direction, beside),
-               quad3_dot(ray->direction, body->axis)};
-    // What the rounding of `across` leaves in a ray along the axis is not a direction.
+    Quad3 axes[3];
+    axes_around(body->axis, axes);
+    Quad3 p = axes_coordinates(axes, quad3_subtract(ray->origin, body->from)),
+          q = axes_coordinates(axes, ray->direction);
+    // What the rounding of the axes leaves in a ray along the axis is not a direction.
     if (q.x * q.x + q.y * q.y < (Quad)1e-60L * q.z * q.z) q.x = q.y = 0;
     Quad radius = body->base + body->slope * p.z, growth = body->slope * q.z;
     Quad a = q.x * q.x + q.y * q.y - growth * growth;
@@ -71,8 +70,7 @@ static void hit_side(const Revolution *body, const ReferenceRay *ray, ReferenceH
         Quad x = p.x + roots[i] * q.x, y = p.y + roots[i] * q.y, z = p.z + roots[i] * q.z;
         Quad3 gradient = {x, y, -body->slope * (body->base + body->slope * z)};
         if (quad3_dot(gradient, gradient) == 0) gradient.z = -1;
-        Quad3 normal = quad3_add(quad3_add(quad3_scale(across, gradient.x), quad3_scale(beside, gradient.y)),
-                                 quad3_scale(body->axis, gradient.z));
+        Quad3 normal = axes_vector(axes, gradient);
         if (body->finite) {
             Quad cosine = plane_cosine(ray, normal);
             hit_reduce_margin(hit, 2 * z * cosine);

@@ -80,15 +80,14 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
         hit_reduce_margin(hit, minor / 4);
         return;
     }
-    Quad3 axis = quad3_unit(quad3(object->as.torus.axis)), across = quad3_perpendicular(axis);
-    Quad3 beside = quad3_cross(axis, across);
+    Quad3 axes[3];
+    axes_around(quad3_unit(quad3(object->as.torus.axis)), axes);
     Quad length = quad3_length(ray->direction);
     Quad3 direction = quad3_scale(ray->direction, 1 / length);
     Quad3 from = quad3_subtract(ray->origin, quad3(object->as.torus.center));
     Quad closest = -quad3_dot(from, direction);
     from = quad3_add(from, quad3_scale(direction, closest));
-    Quad3 p = {quad3_dot(from, across), quad3_dot(from, beside), quad3_dot(from, axis)};
-    Quad3 q = {quad3_dot(direction, across), quad3_dot(direction, beside), quad3_dot(direction, axis)};
+    Quad3 p = axes_coordinates(axes, from), q = axes_coordinates(axes, direction);
 
     const Quad pp = quad3_dot(p, p), pq = quad3_dot(p, q), four = 4 * major * major;
     const Quad sum[3] = {pp + major * major - minor * minor, 2 * pq, 1}; // |p + s q|^2 + R^2 - r^2
@@ -102,8 +101,7 @@ static void hit_torus(const Object *object, const ReferenceRay *ray, ReferenceHi
         if (polynomial_value(sum, 2, zeros[i]) < 0) continue;
         Quad3 at = quad3_add(p, quad3_scale(q, zeros[i]));
         Quad rho = quad_root(at.x * at.x + at.y * at.y), out = 1 - major / rho;
-        Quad3 normal = quad3_add(quad3_add(quad3_scale(across, at.x * out), quad3_scale(beside, at.y * out)),
-                                 quad3_scale(axis, at.z));
+        Quad3 normal = axes_vector(axes, (Quad3){at.x * out, at.y * out, at.z});
         hit_keep_nearest(hit, ray, (closest + zeros[i]) / length, normal, quad_minimum(minor, rho));
     }
     // the hit is there because of the turns up to the next behind it

@@ -69,7 +69,7 @@ static void surface_triangle(const Object *object, Quad3 point, ReferenceSurface
 {
     const Vector3 *vertices = object->as.triangle.vertices;
     Quad3 a = quad3(vertices[0]);
-    Quad3 normal = quad3_cross(quad3_subtract(quad3(vertices[1]), a), quad3_subtract(quad3(vertices[2]), a));
+    Quad3 normal = quad3_triangle_normal(a, quad3(vertices[1]), quad3(vertices[2]));
     Quad area = quad3_length(normal);
     normal = quad3_scale(normal, 1 / area);
     double longest = triangle_longest_side(vertices);
