@@ -53,6 +53,12 @@ void reference_hit_record(ReferenceHit *nearest, ReferenceHit hit, uint32_t obje
 ReferenceHit reference_hit(const Scene *scene, const ReferenceRay *ray);
 Quad3 reference_point(const ReferenceRay *ray, Quad t);
 
+// Reduces a margin to the magnitude of another one if that is smaller.
+static inline void margin_reduce(double *margin, Quad other)
+{
+    *margin = fmin(*margin, (double)quad_absolute(other));
+}
+
 // A part of a surface, described at its point nearest to a given one.
 typedef struct {
     Quad distance;

@@ -31,8 +31,7 @@ typedef struct {
     uint32_t object, path;
     Color color;
     double margin;    // the least of all decisions, relative to the distance from the eye
-    bool has_texture; // on the path, whose color is then undefined because textures are filtered
-                      // exact
+    bool has_texture; // on the path, whose color is then undefined, because textures are filtered
 } ReferencePixel;
 
 // Returns whether a decision is within 2^-80 of the distance to it, where the reference itself may be wrong.

@@ -1,6 +1,6 @@
 #include "host/verify/reference_optics.h"
 
-#include <math.h>
+#include "host/verify/reference.h"
 
 Quad3 reference_reflect(Quad3 direction, Quad3 normal)
 {
@@ -11,7 +11,7 @@ bool reference_refract(Quad3 direction, Quad3 normal, Quad eta, Quad3 *refracted
 {
     Quad cosine = -quad3_dot(direction, normal);
     Quad squared = 1 - eta * eta * (1 - cosine * cosine);
-    *margin = fmin(*margin, (double)quad_absolute(squared));
+    margin_reduce(margin, squared);
     if (squared < 0) return false;
     *refracted =
         quad3_add(quad3_scale(direction, eta), quad3_scale(normal, eta * cosine - quad_root(squared)));
