@@ -89,9 +89,9 @@ void verify_record_ulps(VerifyRun *run, double error, double value, double bound
 // Records an error in the given unit, and counts it as wrong if it exceeds the bound.
 void verify_record(VerifyRun *run, double error, double bound, const char *unit);
 
-// Reads a built-in scene: native YAML without the camera. A text that cannot be read is a bug. The caller
-// frees the scene with scene_free.
-Scene verify_scene(const char *objects);
+// Reads a built-in scene, formatted as by printf: native YAML without the camera. A text that cannot be read
+// is a bug. The caller frees the scene with scene_free.
+Scene verify_scene(const char *format, ...) __attribute__((format(printf, 1, 2)));
 bool verify_is_refused(const char *text); // whether the YAML reader rejects a scene with an error
 Camera verify_camera(Vector3 position, Vector3 look_at, double fov_degrees); // y is up
 
