@@ -4,7 +4,6 @@
 #include "host/verify/checks.h"
 #include "host/verify/families.h"
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 // Returns the signature of the light transport path that passes through each object of a list and ends at
@@ -57,15 +56,13 @@ void verify_nested_spheres(VerifyRun *run)
 
 static Scene matched_scene(const char *object)
 {
-    char text[600];
-    snprintf(text, sizeof text,
-             "background: [0.2, 0.3, 0.4]\nambient: [0.1, 0.1, 0.1]\n"
-             "lights:\n  - point: {position: [-3, 4, -6]}\n"
-             "materials:\n  tiles: {checker: {colors: [[1, 1, 1], [0.1, 0.1, 0.1]], size: 0.5}}\n"
-             "  glass: {transmission: 1, ior: 1, diffuse: 0, ambient: 0}\n"
-             "objects:\n  - plane: {point: [0, 0, 5], normal: [0, 0, -1], material: tiles}\n%s",
-             object);
-    Scene scene = verify_scene(text);
+    Scene scene =
+        verify_scene("background: [0.2, 0.3, 0.4]\nambient: [0.1, 0.1, 0.1]\n"
+                     "lights:\n  - point: {position: [-3, 4, -6]}\n"
+                     "materials:\n  tiles: {checker: {colors: [[1, 1, 1], [0.1, 0.1, 0.1]], size: 0.5}}\n"
+                     "  glass: {transmission: 1, ior: 1, diffuse: 0, ambient: 0}\n"
+                     "objects:\n  - plane: {point: [0, 0, 5], normal: [0, 0, -1], material: tiles}\n%s",
+                     object);
     const Vector3 eye = {0, 0, -5}, ahead = {0, 0, 5};
     scene.camera = verify_camera(eye, ahead, 30);
     return scene;

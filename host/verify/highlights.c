@@ -1,7 +1,6 @@
 // Images of Phong's highlights, from dull to a thousandth of a radian wide.
 #include "host/verify/checks.h"
 #include <math.h>
-#include <stdio.h>
 
 // Returns the point of the unit sphere where the highlight appears.
 static Vector3 highlight_middle(Vector3 eye, Vector3 to_light)
@@ -23,13 +22,11 @@ void verify_highlights(VerifyRun *run)
     for (size_t k = 0; k < 16; k++) {
         double power = powers[k / 2];
         bool closely = k % 2;
-        char text[300];
-        snprintf(text, sizeof text,
-                 "lights:\n  - directional: {direction: [0, 0, 1]}\n"
-                 "materials:\n  shiny: {diffuse: 0, specular: 1, ambient: 0, shininess: %.17g}\n"
-                 "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
-                 power);
-        Scene scene = verify_scene(text);
+        Scene scene =
+            verify_scene("lights:\n  - directional: {direction: [0, 0, 1]}\n"
+                         "materials:\n  shiny: {diffuse: 0, specular: 1, ambient: 0, shininess: %.17g}\n"
+                         "objects:\n  - sphere: {center: [0, 0, 0], radius: 1, material: shiny}\n",
+                         power);
         // the whole sphere is lit from the side and partly behind, the close-up from next to the eye
         Vector3 direction = vector_normalize(closely ? light_beside : light_behind);
         scene.lights.items[0].direction = direction;

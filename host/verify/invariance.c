@@ -44,7 +44,7 @@ static const char every_shape[] =
 
 static Scene every_shape_scene(void)
 {
-    Scene scene = verify_scene(every_shape);
+    Scene scene = verify_scene("%s", every_shape);
     const Vector3 eye = {0, 0, 0}, middle = {-0.5, -2, 10};
     scene.camera = verify_camera(eye, middle, 40);
     scene.camera.up = (Vector3){0.1, 1, 0};

@@ -5,7 +5,6 @@
 #include "host/base/percentile.h"
 #include "host/verify/checks.h"
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 static const Vector3 origin;
@@ -106,12 +105,9 @@ void verify_apex(VerifyRun *run)
     } views[] = {{{0, 0, -5}, "[0, 0, 1]"}, {{5, 0, 0}, "[-1, 0, 0]"}};
     enum { SIDE = 65 };
     for (size_t k = 0; k < COUNT_OF(views); k++) {
-        char text[160];
-        snprintf(text, sizeof text,
-                 "lights:\n  - directional: {direction: %s}\n"
-                 "objects:\n  - cone: {from: [0, 0, 0], to: [0, 0, 10], radius: [0, 5]}\n",
-                 views[k].light);
-        Scene scene = verify_scene(text);
+        Scene scene = verify_scene("lights:\n  - directional: {direction: %s}\n"
+                                   "objects:\n  - cone: {from: [0, 0, 0], to: [0, 0, 10], radius: [0, 5]}\n",
+                                   views[k].light);
         scene.camera = verify_camera(views[k].eye, origin, 0);
         scene.camera.half_tangent = SIDE * 1e-4 / 2 / 5;
         Film image = verify_render(run, &scene, false, SIDE, SIDE);
@@ -130,10 +126,8 @@ void verify_apex(VerifyRun *run)
 
 static Scene torus_scene(double minor)
 {
-    char text[120];
-    snprintf(text, sizeof text,
-             "objects:\n  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: %g}\n", minor);
-    return verify_scene(text);
+    return verify_scene("objects:\n  - torus: {center: [0, 0, 0], axis: [0, 0, 1], major: 1, minor: %g}\n",
+                        minor);
 }
 
 void verify_far_torus(VerifyRun *run)

@@ -2,7 +2,6 @@
 
 #include "host/base/array.h"
 #include "host/base/memory.h"
-#include "host/base/text.h"
 #include "host/verify/checks.h"
 #include <math.h>
 #include <stdlib.h>
@@ -17,11 +16,7 @@ Scene verify_rays_scene(const VerifyRays *set)
         set->scene_make(&scene);
         return scene;
     }
-    Text text = {0};
-    text_appendf(&text, "objects:\n%s", set->objects);
-    Scene scene = verify_scene(text_c(&text));
-    text_free(&text);
-    return scene;
+    return verify_scene("objects:\n%s", set->objects);
 }
 
 static double nudged(const VerifyRun *run, double value, double toward)

@@ -145,21 +145,11 @@ void verify_points_on_faces(VerifyRun *run)
     free(hits);
 }
 
-static const char *const coincident[] = {
-    "box: {min: [0, 0, 0], max: [1, 1, 1]}",
-    "box: {min: [1, 0, 0], max: [2, 1, 1]}",
-    "plane: {point: [0, 0, 0], normal: [0, 1, 0]}",
-    "triangle: {vertices: [[-1, 0.25, 0.25], [3, 0.25, 0.25], [1, 0.25, 2]]}",
-    "triangle: {vertices: [[0, 0.25, 0], [2, 0.25, 0.5], [0, 0.25, 3]]}",
-    "disc: {center: [1, 0.5, 0.5], normal: [1, 0, 0], radius: 0.75}",
-};
-enum { COINCIDENT = COUNT_OF(coincident) };
-
 // Checks that among objects at the same distance the first in the list is hit, and that the distance does
 // not depend on the list's order. A scene of each object alone gives that distance.
 void verify_coincident_faces(VerifyRun *run)
 {
-    enum { COUNT = 1200 };
+    enum { COUNT = 1200, COINCIDENT = 6 };
     static TraceRay rays[COUNT];
     static TraceHit alone[COINCIDENT][COUNT], hits[COUNT];
     for (uint64_t i = 0; i < COUNT; i++) {
@@ -168,28 +158,28 @@ void verify_coincident_faces(VerifyRun *run)
             direction = vector_subtract((Vector3){2 * random_at(7, i, 2), 0, random_at(7, i, 3)}, origin);
         rays[i] = verify_ray(run, origin, direction);
     }
+    Scene scene = verify_scene("objects:\n"
+                               "  - box: {min: [0, 0, 0], max: [1, 1, 1]}\n"
+                               "  - box: {min: [1, 0, 0], max: [2, 1, 1]}\n"
+                               "  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n"
+                               "  - triangle: {vertices: [[-1, 0.25, 0.25], [3, 0.25, 0.25], [1, 0.25, 2]]}\n"
+                               "  - triangle: {vertices: [[0, 0.25, 0], [2, 0.25, 0.5], [0, 0.25, 3]]}\n"
+                               "  - disc: {center: [1, 0.5, 0.5], normal: [1, 0, 0], radius: 0.75}\n");
+    Object objects[COINCIDENT];
+    memcpy(objects, scene.objects.items, sizeof objects);
+    scene.objects.count = 1;
     for (size_t k = 0; k < COINCIDENT; k++) {
-        char text[128];
-        snprintf(text, sizeof text, "objects:\n  - %s\n", coincident[k]);
-        Scene scene = verify_scene(text);
+        scene.objects.items[0] = objects[k];
         verify_trace(run, &scene, false, rays, COUNT, alone[k]);
-        scene_free(&scene);
     }
+    scene.objects.count = COINCIDENT;
     for (size_t order = 0; order < 2 * (size_t)COINCIDENT; order++) {
-        size_t place_of[COINCIDENT] = {0};
-        Scene scene = verify_scene("objects:\n  - plane: {point: [0, 0, 0], normal: [0, 1, 0]}\n");
-        scene.objects.count = 0;
+        size_t place_of[COINCIDENT];
         for (size_t k = 0; k < COINCIDENT; k++) {
             place_of[k] = (order < COINCIDENT ? k + order : COINCIDENT - 1 - k + order) % COINCIDENT;
-            char text[128];
-            snprintf(text, sizeof text, "objects:\n  - %s\n", coincident[place_of[k]]);
-            Scene one = verify_scene(text);
-            array_push(scene.objects, one.objects.items[0]);
-            scene.objects.items[k].material = 0;
-            scene_free(&one);
+            scene.objects.items[k] = objects[place_of[k]];
         }
         verify_trace(run, &scene, order % 2, rays, COUNT, hits);
-        scene_free(&scene);
         for (size_t i = 0; i < COUNT; i++) {
             uint32_t nearest = UINT32_MAX;
             double t = INFINITY;
@@ -202,6 +192,7 @@ void verify_coincident_faces(VerifyRun *run)
             run->result->differing += hits[i].object != nearest || (nearest != UINT32_MAX && hits[i].t != t);
         }
     }
+    scene_free(&scene);
     for (size_t i = 0; i < COUNT; i += 2)
         run->result->wrong += alone[0][i].t != 0.5 || alone[1][i].t != 0.5;
 }
