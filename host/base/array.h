@@ -5,7 +5,8 @@
 
 #define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
 
-// A growing array, which is empty if it is zeroed. Any struct with these members is one.
+// A growing array, which is empty if it is zeroed. Any struct with these members is one, such as a struct
+// with an anonymous ARRAY_OF.
 #define ARRAY_OF(Item)                                                                                       \
     struct {                                                                                                 \
         Item *items;                                                                                         \

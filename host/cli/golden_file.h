@@ -1,6 +1,7 @@
 // Reads and writes the file of glint golden, which has one line of hashes per scene.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/text.h"
 #include "host/render/film.h"
 
@@ -19,8 +20,7 @@ typedef struct {
 } GoldenLine;
 
 typedef struct {
-    GoldenLine *items;
-    size_t count, capacity;
+    ARRAY_OF(GoldenLine);
     Text comments; // the user's
 } GoldenFile;
 

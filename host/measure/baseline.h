@@ -1,6 +1,7 @@
 // Reads earlier reports of glint bench, to compare others with them.
 #pragma once
 
+#include "host/base/array.h"
 #include "host/base/message.h"
 #include "host/measure/bench.h"
 #include "host/measure/calibration.h"
@@ -21,8 +22,7 @@ typedef struct {
 } BaselineRow;
 
 typedef struct {
-    BaselineRow *items;
-    size_t count, capacity;
+    ARRAY_OF(BaselineRow);
     Calibration calibration;
     // The report's origin. Each text is "" if it is unknown.
     const char *date, *version, *commit, *host;

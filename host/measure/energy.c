@@ -25,8 +25,7 @@ typedef struct {
 } Nvml;
 
 struct EnergyMeter {
-    EnergyCounter *items;
-    size_t count, capacity;
+    ARRAY_OF(EnergyCounter);
     double joules;
     Nvml nvml;
 };
