@@ -6,6 +6,7 @@
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 // A map with `stride` values per pixel.
 typedef struct {
@@ -45,28 +46,27 @@ static size_t edges_mark(const ValueMap *map, bool *edges)
     return count;
 }
 
+// Returns the map of the edges of a film's layer with `stride` values per pixel, and their numbers in
+// `counts`.
+static bool *layer_edges(const Film *film, const uint32_t *values, uint32_t stride, size_t *counts)
+{
+    bool *edges = memory_allocate_zeroed(film_pixel_count(film) * stride, sizeof *edges);
+    ValueMap map = {values, film->width, film->height, stride, 0};
+    for (; map.offset < stride; map.offset++)
+        counts[map.offset] = edges_mark(&map, edges);
+    return edges;
+}
+
 void accuracy_edges_find(AccuracyEdges *edges, const Film *reference)
 {
     *edges = (AccuracyEdges){0};
-    const size_t pixels = film_pixel_count(reference);
-    ValueMap map = {reference->object, reference->width, reference->height, 1, 0};
-    if (reference->object) {
-        edges->silhouette = memory_allocate_zeroed(pixels, sizeof(bool));
-        edges->silhouette_pixels = edges_mark(&map, edges->silhouette);
-    }
-    if (reference->path) {
-        edges->path = memory_allocate_zeroed(pixels, sizeof(bool));
-        map.values = reference->path;
-        edges->path_pixels = edges_mark(&map, edges->path);
-    }
-    if (reference->shadow) {
-        const uint32_t lights = reference->light_count;
-        edges->shadow = memory_allocate_zeroed(pixels * lights, sizeof(bool));
-        edges->shadow_edge_pixels = memory_allocate_zeroed(lights, sizeof(size_t));
-        map = (ValueMap){reference->shadow, reference->width, reference->height, lights, 0};
-        for (; map.offset < lights; map.offset++)
-            edges->shadow_edge_pixels[map.offset] = edges_mark(&map, edges->shadow);
-    }
+    if (reference->object)
+        edges->silhouette = layer_edges(reference, reference->object, 1, &edges->silhouette_pixels);
+    if (reference->path) edges->path = layer_edges(reference, reference->path, 1, &edges->path_pixels);
+    if (!reference->shadow) return;
+    const uint32_t lights = reference->light_count;
+    edges->shadow_edge_pixels = memory_allocate_zeroed(lights, sizeof(size_t));
+    edges->shadow = layer_edges(reference, reference->shadow, lights, edges->shadow_edge_pixels);
 }
 
 void accuracy_edges_free(AccuracyEdges *edges)
@@ -126,10 +126,8 @@ static void worst_record(const FilmComparison *comparison, AccuracyMeasure type,
     worst->found = true;
     worst->x = (uint32_t)(pixel % comparison->reference->width);
     worst->y = (uint32_t)(pixel / comparison->reference->width);
-    for (size_t i = 0; i < 3; i++) {
-        worst->reference_color[i] = comparison->reference->color[3 * pixel + i];
-        worst->variant_color[i] = comparison->variant->color[3 * pixel + i];
-    }
+    memcpy(worst->reference_color, comparison->reference->color + 3 * pixel, sizeof worst->reference_color);
+    memcpy(worst->variant_color, comparison->variant->color + 3 * pixel, sizeof worst->variant_color);
 }
 
 static void count_wrong(const FilmComparison *comparison, AccuracyMeasure type, size_t pixel, bool edge,
@@ -226,11 +224,9 @@ static void pixel_compare(const FilmComparison *comparison, size_t pixel)
     if (objects[0] == UINT32_MAX) return;
     surface_compare(comparison, pixel);
     if (!same_shadows || !same_path) return;
-    for (size_t i = 0; i < 3; i++) {
-        comparison->expected[3 * errors->shading_pixels + i] = comparison->reference->color[3 * pixel + i];
-        comparison->found[3 * errors->shading_pixels + i] = comparison->variant->color[3 * pixel + i];
-    }
-    errors->shading_pixels++;
+    const size_t place = 3 * errors->shading_pixels++;
+    memcpy(comparison->expected + place, comparison->reference->color + 3 * pixel, 3 * sizeof(double));
+    memcpy(comparison->found + place, comparison->variant->color + 3 * pixel, 3 * sizeof(double));
     color_error_record(comparison, ACCURACY_SHADING, pixel);
 }
 

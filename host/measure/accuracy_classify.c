@@ -34,6 +34,7 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type)
     if (variant->status == ACCURACY_UNAVAILABLE) return (Figure){.why_not = variant->row->failure};
     if (errors->why_colors_only && type != ACCURACY_IMAGE && type != ACCURACY_FLIP)
         return (Figure){.why_not = errors->why_colors_only};
+    const char *no_surface = errors->surface_pixels > 0 ? NULL : "no pixel shows the same object";
     switch (type) {
     case ACCURACY_OBJECT:
         return (Figure){.value = sum_of(errors->object)};
@@ -44,11 +45,9 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type)
     case ACCURACY_SHADING:
         return (Figure){errors->shading.rmse, errors->shading_pixels > 0 ? NULL : "no pixel shows the same"};
     case ACCURACY_T:
-        return (Figure){errors->t_relative.percentile_999,
-                        errors->surface_pixels > 0 ? NULL : "no pixel shows the same object"};
+        return (Figure){errors->t_relative.percentile_999, no_surface};
     case ACCURACY_NORMAL:
-        return (Figure){errors->normal.percentile_999,
-                        errors->surface_pixels > 0 ? NULL : "no pixel shows the same object"};
+        return (Figure){errors->normal.percentile_999, no_surface};
     case ACCURACY_IMAGE:
         return (Figure){errors->image.rmse, errors->image.count > 0 ? NULL : "no value is finite"};
     default:

@@ -145,13 +145,10 @@ Comparison comparison_of_ends(const Series *seconds, size_t row_count, double to
         series_free(&blocks);
     }
     const double low = intervals[1].low - intervals[0].high, high = intervals[1].high - intervals[0].low;
-    Comparison comparison = {.ratio = exp(medians[1] - medians[0]), .low = exp(low), .high = exp(high)};
-    if (comparison.low > tolerance)
-        comparison.verdict = VERDICT_SLOWER;
-    else if (comparison.high < 1 / tolerance)
-        comparison.verdict = VERDICT_FASTER;
-    else if (comparison.low >= 1 / tolerance && comparison.high <= tolerance)
-        comparison.verdict = VERDICT_SAME;
+    Comparison comparison =
+        comparison_classify(medians[1] - medians[0], (RatioInterval){low, high}, tolerance);
+    const bool is_beyond = comparison.low > tolerance || comparison.high < 1 / tolerance;
+    if (!is_beyond && comparison.verdict != VERDICT_SAME) comparison.verdict = VERDICT_UNDECIDED;
     return comparison;
 }
 

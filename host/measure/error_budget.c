@@ -4,6 +4,7 @@
 #include "host/image/flip.h"
 #include "host/image/image_metrics.h"
 #include "host/image/srgb.h"
+#include "host/scene/vector.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -49,21 +50,6 @@ static void display_color(float display[3], const double color[3], bool display_
     }
 }
 
-// Returns the mean over the channels of the squared error.
-static double square_error(const double reference[3], const double test[3])
-{
-    double sum = 0;
-    for (int i = 0; i < 3; i++)
-        sum += (test[i] - reference[i]) * (test[i] - reference[i]);
-    return sum / 3;
-}
-
-static double largest_error(const double reference[3], const double test[3])
-{
-    return fmax(fabs(test[0] - reference[0]),
-                fmax(fabs(test[1] - reference[1]), fabs(test[2] - reference[2])));
-}
-
 // Returns the largest channel of the film, or infinity if a color is not finite.
 static double largest_channel(const Film *film)
 {
@@ -77,12 +63,13 @@ static double largest_channel(const Film *film)
 static double pixel_share(const ErrorBudget *budget, const double reference[3], const double test[3],
                           double range, bool display_values)
 {
+    const Vector3 error = vector_subtract(vector_from(test), vector_from(reference));
     float colors[2][3];
     switch (budget->metric) {
     case ERROR_RMSE:
-        return range > 0 ? square_error(reference, test) / (range * range) : 0;
+        return range > 0 ? vector_dot(error, error) / 3 / (range * range) : 0; // the mean of the channels
     case ERROR_MAX:
-        return largest_error(reference, test) > budget->limit;
+        return vector_largest(error) > budget->limit;
     default:
         display_color(colors[0], reference, display_values);
         display_color(colors[1], test, display_values);
