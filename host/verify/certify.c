@@ -85,14 +85,10 @@ void certify_sample_close(CertifySample *sample)
 }
 
 // Returns the largest error of a channel, or infinity if a channel is not finite.
-static double color_error(const double color[3], const Color *expected)
+static double color_error(Color color, Color expected)
 {
-    const double errors[3] = {fabs(color[0] - expected->x), fabs(color[1] - expected->y),
-                              fabs(color[2] - expected->z)};
-    double largest = 0;
-    for (int i = 0; i < 3; i++)
-        largest = isfinite(errors[i]) ? fmax(largest, errors[i]) : INFINITY; // fmax ignores a NaN
-    return largest;
+    const Vector3 error = vector_subtract(color, expected);
+    return vector_is_within(error, DBL_MAX) ? vector_largest(error) : INFINITY;
 }
 
 // The first way in which a pixel is wrong.
@@ -109,7 +105,7 @@ static Fault fault_of(const CertifySample *sample, size_t index, const Film *fil
     if (film->path[pixel] != expected->path) return WRONG_PATH;
     if (expected->has_texture) return RIGHT;
     const double bound = CERTIFIED_COLOR_ERROR * fmax(1, vector_largest(expected->color));
-    return color_error(film->color + 3 * pixel, &expected->color) <= bound ? RIGHT : WRONG_COLOR;
+    return color_error(vector_from(film->color + 3 * pixel), expected->color) <= bound ? RIGHT : WRONG_COLOR;
 }
 
 static void wrong_decided_add(CertifyErrors *errors, const uint32_t place[2], double margin)
@@ -120,8 +116,8 @@ static void wrong_decided_add(CertifyErrors *errors, const uint32_t place[2], do
     memcpy(errors->wrong_decided_place, place, sizeof errors->wrong_decided_place);
 }
 
-static void color_compare(CertifyErrors *errors, const double color[3], const Color *expected,
-                          const uint32_t place[2], bool is_wrong)
+static void color_compare(CertifyErrors *errors, Color color, Color expected, const uint32_t place[2],
+                          bool is_wrong)
 {
     errors->colors++;
     const double error = color_error(color, expected);
@@ -153,7 +149,7 @@ CertifyErrors certify_compare(const CertifySample *sample, const Film *film)
             errors.margin = fmax(errors.margin, expected->margin);
         }
         if (!expected->has_texture)
-            color_compare(&errors, film->color + 3 * pixel, &expected->color, place, fault);
+            color_compare(&errors, vector_from(film->color + 3 * pixel), expected->color, place, fault);
     }
     return errors;
 }
@@ -172,8 +168,7 @@ typedef struct {
 // Returns whether two answers differ by more than rounding.
 static bool is_other(const ReferencePixel *a, const ReferencePixel *b)
 {
-    const double color[3] = {a->color.x, a->color.y, a->color.z};
-    return a->object != b->object || a->path != b->path || color_error(color, &b->color) > 1e-6;
+    return a->object != b->object || a->path != b->path || color_error(a->color, b->color) > 1e-6;
 }
 
 static void pixels_examine(void *context, size_t begin, size_t end)
