@@ -4,26 +4,14 @@
 // Members that a row does not name are 0.
 #pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
-#define LIMITS(...)                                                                                          \
-    &(const VerifyLimits)                                                                                    \
-    {                                                                                                        \
-        __VA_ARGS__                                                                                          \
-    }
+// clang-format off
+#define LIMITS(...)           &(const VerifyLimits){__VA_ARGS__}
 #define ULPS(b, c, d)         LIMITS(.ulps = {0, b, c, d})
-#define BY_NUMBERS(case_rays) .rays = (case_rays), .ray_count = sizeof(case_rays) / sizeof *(case_rays)
-
-#define X                                                                                                    \
-    {                                                                                                        \
-        1, 0, 0                                                                                              \
-    }
-#define Y                                                                                                    \
-    {                                                                                                        \
-        0, 1, 0                                                                                              \
-    }
-#define Z                                                                                                    \
-    {                                                                                                        \
-        0, 0, 1                                                                                              \
-    }
+#define BY_NUMBERS(case_rays) .rays = (case_rays), .ray_count = COUNT_OF(case_rays)
+#define X                     {1, 0, 0}
+#define Y                     {0, 1, 0}
+#define Z                     {0, 0, 1}
+// clang-format on
 
 #define UNIT_SPHERE       "  - sphere: {center: [0, 0, 0], radius: 1}\n"
 #define CUBE              "  - box: {min: [-1, -1, -1], max: [1, 1, 1]}\n"
