@@ -142,12 +142,11 @@ bool dat_directional_light(DatReader *reader)
 
 bool dat_spotlight(DatReader *reader)
 {
-    static const Range range_falloff = {0, 180, true, "greater than 0 and less than 180"};
     Light light = {.type = LIGHT_SPOT};
     double start;
     if (!light_place_read(reader, &light) || !dat_vector(reader, "direction", &light.direction) ||
         !dat_number(reader, "falloff_start", &start) || !dat_expect(reader, "falloff_end") ||
-        !free_number(&reader->line, "falloff_end", &range_falloff, &light.spot.half_angle))
+        !free_number(&reader->line, "falloff_end", &range_half_turn, &light.spot.half_angle))
         return false;
     light.spot.penumbra = light.spot.half_angle - fmin(fmax(start, 0), light.spot.half_angle);
     return fading_read(reader, &light) && light_end(reader, light);

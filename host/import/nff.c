@@ -45,7 +45,7 @@ static const LineField view_keys[] = {
     {"from", free_vector, offsetof(View, from), NULL},
     {"at", free_vector, offsetof(View, at), NULL},
     {"up", free_vector, offsetof(View, up), NULL},
-    {"angle", free_number, offsetof(View, angle), &range_field_of_view},
+    {"angle", free_number, offsetof(View, angle), &range_half_turn},
     {"hither", free_number, offsetof(View, hither), NULL},
     {"resolution", read_size, offsetof(View, size), &range_pixels},
 };

@@ -13,7 +13,7 @@ const Range range_positive = {0, INFINITY, true, "greater than 0"};
 const Range range_not_negative = {0, INFINITY, false, "0 or more"};
 const Range range_unit = {0, 1, false, "from 0 to 1"};
 const Range range_byte = {0, 255, false, "from 0 to 255"};
-const Range range_field_of_view = {0, 180, true, "greater than 0 and less than 180"};
+const Range range_half_turn = {0, 180, true, "greater than 0 and less than 180"};
 const Range range_pixels = {1, 65536, false, "from 1 to 65536"};
 
 static double decimal_by_library(const char *text, size_t length)

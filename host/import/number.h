@@ -33,8 +33,7 @@ typedef struct {
     const char *must; // the requirement as messages state it
 } Range;
 
-extern const Range range_positive, range_not_negative, range_unit, range_byte, range_field_of_view,
-    range_pixels;
+extern const Range range_positive, range_not_negative, range_unit, range_byte, range_half_turn, range_pixels;
 
 bool range_holds(const Range *range, double value);
 

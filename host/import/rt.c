@@ -109,7 +109,7 @@ static bool read_camera(RtReader *reader, Camera *camera)
     if (!line_comma_vector(line, "position", NULL, &camera->position)) return false;
     size_t offset = line_peek(line).offset;
     if (!read_unit_vector(line, "direction", &direction) ||
-        !line_number(line, "fov", &range_field_of_view, &fov_degrees) || !element_end(reader))
+        !line_number(line, "fov", &range_half_turn, &fov_degrees) || !element_end(reader))
         return false;
     if (vector_is_zero(direction)) {
         report_warning(&reader->report, offset, "'direction' is zero: looks along +z");

@@ -154,8 +154,8 @@ static uint32_t keys_value(YamlReader *reader, const Keys *keys, Ease ease, doub
 static bool value_animate(YamlReader *reader, uint32_t index)
 {
     static const Field fields[] = {
-        {"keys", read_node, offsetof(Animation, keys), FORM_ANY, REQUIRED},
-        {"ease", read_ease, offsetof(Animation, ease), FORM_ANY, OPTIONAL},
+        {"keys", read_node, offsetof(Animation, keys), REQUIRED},
+        {"ease", read_ease, offsetof(Animation, ease)},
     };
     Keys keys = {0};
     Animation animation = {.ease = EASE_LINEAR};

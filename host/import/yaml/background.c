@@ -44,19 +44,19 @@ static bool read_sun(YamlReader *reader, const Field *field, const YamlNode *nod
         Sun sun;
         double latitude, longitude, days, hour;
     } SunFields;
-    static const Range range_half_turn = {-180, 180, false, "from -180 to 180"};
+    static const Range range_longitude = {-180, 180, false, "from -180 to 180"};
     static const Range range_hour = {-10000, 10000, false, "from -10000 to 10000"};
     enum { FORM_POSITION = FORM_FIRST, FORM_TIME = FORM_SECOND };
     static const Field fields[] = {
-        {"elevation", read_number, offsetof(SunFields, sun.position.elevation), FORM_POSITION, REQUIRED,
+        {"elevation", read_number, offsetof(SunFields, sun.position.elevation), REQUIRED | FORM_POSITION,
          &range_right_angle},
-        {"azimuth", read_number, offsetof(SunFields, sun.position.azimuth), FORM_POSITION, REQUIRED},
-        {"latitude", read_number, offsetof(SunFields, latitude), FORM_TIME, REQUIRED, &range_right_angle},
-        {"longitude", read_number, offsetof(SunFields, longitude), FORM_TIME, REQUIRED, &range_half_turn},
-        {"date", read_date, offsetof(SunFields, days), FORM_TIME, REQUIRED},
-        {"hour", read_number, offsetof(SunFields, hour), FORM_TIME, REQUIRED, &range_hour},
-        {"angle", read_number, offsetof(SunFields, sun.angle), FORM_ANY, OPTIONAL, &range_disc_angle},
-        {"light", read_boolean, offsetof(SunFields, sun.shines), FORM_ANY, OPTIONAL},
+        {"azimuth", read_number, offsetof(SunFields, sun.position.azimuth), REQUIRED | FORM_POSITION},
+        {"latitude", read_number, offsetof(SunFields, latitude), REQUIRED | FORM_TIME, &range_right_angle},
+        {"longitude", read_number, offsetof(SunFields, longitude), REQUIRED | FORM_TIME, &range_longitude},
+        {"date", read_date, offsetof(SunFields, days), REQUIRED | FORM_TIME},
+        {"hour", read_number, offsetof(SunFields, hour), REQUIRED | FORM_TIME, &range_hour},
+        {"angle", read_number, offsetof(SunFields, sun.angle), OPTIONAL, &range_disc_angle},
+        {"light", read_boolean, offsetof(SunFields, sun.shines)},
     };
     SunFields read = {.sun.shines = true};
     const Form form = fields_read(reader, node, field->name, fields, COUNT_OF(fields), &read);
@@ -73,18 +73,18 @@ bool read_background(YamlReader *reader, const Field *field, const YamlNode *nod
     static const Range range_turbidity = {TURBIDITY_MIN, TURBIDITY_MAX, false, "from 2 to 10"};
     enum { FORM_COLORS = FORM_FIRST, FORM_IMAGE = FORM_SECOND, FORM_SUN = FORM_THIRD };
     static const Field fields[] = {
-        {"horizon", read_strength, offsetof(Background, horizon), FORM_COLORS, REQUIRED},
-        {"zenith", read_strength, offsetof(Background, zenith), FORM_COLORS, REQUIRED},
-        {"nadir", read_strength, offsetof(Background, nadir), FORM_COLORS, OPTIONAL},
-        {"image", read_texture, offsetof(Background, texture), FORM_IMAGE, REQUIRED},
-        {"sun", read_sun, offsetof(Background, sun), FORM_SUN, REQUIRED},
-        {"turbidity", read_number, offsetof(Background, turbidity), FORM_SUN, OPTIONAL, &range_turbidity},
-        {"ground", read_color, offsetof(Background, ground), FORM_SUN, OPTIONAL},
-        {"intensity", read_number, offsetof(Background, intensity), FORM_IMAGE | FORM_SUN, OPTIONAL,
+        {"horizon", read_strength, offsetof(Background, horizon), REQUIRED | FORM_COLORS},
+        {"zenith", read_strength, offsetof(Background, zenith), REQUIRED | FORM_COLORS},
+        {"nadir", read_strength, offsetof(Background, nadir), FORM_COLORS},
+        {"image", read_texture, offsetof(Background, texture), REQUIRED | FORM_IMAGE},
+        {"sun", read_sun, offsetof(Background, sun), REQUIRED | FORM_SUN},
+        {"turbidity", read_number, offsetof(Background, turbidity), FORM_SUN, &range_turbidity},
+        {"ground", read_color, offsetof(Background, ground), FORM_SUN},
+        {"intensity", read_number, offsetof(Background, intensity), FORM_IMAGE | FORM_SUN,
          &range_not_negative},
-        {"turn", read_number, offsetof(Background, turn), FORM_IMAGE | FORM_SUN, OPTIONAL},
-        {"up", read_direction, offsetof(Background, up), FORM_ANY, OPTIONAL},
-        {"light", read_boolean, offsetof(Background, is_light), FORM_ANY, OPTIONAL},
+        {"turn", read_number, offsetof(Background, turn), FORM_IMAGE | FORM_SUN},
+        {"up", read_direction, offsetof(Background, up)},
+        {"light", read_boolean, offsetof(Background, is_light)},
     };
     Background *background = target;
     if (node->type != YAML_MAPPING) return read_strength(reader, field, node, &background->horizon);

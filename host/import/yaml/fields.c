@@ -55,7 +55,7 @@ void choices_describe(Text *text, const char *word, const char *const *known, si
         text_appendf(text, "%s%.*s", i > 0 ? ", " : "", WORD_SHOWN, known[i]);
 }
 
-void unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
+bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
                     size_t known_count)
 {
     const char *word = yaml_text(&reader->tree, node);
@@ -64,6 +64,7 @@ void unknown_report(YamlReader *reader, const YamlNode *node, const char *type, 
     report_error(&reader->report, node->offset, "unknown %s '%.*s'%s", type, WORD_SHOWN, word,
                  text_c(&choices));
     text_free(&choices);
+    return false;
 }
 
 void twice_report(YamlReader *reader, const char *type, const char *name, size_t offset, size_t before)
@@ -106,17 +107,23 @@ static size_t field_find(const YamlReader *reader, const YamlNode *key, const Fi
     return index;
 }
 
+static Form field_forms(const Field *field)
+{
+    const Form forms = field->forms & FORM_ANY;
+    return forms ? forms : FORM_ANY;
+}
+
 // Restricts `forms` to those that the key allows. Reports an error and returns false if none remains; `seen`
 // marks the fields before the key.
 static bool form_narrow(YamlReader *reader, const YamlNode *key, const Field *field, const Field *fields,
                         const bool *seen, Form *forms)
 {
-    if (*forms & field->forms) {
-        *forms &= field->forms;
+    if (*forms & field_forms(field)) {
+        *forms &= field_forms(field);
         return true;
     }
     const Field *other = fields;
-    while (!seen[other - fields] || (other->forms & field->forms))
+    while (!seen[other - fields] || (field_forms(other) & field_forms(field)))
         other++;
     return report_error(&reader->report, key->offset, "'%s' cannot be combined with '%s'", field->name,
                         other->name);
@@ -149,7 +156,7 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
     }
     const Form chosen = forms & -forms; // the first
     for (size_t i = 0; i < field_count && !mixed; i++) {
-        if (fields[i].required && (fields[i].forms & chosen) && !seen[i])
+        if ((fields[i].forms & REQUIRED) && (field_forms(&fields[i]) & chosen) && !seen[i])
             report_error(&reader->report, mapping->offset, "%s lacks '%s'", what, fields[i].name);
     }
     return reader->report.error_count == errors_before ? chosen : 0;
@@ -165,6 +172,11 @@ const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, co
         if (yaml_is(&reader->tree, key, name)) return value;
     }
     return mapping;
+}
+
+bool field_fails(YamlReader *reader, const YamlNode *mapping, const char *name, const char *message)
+{
+    return report_error(&reader->report, field_node(reader, mapping, name)->offset, "%s", message);
 }
 
 bool single_pair(YamlReader *reader, const YamlNode *node, const char *expected, const YamlNode **key,

@@ -47,14 +47,14 @@ typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode 
 typedef unsigned Form;
 enum { FORM_FIRST = 1, FORM_SECOND = 2, FORM_THIRD = 4, FORM_FOURTH = 8, FORM_ANY = 15 };
 
-enum { OPTIONAL = false, REQUIRED = true };
+// Bits of a field next to those of its forms.
+enum { OPTIONAL = 0, REQUIRED = 16 };
 
 struct Field {
     const char *name;
     FieldReader *read;
-    size_t offset; // in the target struct
-    unsigned forms;
-    bool required;      // within its forms
+    size_t offset;      // in the target struct
+    unsigned forms;     // that have it, or none if all have it; and REQUIRED if it is required in them
     const Range *range; // of its values; NULL: any
     const Items *items; // of read_items
 };
@@ -77,6 +77,9 @@ Form fields_read(YamlReader *reader, const YamlNode *mapping, const char *what, 
 
 // Returns the value of a key, or the node itself if the key is missing or the node is not a mapping.
 const YamlNode *field_node(const YamlReader *reader, const YamlNode *mapping, const char *name);
+
+// Reports an error at field_node's node and returns false.
+bool field_fails(YamlReader *reader, const YamlNode *mapping, const char *name, const char *message);
 
 // Reports an error and returns false if a key is a list or a mapping.
 bool key_is_word(YamlReader *reader, const YamlNode *key);
@@ -104,6 +107,6 @@ bool expected_report(YamlReader *reader, const char *name, const char *expected,
 // Appends the known word that `word` may stand for, if any, and the list of known words unless it is long.
 void choices_describe(Text *text, const char *word, const char *const *known, size_t known_count);
 // Reports `unknown type 'word'`, with a suggestion if a known word is similar or means the same, and with
-// the list of known words unless it is long.
-void unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
+// the list of known words unless it is long. Returns false.
+bool unknown_report(YamlReader *reader, const YamlNode *node, const char *type, const char *const *known,
                     size_t known_count);

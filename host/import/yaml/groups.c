@@ -64,8 +64,8 @@ void yaml_read_group(YamlReader *reader, const YamlNode *mapping)
         Affine transform;
     } Group;
     static const Field fields[] = {
-        {"objects", read_node, offsetof(Group, objects), FORM_ANY, REQUIRED},
-        {"transform", read_transform, offsetof(Group, transform), FORM_ANY, OPTIONAL},
+        {"objects", read_node, offsetof(Group, objects), REQUIRED},
+        {"transform", read_transform, offsetof(Group, transform)},
     };
     Group group = {.transform = affine_identity};
     if (!fields_read(reader, mapping, "group", fields, COUNT_OF(fields), &group) ||
@@ -114,7 +114,7 @@ static size_t definition_cost(const Definition *definition)
 
 void yaml_read_definitions(YamlReader *reader, const YamlNode *node)
 {
-    static const Field fields[] = {{"objects", read_node, 0, FORM_ANY, REQUIRED}};
+    static const Field fields[] = {{"objects", read_node, 0, REQUIRED}};
     if (node->type != YAML_MAPPING) {
         expected_report(reader, "define", "a mapping", node);
         return;
@@ -190,9 +190,9 @@ void yaml_read_instance(YamlReader *reader, const YamlNode *mapping)
         uint32_t material;
     } Instance;
     static const Field fields[] = {
-        {"of", read_node, offsetof(Instance, of), FORM_ANY, REQUIRED},
-        {"transform", read_transform, offsetof(Instance, transform), FORM_ANY, OPTIONAL},
-        {"material", read_material, offsetof(Instance, material), FORM_ANY, OPTIONAL},
+        {"of", read_node, offsetof(Instance, of), REQUIRED},
+        {"transform", read_transform, offsetof(Instance, transform)},
+        {"material", read_material, offsetof(Instance, material)},
     };
     Instance instance = {.transform = affine_identity, .material = UINT32_MAX};
     if (!fields_read(reader, mapping, "instance", fields, COUNT_OF(fields), &instance)) return;

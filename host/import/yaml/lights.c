@@ -5,7 +5,6 @@
 
 #include <string.h>
 
-static const Range range_half_turn = {0, 180, true, "greater than 0 and less than 180"};
 const Range range_disc_angle = {0, 90, false, "from 0 to 90"};
 
 typedef struct {
@@ -18,9 +17,9 @@ typedef struct {
 static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
-        {"constant", read_number, 0, FORM_ANY, OPTIONAL, &range_not_negative},
-        {"linear", read_number, sizeof(double), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"quadratic", read_number, 2 * sizeof(double), FORM_ANY, OPTIONAL, &range_not_negative},
+        {"constant", read_number, 0, OPTIONAL, &range_not_negative},
+        {"linear", read_number, sizeof(double), OPTIONAL, &range_not_negative},
+        {"quadratic", read_number, 2 * sizeof(double), OPTIONAL, &range_not_negative},
     };
     double *fading = target;
     if (yaml_is(&reader->tree, node, "inverse_square")) {
@@ -34,92 +33,70 @@ static bool read_falloff(YamlReader *reader, const Field *field, const YamlNode 
            report_error(&reader->report, node->offset, "'%s' needs a number above 0", field->name);
 }
 
-#define FALLOFF                                                                                              \
+// The last rows of the tables of all lights, of those that may fade, and of those with an area.
+#define EVERY_LIGHT                                                                                          \
+    {"color", read_strength, offsetof(LightFields, light.color)},                                            \
     {                                                                                                        \
-        "falloff", read_falloff, offsetof(LightFields, light.fading), FORM_ANY, OPTIONAL                     \
+        "intensity", read_number, offsetof(LightFields, intensity), OPTIONAL, &range_not_negative            \
     }
-
-#define COLOR                                                                                                \
-    {"color", read_strength, offsetof(LightFields, light.color), FORM_ANY, OPTIONAL},                        \
-    {                                                                                                        \
-        "intensity", read_number, offsetof(LightFields, intensity), FORM_ANY, OPTIONAL, &range_not_negative  \
-    }
+#define FADING_LIGHT {"falloff", read_falloff, offsetof(LightFields, light.fading)}, EVERY_LIGHT
+#define AREA_LIGHT   {"visible", read_boolean, offsetof(LightFields, light.area.is_visible)}, FADING_LIGHT
 
 static const Field point_fields[] = {
-    {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
-    FALLOFF,
-    COLOR,
+    {"position", read_vector, offsetof(LightFields, light.position), REQUIRED},
+    FADING_LIGHT,
 };
 
 static const Field directional_fields[] = {
-    {"direction", read_direction, offsetof(LightFields, light.direction), FORM_ANY, REQUIRED},
-    {"angle", read_number, offsetof(LightFields, angle), FORM_ANY, OPTIONAL, &range_disc_angle},
-    COLOR,
+    {"direction", read_direction, offsetof(LightFields, light.direction), REQUIRED},
+    {"angle", read_number, offsetof(LightFields, angle), OPTIONAL, &range_disc_angle},
+    EVERY_LIGHT,
 };
 
 // `look_at` and `direction` share a member, in which a target finally becomes a direction.
 static const Field spot_fields[] = {
-    {"position", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
-    {"look_at", read_vector, offsetof(LightFields, light.direction), FORM_FIRST, REQUIRED},
-    {"direction", read_direction, offsetof(LightFields, light.direction), FORM_SECOND, REQUIRED},
-    {"angle", read_number, offsetof(LightFields, light.spot.half_angle), FORM_ANY, REQUIRED,
-     &range_half_turn},
-    {"penumbra", read_number, offsetof(LightFields, light.spot.penumbra), FORM_ANY, OPTIONAL,
-     &range_not_negative},
-    {"radius", read_number, offsetof(LightFields, light.area.radius), FORM_ANY, OPTIONAL,
-     &range_not_negative},
-    FALLOFF,
-    COLOR,
+    {"position", read_vector, offsetof(LightFields, light.position), REQUIRED},
+    {"look_at", read_vector, offsetof(LightFields, light.direction), REQUIRED | FORM_FIRST},
+    {"direction", read_direction, offsetof(LightFields, light.direction), REQUIRED | FORM_SECOND},
+    {"angle", read_number, offsetof(LightFields, light.spot.half_angle), REQUIRED, &range_half_turn},
+    {"penumbra", read_number, offsetof(LightFields, light.spot.penumbra), OPTIONAL, &range_not_negative},
+    {"radius", read_number, offsetof(LightFields, light.area.radius), OPTIONAL, &range_not_negative},
+    FADING_LIGHT,
 };
 
-#define VISIBLE                                                                                              \
-    {                                                                                                        \
-        "visible", read_boolean, offsetof(LightFields, light.area.is_visible), FORM_ANY, OPTIONAL            \
-    }
-
 static const Field sphere_fields[] = {
-    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
-    {"radius", read_number, offsetof(LightFields, light.area.radius), FORM_ANY, REQUIRED, &range_positive},
-    VISIBLE,
-    FALLOFF,
-    COLOR,
+    {"center", read_vector, offsetof(LightFields, light.position), REQUIRED},
+    {"radius", read_number, offsetof(LightFields, light.area.radius), REQUIRED, &range_positive},
+    AREA_LIGHT,
 };
 
 static const Items two_directions = {2, "two vectors", read_direction, sizeof(Vector3)};
 
 static const Field rectangle_fields[] = {
-    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
-    {"edges", read_items, offsetof(LightFields, edges), FORM_ANY, REQUIRED, NULL, &two_directions},
-    VISIBLE,
-    FALLOFF,
-    COLOR,
+    {"center", read_vector, offsetof(LightFields, light.position), REQUIRED},
+    {"edges", read_items, offsetof(LightFields, edges), REQUIRED, .items = &two_directions},
+    AREA_LIGHT,
 };
 
 static const Field disc_fields[] = {
-    {"center", read_vector, offsetof(LightFields, light.position), FORM_ANY, REQUIRED},
-    {"normal", read_direction, offsetof(LightFields, normal), FORM_ANY, REQUIRED},
-    {"radius", read_number, offsetof(LightFields, light.area.radius), FORM_ANY, REQUIRED, &range_positive},
-    VISIBLE,
-    FALLOFF,
-    COLOR,
+    {"center", read_vector, offsetof(LightFields, light.position), REQUIRED},
+    {"normal", read_direction, offsetof(LightFields, normal), REQUIRED},
+    {"radius", read_number, offsetof(LightFields, light.area.radius), REQUIRED, &range_positive},
+    AREA_LIGHT,
 };
 
 static const Field triangle_fields[] = {
-    {"vertices", read_items, offsetof(LightFields, vertices), FORM_ANY, REQUIRED, NULL, &three_points},
-    VISIBLE,
-    FALLOFF,
-    COLOR,
+    {"vertices", read_items, offsetof(LightFields, vertices), REQUIRED, .items = &three_points},
+    AREA_LIGHT,
 };
 
 static bool spot_finish(YamlReader *reader, const YamlNode *mapping, Form form, Light *light)
 {
     if (form == FORM_FIRST) light->direction = vector_subtract(light->direction, light->position);
     if (vector_is_zero(light->direction))
-        return report_error(&reader->report, field_node(reader, mapping, "look_at")->offset,
-                            "'look_at' must differ from 'position'");
+        return field_fails(reader, mapping, "look_at", "'look_at' must differ from 'position'");
     if (light->spot.penumbra > light->spot.half_angle)
-        return report_error(&reader->report, field_node(reader, mapping, "penumbra")->offset,
-                            "'penumbra' must not exceed 'angle'");
+        return field_fails(reader, mapping, "penumbra", "'penumbra' must not exceed 'angle'");
     return true;
 }
 
@@ -179,45 +156,37 @@ static const struct {
     {"triangle", LIGHT_POINT, AREA_TRIANGLE, FIELDS(triangle_fields)},
 };
 
-static void light_read(YamlReader *reader, const YamlNode *item)
+static bool light_read(YamlReader *reader, const YamlNode *item)
 {
     const YamlNode *key, *mapping;
-    if (!single_pair(reader, item, "one light, such as `point: {...}`", &key, &mapping)) return;
+    if (!single_pair(reader, item, "one light, such as `point: {...}`", &key, &mapping)) return false;
     const char *names[COUNT_OF(light_types)];
     size_t row = COUNT_OF(light_types);
     for (size_t i = 0; i < COUNT_OF(light_types); i++) {
         names[i] = light_types[i].name;
         if (yaml_is(&reader->tree, key, names[i])) row = i;
     }
-    if (row == COUNT_OF(light_types)) {
-        unknown_report(reader, key, "light", names, COUNT_OF(light_types));
-        return;
-    }
+    if (row == COUNT_OF(light_types))
+        return unknown_report(reader, key, "light", names, COUNT_OF(light_types));
     LightFields fields = {
         .light = {.type = light_types[row].type, .color = {1, 1, 1}, .area.type = light_types[row].area},
         .intensity = 1,
     };
+    Light *light = &fields.light;
     const Form form = fields_read(reader, mapping, names[row], light_types[row].fields,
                                   light_types[row].field_count, &fields);
-    if (!form) return;
-    if (fields.light.type == LIGHT_SPOT && !spot_finish(reader, mapping, form, &fields.light)) return;
-    const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1]));
-    if (fields.light.area.type == AREA_RECTANGLE && vector_length(across) < 1e-9) {
-        report_error(&reader->report, field_node(reader, mapping, "edges")->offset,
-                     "'edges' must not be parallel");
-        return;
-    }
-    const Vector3 *vertices = fields.vertices;
-    if (fields.light.area.type == AREA_TRIANGLE &&
-        !triangle_has_area(vertices[0], vertices[1], vertices[2])) {
-        report_error(&reader->report, field_node(reader, mapping, "vertices")->offset,
-                     "'vertices' must not be on one line");
-        return;
-    }
+    if (!form || (light->type == LIGHT_SPOT && !spot_finish(reader, mapping, form, light))) return false;
+    const Vector3 across = vector_cross(vector_normalize(fields.edges[0]), vector_normalize(fields.edges[1])),
+                  *vertices = fields.vertices;
+    if (light->area.type == AREA_RECTANGLE && vector_length(across) < 1e-9)
+        return field_fails(reader, mapping, "edges", "'edges' must not be parallel");
+    if (light->area.type == AREA_TRIANGLE && !triangle_has_area(vertices[0], vertices[1], vertices[2]))
+        return field_fails(reader, mapping, "vertices", "'vertices' must not be on one line");
     area_set(&fields);
-    fields.light.color = vector_scale(fields.light.color, fields.intensity);
-    light_fold_fading(&fields.light);
-    array_push(reader->scene->lights, fields.light);
+    light->color = vector_scale(light->color, fields.intensity);
+    light_fold_fading(light);
+    array_push(reader->scene->lights, *light);
+    return true;
 }
 
 void yaml_read_lights(YamlReader *reader, const YamlNode *node)

@@ -11,8 +11,8 @@ static bool read_checker(YamlReader *reader, const Field *field, const YamlNode 
 {
     static const Items two_colors = {2, "two colors", read_color, sizeof(Color)};
     static const Field fields[] = {
-        {"colors", read_items, offsetof(Material, checker.colors), FORM_ANY, REQUIRED, NULL, &two_colors},
-        {"size", read_number, offsetof(Material, checker.size), FORM_ANY, OPTIONAL, &range_positive},
+        {"colors", read_items, offsetof(Material, checker.colors), REQUIRED, .items = &two_colors},
+        {"size", read_number, offsetof(Material, checker.size), OPTIONAL, &range_positive},
     };
     Material *material = target;
     material->checker.is_on = true;
@@ -36,8 +36,8 @@ static bool read_fractions(YamlReader *reader, const Field *field, const YamlNod
 static bool read_absorption(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
-        {"color", read_fractions, offsetof(Absorption, color), FORM_ANY, REQUIRED, &range_unit},
-        {"distance", read_number, offsetof(Absorption, distance), FORM_ANY, OPTIONAL, &range_positive},
+        {"color", read_fractions, offsetof(Absorption, color), REQUIRED, &range_unit},
+        {"distance", read_number, offsetof(Absorption, distance), OPTIONAL, &range_positive},
     };
     Absorption absorption = {.distance = 1};
     if (!fields_read(reader, node, field->name, fields, COUNT_OF(fields), &absorption)) return false;
@@ -73,8 +73,8 @@ static const struct {
 static bool read_conductor(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
-        {"n", read_channels, offsetof(Conductor, n), FORM_ANY, REQUIRED, &range_positive},
-        {"k", read_channels, offsetof(Conductor, k), FORM_ANY, REQUIRED, &range_not_negative},
+        {"n", read_channels, offsetof(Conductor, n), REQUIRED, &range_positive},
+        {"k", read_channels, offsetof(Conductor, k), REQUIRED, &range_not_negative},
     };
     if (node->type == YAML_SEQUENCE)
         return expected_report(reader, field->name, "the name of a metal or a mapping of n and k", node);
@@ -87,8 +87,7 @@ static bool read_conductor(YamlReader *reader, const Field *field, const YamlNod
         *(Conductor *)target = conductors[i].index;
         return true;
     }
-    unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
-    return false;
+    return unknown_report(reader, node, field->name, names, COUNT_OF(conductors));
 }
 
 // Returns the path of the node's file, which is the scene's for a value of --set.
@@ -125,8 +124,8 @@ static bool content_read(YamlReader *reader, const Field *field, const YamlNode 
         const YamlNode *file, *layer;
     } Names;
     static const Field fields[] = {
-        {"file", read_node, offsetof(Names, file), FORM_ANY, REQUIRED},
-        {"layer", read_node, offsetof(Names, layer), FORM_ANY, OPTIONAL},
+        {"file", read_node, offsetof(Names, file), REQUIRED},
+        {"layer", read_node, offsetof(Names, layer)},
     };
     Names names = {.file = node};
     if (node->type == YAML_MAPPING &&
@@ -225,28 +224,26 @@ static void textures_check(YamlReader *reader, const Material *material, const Y
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
 {
     static const Field fields[] = {
-        {"color", read_color, offsetof(Material, color), FORM_FIRST, OPTIONAL},
-        {"checker", read_checker, 0, FORM_SECOND, OPTIONAL},
-        {"image", read_texture, offsetof(Material, image.texture), FORM_THIRD, REQUIRED},
-        {"size", read_number, offsetof(Material, texture_size), FORM_FIRST | FORM_THIRD, OPTIONAL,
-         &range_positive},
-        {"cutout", read_number, offsetof(Material, cutout.threshold), FORM_THIRD, OPTIONAL, &range_unit},
-        {"normal_map", read_normal_map, offsetof(Material, normal_map.texture), FORM_FIRST | FORM_THIRD,
-         OPTIONAL},
+        {"color", read_color, offsetof(Material, color), FORM_FIRST},
+        {"checker", read_checker, 0, FORM_SECOND},
+        {"image", read_texture, offsetof(Material, image.texture), REQUIRED | FORM_THIRD},
+        {"size", read_number, offsetof(Material, texture_size), FORM_FIRST | FORM_THIRD, &range_positive},
+        {"cutout", read_number, offsetof(Material, cutout.threshold), FORM_THIRD, &range_unit},
+        {"normal_map", read_normal_map, offsetof(Material, normal_map.texture), FORM_FIRST | FORM_THIRD},
         {"normal_strength", read_number, offsetof(Material, normal_map.strength), FORM_FIRST | FORM_THIRD,
-         OPTIONAL, &range_not_negative},
-        {"ambient", read_number, offsetof(Material, ambient), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"diffuse", read_strength, offsetof(Material, diffuse), FORM_ANY, OPTIONAL},
-        {"specular", read_specular, 0, FORM_ANY, OPTIONAL, &range_not_negative},
-        {"shininess", read_number, offsetof(Material, shininess), FORM_ANY, OPTIONAL, &range_not_negative},
-        {"reflection", read_reflection, 0, FORM_ANY, OPTIONAL, &range_unit},
-        {"transmission", read_transmission, 0, FORM_ANY, OPTIONAL, &range_unit},
-        {"ior", read_number, offsetof(Material, ior), FORM_ANY, OPTIONAL, &range_positive},
-        {"absorption", read_absorption, offsetof(Material, absorption), FORM_ANY, OPTIONAL},
-        {"emission", read_strength, offsetof(Material, emission), FORM_ANY, OPTIONAL},
-        {"conductor", read_conductor, offsetof(Material, conductor), FORM_ANY, OPTIONAL},
-        {"fresnel", read_boolean, offsetof(Material, fresnel), FORM_ANY, OPTIONAL},
-        {"shadow", read_shadow, offsetof(Material, shadow), FORM_ANY, OPTIONAL},
+         &range_not_negative},
+        {"ambient", read_number, offsetof(Material, ambient), OPTIONAL, &range_not_negative},
+        {"diffuse", read_strength, offsetof(Material, diffuse)},
+        {"specular", read_specular, 0, OPTIONAL, &range_not_negative},
+        {"shininess", read_number, offsetof(Material, shininess), OPTIONAL, &range_not_negative},
+        {"reflection", read_reflection, 0, OPTIONAL, &range_unit},
+        {"transmission", read_transmission, 0, OPTIONAL, &range_unit},
+        {"ior", read_number, offsetof(Material, ior), OPTIONAL, &range_positive},
+        {"absorption", read_absorption, offsetof(Material, absorption)},
+        {"emission", read_strength, offsetof(Material, emission)},
+        {"conductor", read_conductor, offsetof(Material, conductor)},
+        {"fresnel", read_boolean, offsetof(Material, fresnel)},
+        {"shadow", read_shadow, offsetof(Material, shadow)},
     };
     Material material = material_default();
     const YamlNode *conductor = node ? field_node(reader, node, "conductor") : NULL;
@@ -303,20 +300,18 @@ void yaml_read_materials(YamlReader *reader, const YamlNode *node)
     }
 }
 
-static void unknown_material_report(YamlReader *reader, const YamlNode *node)
+static bool unknown_material_report(YamlReader *reader, const YamlNode *node)
 {
-    const char *text = yaml_text(&reader->tree, node);
-    if (is_color_text(text)) {
-        const char *quote = text[0] == '#' ? "'" : "";
-        report_error(&reader->report, node->offset,
-                     "unknown material '%s'; for the color write {color: %s%s%s}", text, quote, text, quote);
-        return;
-    }
+    const char *text = yaml_text(&reader->tree, node), *quote = text[0] == '#' ? "'" : "";
+    if (is_color_text(text))
+        return report_error(&reader->report, node->offset,
+                            "unknown material '%s'; for the color write {color: %s%s%s}", text, quote, text,
+                            quote);
     const char *known[NAMES_COMPARED] = {NULL};
     size_t known_count = 0;
     for (; known_count < NAMES_COMPARED && known_count < reader->names.count; known_count++)
         known[known_count] = reader->names.items[known_count].name;
-    unknown_report(reader, node, "material", known, known_count);
+    return unknown_report(reader, node, "material", known, known_count);
 }
 
 bool read_material(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -333,10 +328,7 @@ bool read_material(YamlReader *reader, const Field *field, const YamlNode *node,
                                    ? bsearch(yaml_text(&reader->tree, node), reader->names.items,
                                              reader->names.count, sizeof(MaterialName), name_matches)
                                    : NULL;
-    if (!name) {
-        unknown_material_report(reader, node);
-        return false;
-    }
+    if (!name) return unknown_material_report(reader, node);
     *index = name->material;
     return true;
 }

@@ -15,10 +15,10 @@ typedef struct {
 void yaml_read_mesh(YamlReader *reader, const YamlNode *mapping)
 {
     static const Field fields[] = {
-        {"file", read_node, offsetof(MeshFields, file), FORM_ANY, REQUIRED},
-        {"transform", read_transform, offsetof(MeshFields, transform), FORM_ANY, OPTIONAL},
-        {"material", read_material, offsetof(MeshFields, material), FORM_ANY, OPTIONAL},
-        {"smooth", read_boolean, offsetof(MeshFields, smooth), FORM_ANY, OPTIONAL},
+        {"file", read_node, offsetof(MeshFields, file), REQUIRED},
+        {"transform", read_transform, offsetof(MeshFields, transform)},
+        {"material", read_material, offsetof(MeshFields, material)},
+        {"smooth", read_boolean, offsetof(MeshFields, smooth)},
     };
     MeshFields read = {.transform = affine_identity, .material = UINT32_MAX};
     if (!fields_read(reader, mapping, "mesh", fields, COUNT_OF(fields), &read)) return;

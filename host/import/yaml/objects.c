@@ -17,36 +17,36 @@ typedef struct {
     Affine transform;
 } PlacedObject;
 
-// The fields of every shape.
-#define MATERIAL_AND_TRANSFORM                                                                               \
-    {"material", read_material, offsetof(Object, material), FORM_ANY, OPTIONAL},                             \
+// The last rows of every shape's table.
+#define EVERY_SHAPE                                                                                          \
+    {"material", read_material, offsetof(Object, material)},                                                 \
     {                                                                                                        \
-        "transform", read_transform, offsetof(PlacedObject, transform), FORM_ANY, OPTIONAL                   \
+        "transform", read_transform, offsetof(PlacedObject, transform)                                       \
     }
 
 static const Field sphere_fields[] = {
-    {"center", read_vector, offsetof(Object, as.sphere.center), FORM_ANY, REQUIRED},
-    {"radius", read_number, offsetof(Object, as.sphere.radius), FORM_ANY, REQUIRED, &range_positive},
-    MATERIAL_AND_TRANSFORM,
+    {"center", read_vector, offsetof(Object, as.sphere.center), REQUIRED},
+    {"radius", read_number, offsetof(Object, as.sphere.radius), REQUIRED, &range_positive},
+    EVERY_SHAPE,
 };
 
 static const Field plane_fields[] = {
-    {"point", read_vector, offsetof(Object, as.plane.point), FORM_ANY, REQUIRED},
-    {"normal", read_direction, offsetof(Object, as.plane.normal), FORM_ANY, REQUIRED},
-    MATERIAL_AND_TRANSFORM,
+    {"point", read_vector, offsetof(Object, as.plane.point), REQUIRED},
+    {"normal", read_direction, offsetof(Object, as.plane.normal), REQUIRED},
+    EVERY_SHAPE,
 };
 
 static const Field disc_fields[] = {
-    {"center", read_vector, offsetof(Object, as.disc.center), FORM_ANY, REQUIRED},
-    {"normal", read_direction, offsetof(Object, as.disc.normal), FORM_ANY, REQUIRED},
-    {"radius", read_number, offsetof(Object, as.disc.radius), FORM_ANY, REQUIRED, &range_positive},
-    MATERIAL_AND_TRANSFORM,
+    {"center", read_vector, offsetof(Object, as.disc.center), REQUIRED},
+    {"normal", read_direction, offsetof(Object, as.disc.normal), REQUIRED},
+    {"radius", read_number, offsetof(Object, as.disc.radius), REQUIRED, &range_positive},
+    EVERY_SHAPE,
 };
 
 static const Field box_fields[] = {
-    {"min", read_vector, offsetof(Object, as.box.min), FORM_ANY, REQUIRED},
-    {"max", read_vector, offsetof(Object, as.box.max), FORM_ANY, REQUIRED},
-    MATERIAL_AND_TRANSFORM,
+    {"min", read_vector, offsetof(Object, as.box.min), REQUIRED},
+    {"max", read_vector, offsetof(Object, as.box.max), REQUIRED},
+    EVERY_SHAPE,
 };
 
 static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -54,28 +54,25 @@ static bool box_finish(YamlReader *reader, const YamlNode *mapping, Form form, O
     (void)form;
     Vector3 min = object->as.box.min, max = object->as.box.max;
     if (min.x <= max.x && min.y <= max.y && min.z <= max.z) return true;
-    return report_error(&reader->report, field_node(reader, mapping, "max")->offset,
-                        "'max' must not be below 'min'");
+    return field_fails(reader, mapping, "max", "'max' must not be below 'min'");
 }
 
 // `from` and `to` share members with `point` and `axis`. Until cylinder_finish the axis holds the finite
 // form's `to`.
 static const Field cylinder_fields[] = {
-    {"from", read_vector, offsetof(Object, as.cylinder.from), FORM_FINITE, REQUIRED},
-    {"to", read_vector, offsetof(Object, as.cylinder.axis), FORM_FINITE, REQUIRED},
-    {"point", read_vector, offsetof(Object, as.cylinder.from), FORM_INFINITE, REQUIRED},
-    {"axis", read_direction, offsetof(Object, as.cylinder.axis), FORM_INFINITE, REQUIRED},
-    {"radius", read_number, offsetof(Object, as.cylinder.radius), FORM_ANY, REQUIRED, &range_positive},
-    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FINITE, OPTIONAL},
-    MATERIAL_AND_TRANSFORM,
+    {"from", read_vector, offsetof(Object, as.cylinder.from), REQUIRED | FORM_FINITE},
+    {"to", read_vector, offsetof(Object, as.cylinder.axis), REQUIRED | FORM_FINITE},
+    {"point", read_vector, offsetof(Object, as.cylinder.from), REQUIRED | FORM_INFINITE},
+    {"axis", read_direction, offsetof(Object, as.cylinder.axis), REQUIRED | FORM_INFINITE},
+    {"radius", read_number, offsetof(Object, as.cylinder.radius), REQUIRED, &range_positive},
+    {"caps", read_boolean, offsetof(Object, as.cylinder.caps), FORM_FINITE},
+    EVERY_SHAPE,
 };
 
 static bool axis_finish(YamlReader *reader, const YamlNode *mapping, Vector3 from, Vector3 *axis)
 {
     *axis = vector_subtract(*axis, from);
-    if (!vector_is_zero(*axis)) return true;
-    return report_error(&reader->report, field_node(reader, mapping, "to")->offset,
-                        "'to' must differ from 'from'");
+    return !vector_is_zero(*axis) || field_fails(reader, mapping, "to", "'to' must differ from 'from'");
 }
 
 static bool cylinder_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -89,15 +86,15 @@ static bool cylinder_finish(YamlReader *reader, const YamlNode *mapping, Form fo
 // `from` and `to` share members with `apex` and `axis`. Until cone_finish the axis holds the finite form's
 // `to`, and the slope the infinite form's angle in degrees.
 static const Field cone_fields[] = {
-    {"from", read_vector, offsetof(Object, as.cone.from), FORM_FINITE, REQUIRED},
-    {"to", read_vector, offsetof(Object, as.cone.axis), FORM_FINITE, REQUIRED},
-    {"radius", read_items, offsetof(Object, as.cone.radius), FORM_FINITE, REQUIRED, &range_not_negative,
-     &two_numbers},
-    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FINITE, OPTIONAL},
-    {"apex", read_vector, offsetof(Object, as.cone.from), FORM_INFINITE, REQUIRED},
-    {"axis", read_direction, offsetof(Object, as.cone.axis), FORM_INFINITE, REQUIRED},
-    {"angle", read_number, offsetof(Object, as.cone.slope), FORM_INFINITE, REQUIRED, &range_quarter_turn},
-    MATERIAL_AND_TRANSFORM,
+    {"from", read_vector, offsetof(Object, as.cone.from), REQUIRED | FORM_FINITE},
+    {"to", read_vector, offsetof(Object, as.cone.axis), REQUIRED | FORM_FINITE},
+    {"radius", read_items, offsetof(Object, as.cone.radius), REQUIRED | FORM_FINITE, &range_not_negative,
+     .items = &two_numbers},
+    {"caps", read_boolean, offsetof(Object, as.cone.caps), FORM_FINITE},
+    {"apex", read_vector, offsetof(Object, as.cone.from), REQUIRED | FORM_INFINITE},
+    {"axis", read_direction, offsetof(Object, as.cone.axis), REQUIRED | FORM_INFINITE},
+    {"angle", read_number, offsetof(Object, as.cone.slope), REQUIRED | FORM_INFINITE, &range_quarter_turn},
+    EVERY_SHAPE,
 };
 
 static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -109,18 +106,16 @@ static bool cone_finish(YamlReader *reader, const YamlNode *mapping, Form form, 
         return true;
     }
     if (object->as.cone.radius[0] == 0 && object->as.cone.radius[1] == 0)
-        return report_error(&reader->report, field_node(reader, mapping, "radius")->offset,
-                            "'radius' must not be zero at both ends");
+        return field_fails(reader, mapping, "radius", "'radius' must not be zero at both ends");
     return axis_finish(reader, mapping, object->as.cone.from, &object->as.cone.axis);
 }
 
 static const Items three_directions = {3, "three directions", read_direction, sizeof(Vector3)};
 
 static const Field triangle_fields[] = {
-    {"vertices", read_items, offsetof(Object, as.triangle.vertices), FORM_ANY, REQUIRED, NULL, &three_points},
-    {"normals", read_items, offsetof(Object, as.triangle.normals), FORM_ANY, OPTIONAL, NULL,
-     &three_directions},
-    MATERIAL_AND_TRANSFORM,
+    {"vertices", read_items, offsetof(Object, as.triangle.vertices), REQUIRED, .items = &three_points},
+    {"normals", read_items, offsetof(Object, as.triangle.normals), .items = &three_directions},
+    EVERY_SHAPE,
 };
 
 static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)
@@ -134,24 +129,24 @@ static bool triangle_finish(YamlReader *reader, const YamlNode *mapping, Form fo
 }
 
 static const Field torus_fields[] = {
-    {"center", read_vector, offsetof(Object, as.torus.center), FORM_ANY, REQUIRED},
-    {"axis", read_direction, offsetof(Object, as.torus.axis), FORM_ANY, REQUIRED},
-    {"major", read_number, offsetof(Object, as.torus.major), FORM_ANY, REQUIRED, &range_positive},
-    {"minor", read_number, offsetof(Object, as.torus.minor), FORM_ANY, REQUIRED, &range_positive},
-    MATERIAL_AND_TRANSFORM,
+    {"center", read_vector, offsetof(Object, as.torus.center), REQUIRED},
+    {"axis", read_direction, offsetof(Object, as.torus.axis), REQUIRED},
+    {"major", read_number, offsetof(Object, as.torus.major), REQUIRED, &range_positive},
+    {"minor", read_number, offsetof(Object, as.torus.minor), REQUIRED, &range_positive},
+    EVERY_SHAPE,
 };
 
 // Until paraboloid_finish the focal length holds `radius`, the radius of the rim.
 static const Field paraboloid_fields[] = {
-    {"apex", read_vector, offsetof(Object, as.paraboloid.apex), FORM_ANY, REQUIRED},
-    {"axis", read_direction, offsetof(Object, as.paraboloid.axis), FORM_ANY, REQUIRED},
-    {"height", read_number, offsetof(Object, as.paraboloid.height), FORM_ANY, OPTIONAL, &range_positive},
-    {"focal_length", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_FOCAL_LENGTH, REQUIRED,
+    {"apex", read_vector, offsetof(Object, as.paraboloid.apex), REQUIRED},
+    {"axis", read_direction, offsetof(Object, as.paraboloid.axis), REQUIRED},
+    {"height", read_number, offsetof(Object, as.paraboloid.height), OPTIONAL, &range_positive},
+    {"focal_length", read_number, offsetof(Object, as.paraboloid.focal_length), REQUIRED | FORM_FOCAL_LENGTH,
      &range_positive},
-    {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), FORM_RADIUS, REQUIRED,
+    {"radius", read_number, offsetof(Object, as.paraboloid.focal_length), REQUIRED | FORM_RADIUS,
      &range_positive},
-    {"caps", read_boolean, offsetof(Object, as.paraboloid.caps), FORM_ANY, OPTIONAL},
-    MATERIAL_AND_TRANSFORM,
+    {"caps", read_boolean, offsetof(Object, as.paraboloid.caps)},
+    EVERY_SHAPE,
 };
 
 static bool paraboloid_finish(YamlReader *reader, const YamlNode *mapping, Form form, Object *object)

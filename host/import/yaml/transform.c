@@ -39,8 +39,8 @@ static bool read_scale(YamlReader *reader, const Field *field, const YamlNode *n
 static bool read_rotation(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
     static const Field fields[] = {
-        {"axis", read_direction, offsetof(Rotation, axis), FORM_ANY, REQUIRED},
-        {"angle", read_number, offsetof(Rotation, angle), FORM_ANY, REQUIRED},
+        {"axis", read_direction, offsetof(Rotation, axis), REQUIRED},
+        {"angle", read_number, offsetof(Rotation, angle), REQUIRED},
     };
     Rotation *rotation = target;
     return node->type == YAML_MAPPING
@@ -54,10 +54,10 @@ static bool step_read(YamlReader *reader, const Field *field, const YamlNode *no
                        matrix_rows = {3, "three rows of four numbers", read_items, 4 * sizeof(double),
                                       &row_numbers};
     static const Field fields[] = {
-        {"translate", read_vector, offsetof(Steps, translate), FORM_STEPS, OPTIONAL},
-        {"rotate", read_rotation, offsetof(Steps, rotation), FORM_STEPS, OPTIONAL},
-        {"scale", read_scale, offsetof(Steps, scale), FORM_STEPS, OPTIONAL},
-        {"matrix", read_items, offsetof(Steps, matrix), FORM_MATRIX, REQUIRED, NULL, &matrix_rows},
+        {"translate", read_vector, offsetof(Steps, translate), FORM_STEPS},
+        {"rotate", read_rotation, offsetof(Steps, rotation), FORM_STEPS},
+        {"scale", read_scale, offsetof(Steps, scale), FORM_STEPS},
+        {"matrix", read_items, offsetof(Steps, matrix), REQUIRED | FORM_MATRIX, .items = &matrix_rows},
     };
     Steps steps = {.scale = {1, 1, 1}};
     const Form form = fields_read(reader, node, field->name, fields, COUNT_OF(fields), &steps);

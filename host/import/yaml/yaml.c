@@ -62,36 +62,34 @@ static void frame_set(CameraFields *read, Form form)
     }
 }
 
-void yaml_read_camera(YamlReader *reader, const YamlNode *node)
+bool yaml_read_camera(YamlReader *reader, const YamlNode *node)
 {
     enum { FORM_FLAT = FORM_FOV | FORM_FOCAL_LENGTH | FORM_HEIGHT }; // the image is part of a plane
     static const Field fields[] = {
-        {"position", read_vector, offsetof(CameraFields, camera.position), FORM_ANY, REQUIRED},
-        {"look_at", read_vector, offsetof(CameraFields, camera.look_at), FORM_ANY, REQUIRED},
-        {"up", read_direction, offsetof(CameraFields, camera.up), FORM_ANY, OPTIONAL},
-        {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FOV, OPTIONAL, &range_field_of_view},
-        {"focal_length", read_number, offsetof(CameraFields, focal_length), FORM_FOCAL_LENGTH, REQUIRED,
+        {"position", read_vector, offsetof(CameraFields, camera.position), REQUIRED},
+        {"look_at", read_vector, offsetof(CameraFields, camera.look_at), REQUIRED},
+        {"up", read_direction, offsetof(CameraFields, camera.up)},
+        {"fov", read_number, offsetof(CameraFields, fov_degrees), FORM_FOV, &range_half_turn},
+        {"focal_length", read_number, offsetof(CameraFields, focal_length), REQUIRED | FORM_FOCAL_LENGTH,
          &range_positive},
-        {"frame", read_items, offsetof(CameraFields, frame), FORM_FOCAL_LENGTH, REQUIRED, &range_positive,
-         &two_numbers},
-        {"height", read_number, offsetof(CameraFields, height), FORM_HEIGHT, REQUIRED, &range_positive},
-        {"projection", read_projection, offsetof(CameraFields, camera.projection), FORM_PROJECTION, REQUIRED},
-        {"shift", read_items, offsetof(CameraFields, camera.shift), FORM_FLAT, OPTIONAL, NULL, &two_numbers},
-        {"turn", read_number, offsetof(CameraFields, turn), FORM_ANY, OPTIONAL},
-        {"aperture", read_number, offsetof(CameraFields, aperture), FORM_FLAT, OPTIONAL, &range_not_negative},
-        {"focus", read_focus, 0, FORM_FLAT, OPTIONAL},
+        {"frame", read_items, offsetof(CameraFields, frame), REQUIRED | FORM_FOCAL_LENGTH, &range_positive,
+         .items = &two_numbers},
+        {"height", read_number, offsetof(CameraFields, height), REQUIRED | FORM_HEIGHT, &range_positive},
+        {"projection", read_projection, offsetof(CameraFields, camera.projection),
+         REQUIRED | FORM_PROJECTION},
+        {"shift", read_items, offsetof(CameraFields, camera.shift), FORM_FLAT, .items = &two_numbers},
+        {"turn", read_number, offsetof(CameraFields, turn)},
+        {"aperture", read_number, offsetof(CameraFields, aperture), FORM_FLAT, &range_not_negative},
+        {"focus", read_focus, 0, FORM_FLAT},
     };
     CameraFields read = {.camera = {.up = {0, 1, 0}}, .fov_degrees = 50};
     const Form form = fields_read(reader, node, "camera", fields, COUNT_OF(fields), &read);
-    if (!form) return;
+    if (!form) return false;
     frame_set(&read, form);
     Camera *camera = &reader->scene->camera;
     *camera = read.camera;
-    if (vector_is_zero(vector_subtract(camera->look_at, camera->position))) {
-        report_error(&reader->report, field_node(reader, node, "look_at")->offset,
-                     "'look_at' must differ from 'position'");
-        return;
-    }
+    if (vectors_equal(camera->look_at, camera->position))
+        return field_fails(reader, node, "look_at", "'look_at' must differ from 'position'");
     if (read.turn != 0) {
         const Vector3 from = vector_subtract(camera->position, camera->look_at);
         camera->position =
@@ -101,8 +99,8 @@ void yaml_read_camera(YamlReader *reader, const YamlNode *node)
     const YamlNode *focus = field_node(reader, node, "focus");
     if (camera->lens.radius == 0 && focus != node)
         report_warning(&reader->report, focus->offset, "'focus' has no effect without an 'aperture'");
-    else if (camera->lens.radius > 0 && camera_focal_distance(camera) == 0)
-        report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
+    return camera->lens.radius == 0 || camera_focal_distance(camera) > 0 ||
+           report_error(&reader->report, focus->offset, "'focus' must lie in front of the camera");
 }
 
 // Rejects an `include` that --set adds, because files are included before values are set.
@@ -132,21 +130,20 @@ typedef struct {
 
 static void document_read(YamlReader *reader)
 {
-    static const Range range_shutter = {0, 1, false, "from 0 to 1"};
     static const Range range_frames = {1, FRAMES_MAX, false, "from 1 to 1000000"};
     static const Range range_frame_rate = {0, 1000, true, "above 0 and at most 1000"};
     static const Field fields[] = {
-        {"include", read_include, 0, FORM_ANY, OPTIONAL},
-        {"camera", read_node, offsetof(Document, camera), FORM_ANY, OPTIONAL},
-        {"frames", read_frames, offsetof(Document, frame_count), FORM_ANY, OPTIONAL, &range_frames},
-        {"fps", read_number, offsetof(Document, frame_rate), FORM_ANY, OPTIONAL, &range_frame_rate},
-        {"shutter", read_number, offsetof(Document, shutter), FORM_ANY, OPTIONAL, &range_shutter},
-        {"background", read_background, offsetof(Document, background), FORM_ANY, OPTIONAL},
-        {"ambient", read_strength, offsetof(Document, ambient), FORM_ANY, OPTIONAL},
-        {"lights", read_node, offsetof(Document, lights), FORM_ANY, OPTIONAL},
-        {"materials", read_node, offsetof(Document, materials), FORM_ANY, OPTIONAL},
-        {"define", read_node, offsetof(Document, definitions), FORM_ANY, OPTIONAL},
-        {"objects", read_node, offsetof(Document, objects), FORM_ANY, OPTIONAL},
+        {"include", read_include, 0},
+        {"camera", read_node, offsetof(Document, camera)},
+        {"frames", read_frames, offsetof(Document, frame_count), OPTIONAL, &range_frames},
+        {"fps", read_number, offsetof(Document, frame_rate), OPTIONAL, &range_frame_rate},
+        {"shutter", read_number, offsetof(Document, shutter), OPTIONAL, &range_unit},
+        {"background", read_background, offsetof(Document, background)},
+        {"ambient", read_strength, offsetof(Document, ambient)},
+        {"lights", read_node, offsetof(Document, lights)},
+        {"materials", read_node, offsetof(Document, materials)},
+        {"define", read_node, offsetof(Document, definitions)},
+        {"objects", read_node, offsetof(Document, objects)},
     };
     Document document = {.ambient = vector_all(NAN), .shutter = NAN};
     const YamlNode *root = reader->tree.nodes.items;

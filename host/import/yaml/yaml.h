@@ -52,7 +52,7 @@ FieldReader read_background;
 // error.
 void yaml_set_background(YamlReader *reader, const Background *background, Color ambient);
 
-void yaml_read_camera(YamlReader *reader, const YamlNode *node);
+bool yaml_read_camera(YamlReader *reader, const YamlNode *node); // false with an error
 void yaml_read_lights(YamlReader *reader, const YamlNode *node);
 extern const Range range_disc_angle;
 // Turns a directional light into that of a disc in the sky, of an angle in degrees, unless the angle is 0.
