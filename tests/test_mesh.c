@@ -306,6 +306,7 @@ TEST(faults_name_file_and_vertex)
         {"a.ply", PLY_HEADER("3", "1") "end_header too\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
          "14:1: error: the header lacks its end, a line 'end_header'"},
         {"a.ply", PLY_HEADER("99999999", "1") "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+         "13:7: warning: words after the last property of a row are not used\n"
          "14:1: error: the file ends before vertex 4 (from 0) of 99999999"},
         {"a.ply", PLY_HEADER("3\rcomment\relement face 99999999", "1") "end_header\r\n0 0 0\n",
          "9:9: error: the header declares 'face' twice"},

@@ -310,6 +310,15 @@ TEST(what_is_not_used_is_reported)
                                "7:16: warning: not used: 'red', 'green'\n"
                                "9:9: warning: the element 'edge' is not used\n");
     scene_free(&scene);
+    scene = scene_of_ply(HEADER CORNERS "3 0 1 2 4\n3 1 3 2 5\n\n\n more\nlines\n",
+                         "14:9: warning: words after the last property of a row are not used\n"
+                         "18:2: warning: lines after the last element are not used\n");
+    scene_free(&scene);
+    Text bytes = binary_with_count(BINARY("uchar"), 3, &types[1]);
+    text_append(&bytes, "\n", 1);
+    file_write_bytes("a.ply", bytes.items, bytes.count);
+    assert_messages("scene.yaml", SCENE, "4:18: warning: a.ply: 1 byte after the last element is not used\n");
+    text_free(&bytes);
 }
 
 TEST(vertices_without_a_coordinate_are_refused)

@@ -25,7 +25,8 @@ bool line_next(Line *line)
     while (line->end < source->length &&
            !text_ends_line(source->bytes + line->end, source->length - line->end))
         line->end++;
-    line->next = line->end + 1;
+    line->next = line->end < source->length ? line->end + 1 : line->end;
+    if (line->end > line->start && source->bytes[line->end - 1] == '\r') line->end--;
     const char *comment = line->comment ? memchr(bytes, line->comment, line->end - line->start) : NULL;
     if (comment) line->end = (size_t)(comment - source->bytes);
     return true;
@@ -43,18 +44,18 @@ bool line_reach_word(Line *line)
     return true;
 }
 
-static bool is_blank(char character)
+size_t line_skip_blanks(Line *line)
 {
-    return character == ' ' || character == '\t' || character == '\r';
+    while (line->at < line->end && character_is_blank(line->report->source->bytes[line->at]))
+        line->at++;
+    return line->at;
 }
 
 Word line_word(Line *line)
 {
     const char *bytes = line->report->source->bytes;
-    while (line->at < line->end && is_blank(bytes[line->at]))
-        line->at++;
-    size_t start = line->at;
-    while (line->at < line->end && !is_blank(bytes[line->at]))
+    const size_t start = line_skip_blanks(line);
+    while (line->at < line->end && !character_is_blank(bytes[line->at]))
         line->at++;
     return (Word){.text = bytes + start, .offset = start, .length = line->at - start};
 }
@@ -180,9 +181,9 @@ bool line_comma_vector(Line *line, const char *name, const Range *range, void *v
         while (start + part.length < word.length && part.text[part.length] != ',')
             part.length++;
         start += part.length + 1;
-        while (part.length > 0 && is_blank(part.text[0]))
+        while (part.length > 0 && character_is_blank(part.text[0]))
             part = (Word){part.text + 1, part.offset + 1, part.length - 1};
-        while (part.length > 0 && is_blank(part.text[part.length - 1]))
+        while (part.length > 0 && character_is_blank(part.text[part.length - 1]))
             part.length--;
         if (!number_read_field(line->report, part, name, range, &values[i])) return false;
     }

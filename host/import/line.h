@@ -6,11 +6,16 @@
 
 typedef struct {
     Report *report;
-    size_t start, at, end; // of the line; read position; its newline or comment
+    size_t start, at, end; // of the line; read position; its end or comment
     size_t next;           // start of the next line
     char comment;          // that starts a comment, or '\0'
     bool joins_blanks;     // vectors may have blanks next to their commas
 } Line;
+
+static inline bool character_is_blank(char character)
+{
+    return character == ' ' || character == '\t';
+}
 
 // Moves before the first line of the report's source. `comment` is the character that starts a comment, or
 // '\0'. Reports an error and returns false if the source contains a NUL.
@@ -22,8 +27,9 @@ bool line_next(Line *line);
 bool line_next_filled(Line *line);
 bool line_reach_word(Line *line);
 
-// Returns the next word, empty at the end of the line. Words are separated by spaces, tabs and carriage
-// returns.
+// Moves to the next word of the line, or to its end, and returns the offset there.
+size_t line_skip_blanks(Line *line);
+// Returns the next word, empty at the end of the line. Words are separated by spaces and tabs.
 Word line_peek(const Line *line);
 Word line_peek_vector(const Line *line); // as line_comma_vector reads it
 // Return the next word of this or a later line, empty at the end of the source. free_peek leaves it unread.

@@ -6,42 +6,18 @@
 #include <string.h>
 #include <strings.h>
 
-bool ply_line(PlyReading *reading, Scan *line)
-{
-    Scan *left = &reading->left;
-    if (left->at == left->end) return false;
-    const char *at = left->at, *end = left->end;
-    while (at < end && *at != '\n' && *at != '\r')
-        at++;
-    *line = (Scan){left->at, at, left->start};
-    left->at = at;
-    if (left->at < left->end && *left->at == '\r') left->at++;
-    if (left->at < left->end && *left->at == '\n') left->at++;
-    return true;
-}
-
-Word ply_word(Scan *line)
-{
-    Word word = {.offset = ply_blanks_skip(line)};
-    word.text = line->at;
-    while (line->at < line->end && !scan_is_blank(*line->at))
-        line->at++;
-    word.length = (size_t)(line->at - word.text);
-    return word;
-}
-
-static bool format_read(PlyHeader *header, PlyReading *reading, Scan line)
+static bool format_read(PlyHeader *header, Line *line)
 {
     static const char *const names[] = {
         [PLY_ASCII] = "ascii",
         [PLY_LITTLE_ENDIAN] = "binary_little_endian",
         [PLY_BIG_ENDIAN] = "binary_big_endian",
     };
-    Word word = ply_word(&line);
+    Word word = line_word(line);
     for (PlyFormat format = PLY_ASCII; format <= PLY_BIG_ENDIAN; format++)
         if (word_is(word, names[format])) header->format = format;
     return header->format != PLY_NO_FORMAT ||
-           draft_fails(reading->draft, word.offset, "'%.*s' is not a format of PLY", WORD_TEXT(word));
+           report_error(line->report, word.offset, "'%.*s' is not a format of PLY", WORD_TEXT(word));
 }
 
 // Reads a count of at most 18 digits. No file has as many rows as a longer number.
@@ -56,13 +32,13 @@ static bool count_read(Word word, size_t *count)
     return word.length > 0;
 }
 
-static bool element_read(PlyHeader *header, PlyReading *reading, Scan line)
+static bool element_read(PlyHeader *header, Line *line)
 {
-    PlyElement element = {.name = ply_word(&line), .first_property = header->properties.count};
-    Word count = ply_word(&line);
+    PlyElement element = {.name = line_word(line), .first_property = header->properties.count};
+    Word count = line_word(line);
     if (!count_read(count, &element.count))
-        return draft_fails(reading->draft, count.offset, "'%.*s' is not a number of '%.*s'", WORD_TEXT(count),
-                           WORD_TEXT(element.name));
+        return report_error(line->report, count.offset, "'%.*s' is not a number of '%.*s'", WORD_TEXT(count),
+                            WORD_TEXT(element.name));
     array_push(header->elements, element);
     return true;
 }
@@ -82,59 +58,58 @@ static const PlyType *type_of(Word word)
     return NULL;
 }
 
-static bool type_read(PlyReading *reading, Word word, const PlyType **type)
+static bool type_read(Line *line, Word word, const PlyType **type)
 {
     *type = type_of(word);
-    return *type || draft_fails(reading->draft, word.offset, "'%.*s' is not a type of PLY", WORD_TEXT(word));
+    return *type || report_error(line->report, word.offset, "'%.*s' is not a type of PLY", WORD_TEXT(word));
 }
 
-static bool property_read(PlyHeader *header, PlyReading *reading, Scan line)
+static bool property_read(PlyHeader *header, Line *line)
 {
     if (header->elements.count == 0)
-        return draft_fails(reading->draft, scan_offset(&line), "a property before the first element");
+        return report_error(line->report, line->at, "a property before the first element");
     PlyProperty property = {0};
-    Word word = ply_word(&line);
+    Word word = line_word(line);
     if (word_is(word, "list")) {
-        if (!type_read(reading, ply_word(&line), &property.count_type)) return false;
-        word = ply_word(&line);
+        if (!type_read(line, line_word(line), &property.count_type)) return false;
+        word = line_word(line);
     }
-    if (!type_read(reading, word, &property.type)) return false;
-    property.name = ply_word(&line);
-    if (property.name.length == 0)
-        return draft_fails(reading->draft, scan_offset(&line), "a property without a name");
+    if (!type_read(line, word, &property.type)) return false;
+    property.name = line_word(line);
+    if (property.name.length == 0) return report_error(line->report, line->at, "a property without a name");
     array_push(header->properties, property);
     header->elements.items[header->elements.count - 1].property_count++;
     return true;
 }
 
 // Reads a line of the header. Ignores lines with unknown keywords and comments.
-static bool header_line_read(PlyHeader *header, PlyReading *reading, Scan line)
+static bool header_line_read(PlyHeader *header, Line *line)
 {
-    Word keyword = ply_word(&line);
-    if (word_is(keyword, "format")) return format_read(header, reading, line);
-    if (word_is(keyword, "element")) return element_read(header, reading, line);
-    if (word_is(keyword, "property")) return property_read(header, reading, line);
+    Word keyword = line_word(line);
+    if (word_is(keyword, "format")) return format_read(header, line);
+    if (word_is(keyword, "element")) return element_read(header, line);
+    if (word_is(keyword, "property")) return property_read(header, line);
     return true;
 }
 
-static bool is_end_of_header(Scan line)
+static bool is_end_of_header(Line line)
 {
-    return word_is(ply_word(&line), "end_header") && ply_word(&line).length == 0;
+    return word_is(line_word(&line), "end_header") && line_word(&line).length == 0;
 }
 
-bool ply_header_read(PlyHeader *header, PlyReading *reading)
+bool ply_header_read(PlyHeader *header, Line *line)
 {
-    Scan line;
-    if (!ply_line(reading, &line) || line.end - line.at < 3 || strncasecmp(line.at, "ply", 3) != 0)
-        return draft_fails(reading->draft, 0, "not a PLY file, which starts with a line 'ply'");
-    while (ply_line(reading, &line)) {
-        if (is_end_of_header(line))
+    const Source *source = line->report->source;
+    if (source->length < 3 || strncasecmp(source->bytes, "ply", 3) != 0)
+        return report_error(line->report, 0, "not a PLY file, which starts with a line 'ply'");
+    line_next(line);
+    while (line_next(line)) {
+        if (is_end_of_header(*line))
             return header->format != PLY_NO_FORMAT ||
-                   draft_fails(reading->draft, scan_offset(&line), "the header lacks its format");
-        if (!header_line_read(header, reading, line)) return false;
+                   report_error(line->report, line->start, "the header lacks its format");
+        if (!header_line_read(header, line)) return false;
     }
-    return draft_fails(reading->draft, scan_offset(&reading->left),
-                       "the header lacks its end, a line 'end_header'");
+    return report_error(line->report, line->next, "the header lacks its end, a line 'end_header'");
 }
 
 void ply_header_free(PlyHeader *header)

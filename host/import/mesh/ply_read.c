@@ -1,5 +1,6 @@
 // A PLY file's vertices and faces (Turk, The PLY Polygon File Format, 1994), in text or binary.
 #include "host/base/array.h"
+#include "host/import/mesh/draft.h"
 #include "host/import/mesh/ply.h"
 
 #include <stdlib.h>
@@ -26,8 +27,8 @@ typedef ARRAY_OF(double) Numbers;
 
 typedef struct {
     PlyHeader header;
-    PlyReading reading;
-    Scan line;                 // the unread part of the row's line, in text
+    MeshDraft *draft;
+    Line line;                 // of the row, in text; a binary file is read from line.next on
     const PlyElement *element; // of the current row, and the row's index
     size_t row;
     ARRAY_OF(PlyRole) roles; // of the element's properties
@@ -35,6 +36,7 @@ typedef struct {
     double numbers[ROLE_NONE + 1]; // of the current vertex
     size_t unread;                 // the offset of its first coordinate that is not a number in range, or 0
     Numbers corners, corner_uvs;   // of the current face
+    bool has_more_words;           // whether words after a row's last property were warned of
 } PlyReader;
 
 static const PlyProperty *properties_of(const PlyReader *reader, const PlyElement *element)
@@ -48,23 +50,28 @@ static bool is_wanted(const PlyElement *element)
            (word_is(element->name, "vertex") || word_is(element->name, "face"));
 }
 
+// The names of each role's properties.
+static const char *const role_names[ROLE_NONE][4] = {
+    [ROLE_X] = {"x"},
+    [ROLE_Y] = {"y"},
+    [ROLE_Z] = {"z"},
+    [ROLE_NX] = {"nx"},
+    [ROLE_NY] = {"ny"},
+    [ROLE_NZ] = {"nz"},
+    [ROLE_U] = {"u", "s", "texture_u", "tx"},
+    [ROLE_V] = {"v", "t", "texture_v", "ty"},
+    [ROLE_CORNERS] = {"vertex_indices", "vertex_index"},
+    [ROLE_CORNER_UVS] = {"texcoord"},
+};
+
 static PlyRole role_of(const PlyElement *element, const PlyProperty *property)
 {
-    static const struct {
-        const char *name;
-        PlyRole role;
-    } numbers[] = {{"x", ROLE_X},   {"y", ROLE_Y}, {"z", ROLE_Z},  {"nx", ROLE_NX},       {"ny", ROLE_NY},
-                   {"nz", ROLE_NZ}, {"u", ROLE_U}, {"s", ROLE_U},  {"texture_u", ROLE_U}, {"tx", ROLE_U},
-                   {"v", ROLE_V},   {"t", ROLE_V}, {"ty", ROLE_V}, {"texture_v", ROLE_V}},
-      lists[] = {
-          {"vertex_indices", ROLE_CORNERS}, {"vertex_index", ROLE_CORNERS}, {"texcoord", ROLE_CORNER_UVS}};
-    if (word_is(element->name, "vertex") && !property->count_type) {
-        for (size_t i = 0; i < COUNT_OF(numbers); i++)
-            if (word_is(property->name, numbers[i].name)) return numbers[i].role;
-    } else if (word_is(element->name, "face") && property->count_type) {
-        for (size_t i = 0; i < COUNT_OF(lists); i++)
-            if (word_is(property->name, lists[i].name)) return lists[i].role;
-    }
+    const bool is_list = property->count_type != NULL;
+    if (!word_is(element->name, is_list ? "face" : "vertex")) return ROLE_NONE;
+    const PlyRole end = is_list ? ROLE_NONE : ROLE_NUMBER_COUNT;
+    for (PlyRole role = is_list ? ROLE_NUMBER_COUNT : ROLE_X; role < end; role++)
+        for (size_t i = 0; i < 4 && role_names[role][i]; i++)
+            if (word_is(property->name, role_names[role][i])) return role;
     return ROLE_NONE;
 }
 
@@ -74,11 +81,11 @@ static bool elements_are_sound(PlyReader *reader)
     for (size_t i = 0; i < reader->header.elements.count; i++) {
         Word name = elements[i].name;
         if (word_is(name, "tristrips") && elements[i].count > 0)
-            return draft_fails(reader->reading.draft, name.offset,
+            return draft_fails(reader->draft, name.offset,
                                "strips of triangles (tristrips) are not read, only faces");
         for (size_t k = 0; k < i && is_wanted(&elements[i]); k++)
             if (words_equal(name, elements[k].name))
-                return draft_fails(reader->reading.draft, name.offset, "the header declares '%.*s' twice",
+                return draft_fails(reader->draft, name.offset, "the header declares '%.*s' twice",
                                    WORD_TEXT(name));
     }
     return true;
@@ -97,10 +104,10 @@ static void element_warn_of_unused(PlyReader *reader, const PlyElement *element)
     }
     const Word name = element->name;
     if (!is_wanted(element))
-        report_warning(&reader->reading.draft->report, name.offset, "the element '%.*s' is not used",
+        report_warning(&reader->draft->report, name.offset, "the element '%.*s' is not used",
                        WORD_TEXT(name));
     else if (first)
-        report_warning(&reader->reading.draft->report, first->name.offset, "not used:%s", text_c(&unused));
+        report_warning(&reader->draft->report, first->name.offset, "not used:%s", text_c(&unused));
     text_free(&unused);
 }
 
@@ -112,13 +119,13 @@ static bool is_binary(const PlyReader *reader)
 // Returns the offset of the read position.
 static size_t place_of(const PlyReader *reader)
 {
-    return scan_offset(is_binary(reader) ? &reader->reading.left : &reader->line);
+    return is_binary(reader) ? reader->line.next : reader->line.at;
 }
 
 static bool value_missing(PlyReader *reader, const PlyProperty *property)
 {
     Word element = reader->element->name;
-    return draft_fails(reader->reading.draft, place_of(reader), "%.*s %zu (from 0) lacks its '%.*s'",
+    return draft_fails(reader->draft, place_of(reader), "%.*s %zu (from 0) lacks its '%.*s'",
                        WORD_TEXT(element), reader->row, WORD_TEXT(property->name));
 }
 
@@ -159,29 +166,29 @@ static bool real_read(const char **text, const char *end, double *value)
 // Reads the line's next word as a number of the type. Sets *is_there to whether the line has one.
 static bool word_read(PlyReader *reader, const PlyType *type, double *value, bool *is_there)
 {
-    ply_blanks_skip(&reader->line);
-    const char *at = reader->line.at, *end = reader->line.end;
+    const char *bytes = reader->draft->source.bytes;
+    const char *at = bytes + line_skip_blanks(&reader->line), *end = bytes + reader->line.end;
     *is_there = at < end;
     if (at == end) return true;
     const bool read =
         type->kind == PLY_REAL ? real_read(&at, end, value) : whole_read(&at, end, type->kind, value);
-    if (read && (at == end || scan_is_blank(*at))) {
-        reader->line.at = at;
+    if (read && (at == end || character_is_blank(*at))) {
+        reader->line.at = (size_t)(at - bytes);
         return true;
     }
-    const Word word = ply_word(&reader->line);
-    return draft_fails(reader->reading.draft, word.offset, "'%.*s' is not a number of type %s",
-                       WORD_TEXT(word), type->name);
+    const Word word = line_word(&reader->line);
+    return draft_fails(reader->draft, word.offset, "'%.*s' is not a number of type %s", WORD_TEXT(word),
+                       type->name);
 }
 
 static size_t bytes_left(const PlyReader *reader)
 {
-    return (size_t)(reader->reading.left.end - reader->reading.left.at);
+    return reader->draft->source.length - reader->line.next;
 }
 
 static double binary_number(const PlyReader *reader, const PlyType *type)
 {
-    const unsigned char *bytes = (const unsigned char *)reader->reading.left.at;
+    const unsigned char *bytes = (const unsigned char *)reader->draft->source.bytes + reader->line.next;
     uint64_t bits = 0, end = 1; // of whole numbers' bits
     for (size_t i = 0; i < type->size; i++, end <<= 8)
         bits = bits << 8 | bytes[reader->header.format == PLY_BIG_ENDIAN ? i : type->size - 1 - i];
@@ -202,7 +209,7 @@ static bool value_read(PlyReader *reader, const PlyType *type, double *value, bo
     *is_there = bytes_left(reader) >= type->size;
     if (!*is_there) return true;
     *value = binary_number(reader, type);
-    reader->reading.left.at += type->size;
+    reader->line.next += type->size;
     return true;
 }
 
@@ -217,7 +224,7 @@ static bool list_fails(PlyReader *reader, const PlyProperty *property, size_t of
                        size_t held)
 {
     Word element = reader->element->name;
-    return draft_fails(reader->reading.draft, offset,
+    return draft_fails(reader->draft, offset,
                        "%.*s %zu (from 0) declares %.15g numbers of '%.*s', the %s has %zu more",
                        WORD_TEXT(element), reader->row, promised, WORD_TEXT(property->name),
                        is_binary(reader) ? "file" : "line", held);
@@ -231,14 +238,14 @@ static bool is_count(double number)
 static bool list_read(PlyReader *reader, const PlyProperty *property, Numbers *numbers)
 {
     double count;
-    if (!is_binary(reader)) ply_blanks_skip(&reader->line);
+    if (!is_binary(reader)) line_skip_blanks(&reader->line);
     const size_t start = place_of(reader);
     if (!number_next(reader, property, property->count_type, &count)) return false;
     if (is_binary(reader)) {
         const size_t most = bytes_left(reader) / property->type->size;
         if (!is_count(count) || count > (double)most) return list_fails(reader, property, start, count, most);
     } else if (!is_count(count)) {
-        return draft_fails(reader->reading.draft, start, "%.15g is not the length of a list", count);
+        return draft_fails(reader->draft, start, "%.15g is not the length of a list", count);
     }
     for (size_t i = 0; (double)i < count; i++) {
         double value;
@@ -260,7 +267,7 @@ static bool property_read(PlyReader *reader, size_t index)
                          : role == ROLE_CORNER_UVS ? &reader->corner_uvs
                                                    : NULL);
     if (role <= ROLE_Z && !is_binary(reader) && !reader->unread) {
-        const size_t start = ply_blanks_skip(&reader->line);
+        const size_t start = line_skip_blanks(&reader->line);
         if (!number_next(reader, property, property->type, &reader->numbers[role])) return false;
         if (isnan(reader->numbers[role])) reader->unread = start;
         return true;
@@ -268,23 +275,17 @@ static bool property_read(PlyReader *reader, size_t index)
     return number_next(reader, property, property->type, &reader->numbers[role]);
 }
 
-// Starts a row. In text a row is a nonempty line, and words after its last property are ignored.
+// Starts a row. In text a row is a nonempty line.
 static bool row_start(PlyReader *reader)
 {
-    Word name = reader->element->name;
-    do {
-        if (!ply_line(&reader->reading, &reader->line))
-            return draft_fails(reader->reading.draft, scan_offset(&reader->reading.left),
-                               "the file ends before %.*s %zu (from 0) of %zu", WORD_TEXT(name), reader->row,
-                               reader->element->count);
-        ply_blanks_skip(&reader->line);
-    } while (reader->line.at == reader->line.end);
-    return true;
+    return line_next_filled(&reader->line) ||
+           draft_fails(reader->draft, reader->line.next, "the file ends before %.*s %zu (from 0) of %zu",
+                       WORD_TEXT(reader->element->name), reader->row, reader->element->count);
 }
 
 static bool vertex_add(PlyReader *reader)
 {
-    MeshDraft *draft = reader->reading.draft;
+    MeshDraft *draft = reader->draft;
     const double *numbers = reader->numbers;
     if (draft->is_shared[DRAFT_NORMAL])
         array_push(draft->normals, ((Vector3){numbers[ROLE_NX], numbers[ROLE_NY], numbers[ROLE_NZ]}));
@@ -295,18 +296,18 @@ static bool vertex_add(PlyReader *reader)
 
 static bool face_add(PlyReader *reader)
 {
-    MeshDraft *draft = reader->reading.draft;
+    MeshDraft *draft = reader->draft;
     const size_t offset = place_of(reader), count = reader->corners.count;
     if (reader->corner_uvs.count > 2 * count)
-        return draft_fails(reader->reading.draft, offset,
+        return draft_fails(reader->draft, offset,
                            "face %zu (from 0) has %zu corner%s, but %zu texture coordinate%s", reader->row,
                            count, text_plural(count), reader->corner_uvs.count / 2,
                            text_plural(reader->corner_uvs.count / 2));
     for (size_t i = 0; i < count; i++) {
         const double index = reader->corners.items[i];
         if (!(index >= 0 && index <= UINT32_MAX && floor(index) == index))
-            return draft_fails(reader->reading.draft, offset, "face %zu (from 0) names vertex %.15g",
-                               reader->row, index);
+            return draft_fails(reader->draft, offset, "face %zu (from 0) names vertex %.15g", reader->row,
+                               index);
         draft_add_index(draft, DRAFT_POSITION, (uint32_t)index, offset);
         if (!reader->has_role[ROLE_CORNER_UVS]) continue;
         const bool has_uv = 2 * i + 1 < reader->corner_uvs.count;
@@ -324,6 +325,11 @@ static bool row_read(PlyReader *reader)
     for (size_t i = 0; i < reader->element->property_count; i++)
         if (!property_read(reader, i)) return false;
     if (!is_wanted(reader->element)) return true;
+    if (!is_binary(reader) && !reader->has_more_words && line_peek(&reader->line).length > 0) {
+        report_warning(&reader->draft->report, line_peek(&reader->line).offset,
+                       "words after the last property of a row are not used");
+        reader->has_more_words = true;
+    }
     return word_is(reader->element->name, "face") ? face_add(reader) : vertex_add(reader);
 }
 
@@ -352,8 +358,7 @@ static bool corners_have_uvs(const PlyReader *reader)
 
 static bool element_start(PlyReader *reader, const PlyElement *element)
 {
-    static const char *const names[] = {"x", "y", "z"};
-    MeshDraft *draft = reader->reading.draft;
+    MeshDraft *draft = reader->draft;
     reader->element = element;
     roles_find(reader, element);
     if (element->property_count == 0) return true;
@@ -361,8 +366,8 @@ static bool element_start(PlyReader *reader, const PlyElement *element)
     if (!word_is(element->name, "vertex")) return true;
     for (PlyRole role = ROLE_X; role <= ROLE_Z; role++)
         if (!reader->has_role[role])
-            return draft_fails(reader->reading.draft, element->name.offset, "the vertices have no '%s'",
-                               names[role]);
+            return draft_fails(reader->draft, element->name.offset, "the vertices have no '%s'",
+                               role_names[role][0]);
     draft->is_shared[DRAFT_NORMAL] =
         reader->has_role[ROLE_NX] && reader->has_role[ROLE_NY] && reader->has_role[ROLE_NZ];
     draft->is_shared[DRAFT_UV] =
@@ -372,25 +377,37 @@ static bool element_start(PlyReader *reader, const PlyElement *element)
 
 static bool element_read(PlyReader *reader, const PlyElement *element)
 {
-    MeshDraft *draft = reader->reading.draft;
+    MeshDraft *draft = reader->draft;
     draft->places = DRAFT_LINES; // of the header
     if (!element_start(reader, element)) return false;
     if (is_binary(reader)) draft->places = DRAFT_BYTES;
     // an element without properties has no rows, whatever its count
     const size_t count = element->property_count > 0 ? element->count : 0;
     for (reader->row = 0; reader->row < count; reader->row++) {
-        stage_set(draft->stage, scan_offset(&reader->reading.left));
+        stage_set(draft->stage, reader->line.next);
         if (!row_read(reader)) return false;
     }
     return true;
 }
 
+static void warn_of_rest(PlyReader *reader)
+{
+    const size_t rest = bytes_left(reader);
+    if (is_binary(reader) && rest > 0)
+        draft_warn(reader->draft, "%zu byte%s after the last element %s not used", rest, text_plural(rest),
+                   rest == 1 ? "is" : "are");
+    else if (!is_binary(reader) && line_next_filled(&reader->line))
+        report_warning(&reader->draft->report, line_peek(&reader->line).offset,
+                       "lines after the last element are not used");
+}
+
 bool ply_read(MeshDraft *draft)
 {
-    PlyReader reader = {.reading = {draft, scan_open(&draft->source)}};
-    bool read = ply_header_read(&reader.header, &reader.reading) && elements_are_sound(&reader);
+    PlyReader reader = {.draft = draft, .line = {.report = &draft->report}};
+    bool read = ply_header_read(&reader.header, &reader.line) && elements_are_sound(&reader);
     for (size_t i = 0; read && i < reader.header.elements.count; i++)
         read = element_read(&reader, &reader.header.elements.items[i]);
+    if (read) warn_of_rest(&reader);
     ply_header_free(&reader.header);
     free(reader.roles.items);
     free(reader.corners.items);

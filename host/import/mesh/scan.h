@@ -27,11 +27,6 @@ static inline bool scan_is_line_end(char character)
     return character == '\n' || character == '\r' || character == '\0' || character == '#';
 }
 
-static inline bool scan_is_blank(char character)
-{
-    return character == ' ' || character == '\t';
-}
-
 // Returns the length of a backslash and line end that continue the line on the next one, otherwise 0.
 static inline size_t scan_continuation(const char *at)
 {
@@ -43,7 +38,7 @@ static inline size_t scan_continuation(const char *at)
 static inline bool scan_more(Scan *scan)
 {
     for (;;) {
-        while (scan_is_blank(*scan->at))
+        while (character_is_blank(*scan->at))
             scan->at++;
         const size_t continuation = scan_continuation(scan->at);
         if (continuation == 0) return !scan_is_line_end(*scan->at);
@@ -53,7 +48,7 @@ static inline bool scan_more(Scan *scan)
 
 static inline bool scan_is_word_end(const char *at)
 {
-    return scan_is_blank(*at) || scan_is_line_end(*at) || scan_continuation(at) > 0;
+    return character_is_blank(*at) || scan_is_line_end(*at) || scan_continuation(at) > 0;
 }
 
 // Returns the next word of the line, empty at its end.
@@ -74,7 +69,7 @@ static inline Word scan_rest(Scan *scan)
     while (*scan->at != '\n' && *scan->at != '\r' && *scan->at != '\0')
         scan->at++;
     const char *end = scan->at;
-    while (end > start && scan_is_blank(end[-1]))
+    while (end > start && character_is_blank(end[-1]))
         end--;
     return (Word){start, (size_t)(start - scan->start), (size_t)(end - start)};
 }
