@@ -22,15 +22,15 @@ static Material random_material(Random *random, size_t index)
     Material material = material_default();
     material.color = random_color(random);
     material.diffuse = random_color(random);
-    material.specular = random_between(random, 0, 1);
+    material.specular.largest = random_between(random, 0, 1);
     material.shininess = random_between(random, 0, 100);
     if (index == 1) {
-        material.reflection = random_between(random, 0.2, 0.8);
-        material.reflection_tint = (Color){1, random_between(random, 0, 1), random_between(random, 0, 1)};
+        material.reflection.largest = random_between(random, 0.2, 0.8);
+        material.reflection.tint = (Color){1, random_between(random, 0, 1), random_between(random, 0, 1)};
     }
-    if (index == 2) material.transmission = random_between(random, 0.5, 0.9);
+    if (index == 2) material.transmission.largest = random_between(random, 0.5, 0.9);
     // from numbers that are drawn anyway, since others would change all scenes
-    if (index == 2) material.transmission_tint = color_tint(material.color);
+    if (index == 2) material.transmission.tint = color_tint(material.color);
     if (index == 0) material.emission = (Color){material.diffuse.y, 0, 1.5 * material.diffuse.x};
     if (index == 3) {
         material.checker.is_on = true;

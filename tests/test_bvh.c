@@ -66,7 +66,7 @@ static Scene random_scene(size_t count)
     Scene scene = {0};
     array_push(scene.materials, ((Material){.color = {1, 1, 1}, .ambient = 1, .ior = 1}));
     // what a ray crosses twice attenuates it twice
-    array_push(scene.materials, ((Material){.color = {1, 1, 1}, .transmission = 0.75, .ior = 1}));
+    array_push(scene.materials, ((Material){.color = {1, 1, 1}, .transmission.largest = 0.75, .ior = 1}));
     for (size_t i = 0; scene.objects.count < count; i++) {
         const ShapeForm *form = i % 3 == 0 ? &triangle : &forms[random_bits(&random_state) % form_count];
         if (i % 3 > 0 && !form->bounded) continue;

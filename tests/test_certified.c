@@ -263,12 +263,12 @@ static Scene scene_attacking(Family family, unsigned seed)
                               .half_tangent = half_tangent}};
     Material material = material_default();
     array_push(scene.materials, material);
-    material.reflection = 0.25;
-    material.transmission = 0.5;
+    material.reflection.largest = 0.25;
+    material.transmission.largest = 0.5;
     material.ior = 1.5;
     array_push(scene.materials, material);
-    material.transmission = 0;
-    material.reflection = 0.6;
+    material.transmission.largest = 0;
+    material.reflection.largest = 0.6;
     array_push(scene.materials, material);
     array_push(scene.lights, ((Light){.type = LIGHT_POINT, .color = {0.5, 0.4, 0.3}, .position = light}));
     random_state.state = seed + 1;

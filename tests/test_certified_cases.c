@@ -77,7 +77,7 @@ TEST(faint_paths_are_decided)
     const double parts[] = {0.5, 1e-3, 1e-20, 1e-50};
     for (size_t i = 0; i < COUNT_OF(parts); i++) {
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
-        scene.materials.items[0].reflection = parts[i];
+        scene.materials.items[0].reflection.largest = parts[i];
         for (int side = -1; side <= 1; side += 2)
             array_push(scene.objects, ((Object){.type = SHAPE_PLANE, .as.plane = {{0, 0, side}, {0, 0, 1}}}));
         const uint32_t bounces = tests_are_long() ? 40 : 8; // with more, a kernel keeps more pending rays
@@ -85,7 +85,7 @@ TEST(faint_paths_are_decided)
         scene = scene_seen_from((Vector3){0, 0, 0}, 0.5);
         point_light_add(&scene, (Vector3){0, 0, 3}, 1);
         array_push(scene.materials, scene.materials.items[0]);
-        scene.materials.items[1].transmission = parts[i];
+        scene.materials.items[1].transmission.largest = parts[i];
         array_push(scene.objects, ((Object){.type = SHAPE_PLANE, .as.plane = {{0, 0, -9}, {0, 0, 1}}}));
         for (int k = 0; k < 8; k++) // one after another in view, and on the way to the light
             array_push(scene.objects, ((Object){.type = SHAPE_PLANE,
@@ -120,7 +120,7 @@ TEST(thin_walls_are_decided)
         const double wall = i == 0 ? stated : pow(10, -3 - 2 * i);
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.2);
         Material *material = &scene.materials.items[0];
-        material->transmission = 0.9;
+        material->transmission.largest = 0.9;
         material->ior = 1.5;
         array_push(scene.materials, scene.materials.items[0]);
         scene.materials.items[1].ior = 1 / 1.5;
@@ -218,7 +218,7 @@ TEST(slim_triangles_are_seldom_rerendered)
         Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.2);
         array_push(scene.materials, material_default());
         Material *sheet = &scene.materials.items[0], *wall = &scene.materials.items[1];
-        *(is_mirror ? &sheet->reflection : &sheet->transmission) = 0.8;
+        *(is_mirror ? &sheet->reflection.largest : &sheet->transmission.largest) = 0.8;
         sheet->ior = 1.5;
         wall->checker.is_on = true;
         wall->checker.size = 0.05;

@@ -239,7 +239,7 @@ TEST(culls_of_several_packets_change_nothing)
         scene.objects.items[i] = scene.objects.items[2 * OBJECTS - 1 - i];
     scene.objects.count = OBJECTS;
     for (size_t i = 0; i < scene.materials.count; i++)
-        scene.materials.items[i].reflection = scene.materials.items[i].transmission = 0;
+        scene.materials.items[i].reflection.largest = scene.materials.items[i].transmission.largest = 0;
     RenderSettings settings = film_settings(8 * WIDTH, 8 * HEIGHT, probe_same_bits_from());
     settings.extra_features = features_of(&scene);
     assert_int_equal(settings.extra_features & (FEATURE_REFLECTION | FEATURE_TRANSMISSION), 0);

@@ -124,7 +124,7 @@ TEST_AT_EACH_PRECISION(light_above_plane)
     check(film.color[3 * middle] == 0.125);
     film_free(&film);
 
-    scene.materials.items[scene.objects.items[0].material].specular = 0.75;
+    scene.materials.items[scene.objects.items[0].material].specular.largest = 0.75;
     Film shiny = render(&scene, 33, 33, precision, 0);
     check(near(shiny.color[3 * middle], 0.125 + 0.5 * 0.75, tolerance));
     check(near(shiny.color[3 * middle + 1], 0.0625 + 0.25 * 0.75, tolerance));

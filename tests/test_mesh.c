@@ -145,10 +145,10 @@ TEST(materials_come_from_the_file)
     assert_int_equal(scene.meshes.items[0].triangle_count, 2);
     const Material *red = material_of_triangle(&scene, 0), *glass = material_of_triangle(&scene, 1);
     assert_vector(red->color, 0.75, 0.25, 0);
-    assert_number(red->specular, 0.5);
+    assert_number(red->specular.largest, 0.5);
     assert_number(red->shininess, 40);
-    assert_number(red->transmission, 0);
-    assert_number(glass->transmission, 0.75);
+    assert_number(red->transmission.largest, 0);
+    assert_number(glass->transmission.largest, 0.75);
     scene_free(&scene);
 
     scene = scene_of_objects("  - mesh: {file: a.obj, material: {color: [0, 0, 1]}}\n");

@@ -212,7 +212,7 @@ TEST(pilot_chooses)
     assert_true(pilot.candidates[PRECISION_SINGLE].verdict.keeps);
     assert_true(pilot.candidates[PRECISION_SINGLE].verdict.bound <= 0.1);
     for (size_t i = 0; i < scene.materials.count; i++) {
-        scene.materials.items[i].specular = 1000;
+        scene.materials.items[i].specular.largest = 1000;
         scene.materials.items[i].shininess = 1e15;
     }
     assert_true(pilot_run(&pilot, &budget, &probe_compute, &scene, &settings, &messages));

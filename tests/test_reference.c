@@ -237,8 +237,11 @@ static double red(const Scene *scene, Vector3 origin, Vector3 direction)
 TEST(shades_as_phong)
 {
     Object floor = {.type = SHAPE_PLANE, .as.plane = {{0, 0, 0}, {0, 1, 0}}};
-    Material material = {
-        .color = {0.8, 0, 0}, .ambient = 0.5, .diffuse = {0.5, 0, 0}, .specular = 0.25, .shininess = 2};
+    Material material = {.color = {0.8, 0, 0},
+                         .ambient = 0.5,
+                         .diffuse = {0.5, 0, 0},
+                         .specular.largest = 0.25,
+                         .shininess = 2};
     Light light = {.type = LIGHT_POINT, .color = {2, 2, 2}, .position = {3, 4, 0}};
     Scene scene = one_object(&floor, &material, &light, 1);
 

@@ -45,7 +45,7 @@ TEST(test_sphere)
     assert_vector(material_of(sphere)->color, 1, 0.4, 0);
     assert_number(material_of(sphere)->ambient, 1);
     assert_vector(material_of(sphere)->diffuse, 0.5, 0.6, 0.7);
-    assert_number(material_of(sphere)->specular, 1);
+    assert_number(material_of(sphere)->specular.largest, 1);
     assert_number(material_of(sphere)->shininess, 30);
 }
 
@@ -66,7 +66,7 @@ TEST(test_cylinder)
     assert_vector(cylinder->as.cylinder.from, 3, 0, -9);
     assert_vector(cylinder->as.cylinder.axis, 0, 2, 0);
     assert_number(cylinder->as.cylinder.radius, 1);
-    assert_number(material_of(cylinder)->specular, 0.25);
+    assert_number(material_of(cylinder)->specular.largest, 0.25);
 }
 
 TEST(test_cone)

@@ -75,16 +75,16 @@ TEST(test_materials)
     assert_vector(plastic->color, 1, 0.5, 0.25);
     assert_number(plastic->ambient, 0.1);
     assert_vector(plastic->diffuse, 0.6, 0.6, 0.6);
-    assert_number(plastic->reflection, 0.2);
-    assert_number(plastic->transmission, 0.25);
+    assert_number(plastic->reflection.largest, 0.2);
+    assert_number(plastic->transmission.largest, 0.25);
     assert_number(plastic->ior, 1);
-    assert_number(plastic->specular, 0.5);
+    assert_number(plastic->specular.largest, 0.5);
     assert_number(plastic->shininess, 10);
     assert_ptr_equal(material_of(&complete.objects.items[1]), plastic);
     assert_vector(green->color, 0, 1, 0);
-    assert_number(green->specular, 0);
+    assert_number(green->specular.largest, 0);
     assert_vector(blue->color, 0, 0, 1);
-    assert_number(blue->specular, 0.5);
+    assert_number(blue->specular.largest, 0.5);
 
     // as VMD has it, what a transparent surface shows is dimmed
     Scene scene = scene_of_text(
@@ -94,8 +94,8 @@ TEST(test_materials)
     const Material *dimmed = &scene.materials.items[0];
     assert_number(dimmed->ambient, 0.1);
     assert_vector(dimmed->diffuse, 0.2, 0.2, 0.2);
-    assert_number(dimmed->specular, 0.25);
-    assert_number(dimmed->transmission, 0.75);
+    assert_number(dimmed->specular.largest, 0.25);
+    assert_number(dimmed->transmission.largest, 0.75);
     scene_free(&scene);
 }
 

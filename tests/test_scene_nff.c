@@ -56,11 +56,11 @@ TEST(test_materials)
     assert_vector(matte->color, 1, 0.5, 0.25);
     assert_number(matte->ambient, 0.8);
     assert_vector(matte->diffuse, 0.8, 0.8, 0.8);
-    assert_number(matte->specular, 0.3);
+    assert_number(matte->specular.largest, 0.3);
     assert_number(matte->shininess, 20);
-    assert_number(matte->reflection, 0.3);
-    assert_number(matte->transmission, 0);
-    assert_number(glass->transmission, 0.9);
+    assert_number(matte->reflection.largest, 0.3);
+    assert_number(matte->transmission.largest, 0);
+    assert_number(glass->transmission.largest, 0.9);
     assert_number(glass->ior, 1.5);
     assert_int_equal(glass->shadow, SHADOW_FULL);
     assert_int_equal(complete.objects.items[1].material, 0);

@@ -50,7 +50,7 @@ TEST(test_sphere_and_plane)
     assert_vector(sphere->as.sphere.center, 1, 2, 3);
     assert_number(sphere->as.sphere.radius, 2);
     assert_vector(material_of(sphere)->color, 1, 0, 0);
-    assert_number(material_of(sphere)->specular, 0.5);
+    assert_number(material_of(sphere)->specular.largest, 0.5);
     assert_number(material_of(sphere)->shininess, 10);
     assert_int_equal(plane->type, SHAPE_PLANE);
     assert_vector(plane->as.plane.point, 0, -1, 0);
@@ -58,7 +58,7 @@ TEST(test_sphere_and_plane)
     assert_vector(material_of(plane)->color, 0, 1, 0);
     assert_vector(material_of(plane)->diffuse, 1, 1, 1);
     assert_number(material_of(plane)->ambient, 1);
-    assert_number(material_of(plane)->specular, 0);
+    assert_number(material_of(plane)->specular.largest, 0);
 }
 
 TEST(test_cylinder_and_cone)
@@ -69,7 +69,7 @@ TEST(test_cylinder_and_cone)
     assert_vector(cylinder->as.cylinder.axis, 0, 6, 0);
     assert_number(cylinder->as.cylinder.radius, 1);
     assert_true(cylinder->as.cylinder.finite && cylinder->as.cylinder.caps);
-    assert_number(material_of(cylinder)->specular, 0.25);
+    assert_number(material_of(cylinder)->specular.largest, 0.25);
     assert_int_equal(cone->type, SHAPE_CONE);
     assert_vector(cone->as.cone.from, 1, 2, 3);
     assert_vector(cone->as.cone.axis, 3, 0, 0);
@@ -156,7 +156,7 @@ TEST(test_color_before_sizes)
     Scene scene = scene_of_text("s.rt", LIT "cy 0,0,0 0,1,0 255,0,0 2 6 0.5 10\n");
     assert_number(scene.objects.items[0].as.cylinder.radius, 1);
     assert_vector(scene.materials.items[0].color, 1, 0, 0);
-    assert_number(scene.materials.items[0].specular, 0.5);
+    assert_number(scene.materials.items[0].specular.largest, 0.5);
     scene_free(&scene);
 }
 
@@ -200,7 +200,7 @@ TEST(test_lenient_reads_dialects)
     assert_vector(scene.lights.items[0].position, 1, 2, 3);
     assert_vector(scene.lights.items[0].color, 1.5, 0, 0);
     assert_vector(scene.objects.items[0].as.sphere.center, 1, 2, 3);
-    assert_number(scene.materials.items[0].specular, 0.5);
+    assert_number(scene.materials.items[0].specular.largest, 0.5);
     scene_free(&scene);
 }
 

@@ -43,7 +43,8 @@ static void glass_reflect(Scene *scene)
 {
     for (size_t i = 0; i < scene->materials.count; i++) {
         Material *material = &scene->materials.items[i];
-        if (material->transmission > 0 && material->reflection == 0) material->reflection = 1e-6;
+        if (material->transmission.largest > 0 && material->reflection.largest == 0)
+            material->reflection.largest = 1e-6;
     }
 }
 

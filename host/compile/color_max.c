@@ -24,7 +24,7 @@ static Color material_color_max(const CompiledScene *compiled, const Scene *scen
         color = vector_all(compiled->textures[material->image.texture - 1].largest_texel);
     const Color ambient = vector_scale(vector_multiply(scene->ambient, color), material->ambient);
     const Color factor =
-        vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular));
+        vector_add(vector_multiply(material->diffuse, color), vector_all(material->specular.largest));
     return vector_add(vector_add(material->emission, ambient), vector_multiply(light_sum, factor));
 }
 
@@ -45,7 +45,8 @@ double scene_color_max(const CompiledScene *compiled, const Scene *scene, uint32
         seen = vector_max(seen, background_max(compiled, scene));
         for (size_t i = 0; i < scene->materials.count; i++) {
             const Material *material = &scene->materials.items[i];
-            const Color passed = vector_scale(before, material->reflection + material->transmission);
+            const Color passed =
+                vector_scale(before, material->reflection.largest + material->transmission.largest);
             seen = vector_max(seen,
                               vector_add(material_color_max(compiled, scene, material, light_sum), passed));
         }

@@ -26,16 +26,16 @@ static FeatureSet material_features(const Material *material)
     if (material_any_texture(material)) set |= FEATURE_IMAGES;
     if (material->cutout.threshold > 0) set |= FEATURE_CUTOUTS;
     if (material->normal_map.texture > 0) set |= FEATURE_NORMAL_MAPS;
-    if (material->reflection > 0) set |= FEATURE_REFLECTION;
+    if (material->reflection.largest > 0) set |= FEATURE_REFLECTION;
     // includes reflected rays, for total internal reflection
-    if (material->transmission > 0) set |= FEATURE_TRANSMISSION;
+    if (material->transmission.largest > 0) set |= FEATURE_TRANSMISSION;
     // shadow rays must pass through it
     if (material->shadow == SHADOW_NONE) set |= FEATURE_TRANSMISSION;
-    if (material->transmission > 0 && !vector_is_zero(material->transmission_tint))
+    if (material->transmission.largest > 0 && !vector_is_zero(material->transmission.tint))
         set |= FEATURE_FILTERS | FEATURE_TINTS;
-    if (material->transmission > 0 && !vector_is_zero(material->absorption))
+    if (material->transmission.largest > 0 && !vector_is_zero(material->absorption))
         set |= FEATURE_ABSORPTION | FEATURE_TINTS;
-    if (!vector_is_zero(material->reflection_tint) || !vector_is_zero(material->specular_tint))
+    if (!vector_is_zero(material->reflection.tint) || !vector_is_zero(material->specular.tint))
         set |= FEATURE_TINTS;
     if (!vector_is_zero(material->emission)) set |= FEATURE_EMISSION;
     if (material->conductor.n.x > 0 && set & FEATURE_REFLECTION) set |= FEATURE_CONDUCTORS | FEATURE_TINTS;

@@ -110,7 +110,7 @@ static void shared_mesh_classify(const Scene *scene, SharedMeshPlan *shared)
     const uint32_t *materials = shared->material > 0 ? NULL : mesh->materials;
     for (size_t i = 0; i < (materials ? mesh->triangle_count : 1); i++) {
         const uint32_t material = materials ? materials[i] : shared->object_material;
-        const bool is_transparent = scene->materials.items[material].transmission > 0;
+        const bool is_transparent = scene->materials.items[material].transmission.largest > 0;
         shared->is_transparent_somewhere |= is_transparent;
         shared->is_opaque_somewhere |= !is_transparent;
     }

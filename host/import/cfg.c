@@ -71,7 +71,7 @@ static void object_finish(CfgReader *reader, const BlockValues *values, Object o
     Material material = material_default();
     material.color = vector_scale(values->color, 1 / COLOR_MAX);
     material.diffuse = values->diffuse;
-    material.specular = values->specular;
+    material.specular.largest = values->specular;
     material.shininess = 30;
     scene_add_object(reader->scene, object, &material);
 }

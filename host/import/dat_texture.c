@@ -105,12 +105,12 @@ static Material material_of(const DatReader *reader, const Texture *texture)
     material.color = texture->color;
     material.ambient = texture->ambient;
     material.diffuse = vector_all(texture->diffuse);
-    material.specular = texture->phong;
-    if (texture->is_metal) material.specular *= (texture->color.x + texture->color.y + texture->color.z) / 3;
+    material.specular.largest = texture->phong;
+    if (texture->is_metal) material.specular.largest *= vector_mean(texture->color);
     material.shininess = texture->phong_size / 4;
-    material.reflection = texture->specular;
+    material.reflection.largest = texture->specular;
     if (reader->dims_clear && texture->opacity < 1) material_set_opacity(&material, texture->opacity);
-    material.transmission = 1 - texture->opacity;
+    material.transmission.largest = 1 - texture->opacity;
     return material;
 }
 

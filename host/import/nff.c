@@ -118,11 +118,11 @@ static bool read_material(NffReader *reader)
     reader->has_material = true;
     if (!read_color(reader, &material.color) ||
         !free_number(line, "Kd", &range_not_negative, &material.ambient) ||
-        !free_number(line, "Ks", &range_unit, &material.specular) ||
+        !free_number(line, "Ks", &range_unit, &material.specular.largest) ||
         !free_number(line, "Shine", &range_not_negative, &material.shininess) ||
-        !free_number(line, "T", &range_unit, &material.transmission))
+        !free_number(line, "T", &range_unit, &material.transmission.largest))
         return false;
-    const Range *range = material.transmission > 0 ? &range_positive : &range_not_negative;
+    const Range *range = material.transmission.largest > 0 ? &range_positive : &range_not_negative;
     if (!free_number(line, "index of refraction", range, &ior) || !line_end(line)) return false;
     if (ior > 0) material.ior = ior;
     material.diffuse = vector_all(material.ambient);

@@ -69,7 +69,7 @@ static bool read_finish(RtReader *reader, Material *material)
 {
     Line *line = &reader->line;
     if (finish_follows(reader) &&
-        !(line_number(line, "specular", &range_unit, &material->specular) &&
+        !(line_number(line, "specular", &range_unit, &material->specular.largest) &&
           line_number(line, "shininess", &range_not_negative, &material->shininess)))
         return false;
     return element_end(reader);

@@ -57,14 +57,19 @@ Color tint_factors(Color tint)
     return vector_is_zero(tint) ? vector_all(1) : tint;
 }
 
+Color factor_color(TintedFactor factor)
+{
+    return vector_scale(tint_factors(factor.tint), factor.largest);
+}
+
 void material_set_opacity(Material *material, double opacity)
 {
     material->ambient *= opacity;
     material->diffuse = vector_scale(material->diffuse, opacity);
-    material->specular *= opacity;
-    material->reflection *= opacity;
+    material->specular.largest *= opacity;
+    material->reflection.largest *= opacity;
     material->emission = vector_scale(material->emission, opacity);
-    material->transmission = 1 - opacity;
+    material->transmission.largest = 1 - opacity;
     material->ior = 1;
 }
 
@@ -114,8 +119,7 @@ double camera_focal_distance(const Camera *camera)
 
 Color material_passing(const Material *material)
 {
-    if (material->shadow == SHADOW_OF_TRANSMISSION)
-        return vector_scale(tint_factors(material->transmission_tint), material->transmission);
+    if (material->shadow == SHADOW_OF_TRANSMISSION) return factor_color(material->transmission);
     return vector_all(material->shadow == SHADOW_NONE ? 1 : 0);
 }
 

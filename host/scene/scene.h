@@ -94,16 +94,20 @@ typedef struct {
     Color n, k;
 } Conductor;
 
+// A color as its largest channel and its tint, the channels over the largest, or 0 where they are equal.
+typedef struct {
+    double largest;
+    Color tint;
+} TintedFactor;
+
 typedef struct {
     Color color;
-    double ambient;                  // ka
-    Color diffuse;                   // kd, per channel
-    double specular;                 // ks, the largest channel's
-    double shininess;                // Phong's power, >= 0
-    double reflection, transmission; // weights of the reflected and the refracted ray, the largest channel's
-    // the channels over the largest, or 0 where they are equal
-    Color reflection_tint, transmission_tint, specular_tint;
-    Color emission;      // added to what the surface shows; lights nothing else
+    double ambient;                        // ka
+    Color diffuse;                         // kd, per channel
+    TintedFactor specular;                 // ks
+    double shininess;                      // Phong's power, >= 0
+    TintedFactor reflection, transmission; // weights of the reflected and the refracted ray
+    Color emission;                        // added to what the surface shows; lights nothing else
     bool fresnel;        // the surface reflects a part of `transmission`, or of `reflection` without it
     Conductor conductor; // reflects by this index; n is 0 if it does not
     double ior;
@@ -372,6 +376,7 @@ Color color_tint(Color color);
 Color color_absorption(Color left, double distance);
 // Returns the factors of a tint, which are 1 where it is 0.
 Color tint_factors(Color tint);
+Color factor_color(TintedFactor factor);
 // Makes a material pass the fraction 1 - opacity of the light from behind, undeflected, and dims what the
 // surface itself shows by the opacity.
 void material_set_opacity(Material *material, double opacity);

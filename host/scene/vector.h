@@ -62,6 +62,11 @@ static inline double vector_largest(Vector3 a)
     return fmax(fabs(a.x), fmax(fabs(a.y), fabs(a.z)));
 }
 
+static inline double vector_mean(Vector3 a)
+{
+    return (a.x + a.y + a.z) / 3;
+}
+
 // Returns whether no component's magnitude exceeds `largest`; false for NaN.
 static inline bool vector_is_within(Vector3 a, double largest)
 {

@@ -180,7 +180,7 @@ static Scene plain_scene(void)
 {
     Scene scene = unchecked_scene();
     for (size_t i = 0; i < scene.materials.count; i++)
-        scene.materials.items[i].reflection = scene.materials.items[i].transmission = 0;
+        scene.materials.items[i].reflection = scene.materials.items[i].transmission = (TintedFactor){0};
     for (size_t i = 0; i < scene.objects.count; i++) {
         Object *object = &scene.objects.items[i];
         if (object->type == SHAPE_CONE && object->as.cone.finite)

@@ -87,14 +87,14 @@ static ReferenceHit path_hit(const ReferenceScene *world, const PathRay *path)
     const Scene *scene = &world->scene;
     const ReferenceRay *ray = &path->ray;
     const ReferenceHit first = reference_scene_hit(world, ray, path->left);
-    if (!first.found || reference_material(scene, first.object)->transmission <= 0) return first;
+    if (!first.found || reference_material(scene, first.object)->transmission.largest <= 0) return first;
     const Quad length = quad3_length(ray->direction), reach = START_PART * first.t * length;
     const ReferenceRay inward = {reference_point(ray, first.t), quad3_scale(first.normal, -1), -reach, reach};
     const Quad depth = 2 * reach / (first.cosine * length);
     const ReferenceRay around = {ray->origin, ray->direction, first.t - depth, first.t + depth};
     ReferenceHit hit = first;
     for (size_t i = 0; i < scene->objects.count; i++) {
-        if (reference_material(scene, i)->transmission > 0) continue;
+        if (reference_material(scene, i)->transmission.largest > 0) continue;
         if (!reference_scene_hit_object(world, i, &inward, UINT32_MAX).found) continue;
         ReferenceHit opaque = reference_scene_hit_object(world, i, &around, UINT32_MAX);
         if (!opaque.found || (hit.object != first.object && opaque.t >= hit.t)) continue;
@@ -160,10 +160,10 @@ static void surface_split(const ShadedPoint *surface, bool is_total, Color *refl
 {
     const Material *material = surface->material;
     const Quad cosine = quad3_dot(surface->to_eye, surface->normal);
-    double transmission = material->transmission, part = is_total;
+    double transmission = material->transmission.largest, part = is_total;
     if (material->fresnel && !is_total)
         part = (double)reference_reflectance(cosine, material->ior, surface->entering || transmission == 0);
-    *reflected = vector_scale(tint_factors(material->reflection_tint), material->reflection);
+    *reflected = factor_color(material->reflection);
     if (transmission > 0) {
         *reflected = vector_add(*reflected, vector_all(part * transmission));
         transmission -= part * transmission;
@@ -177,7 +177,7 @@ static void surface_split(const ShadedPoint *surface, bool is_total, Color *refl
                              reference_conductor_reflectance(cosine, n.z, k.z)};
         *reflected = vector_multiply(*reflected, metal);
     }
-    *refracted = vector_scale(tint_factors(material->transmission_tint), transmission);
+    *refracted = vector_scale(tint_factors(material->transmission.tint), transmission);
 }
 
 static void add_path(PathTree *tree, const PathRay *path, unsigned bounces_left);
@@ -192,7 +192,7 @@ static void add_bounces(PathTree *tree, const PathRay *path, const ShadedPoint *
                          path->weight,
                          path->medium};
     PathRay reflected = refracted;
-    const bool is_total = material->transmission > 0 &&
+    const bool is_total = material->transmission.largest > 0 &&
                           !surface_refract(surface, direction, &refracted.ray.direction, &tree->margin);
     Color reflected_part, refracted_part;
     surface_split(surface, is_total, &reflected_part, &refracted_part);
@@ -223,7 +223,7 @@ static void add_path(PathTree *tree, const PathRay *path, unsigned bounces_left)
     const ShadedPoint surface = shaded_point(tree->world, &path->ray, &hit, tree->blur, &tree->random);
     PathRay arriving = *path;
     // a surface that is reached from within defines the medium
-    if (surface.material->transmission > 0 && !surface.entering)
+    if (surface.material->transmission.largest > 0 && !surface.entering)
         arriving.medium.density = surface.material->absorption;
     arriving.weight = weight_left(path->weight, arriving.medium.density, (double)surface.scale);
     add_surface(tree, &surface, arriving.weight, hit.margin);

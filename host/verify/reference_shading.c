@@ -187,8 +187,8 @@ static bool add_light(const ReferenceScene *world, const Light *light, const Sha
         reference_highlight(surface->normal, to_light, surface->to_eye, material->shininess);
     const Color reflected = vector_add(
         vector_scale(vector_multiply(material->diffuse, surface->base), (double)(strength * facing)),
-        vector_scale(tint_factors(material->specular_tint),
-                     (double)(strength * highlight) * material->specular));
+        vector_scale(tint_factors(material->specular.tint),
+                     (double)(strength * highlight) * material->specular.largest));
     sum->color = vector_add(sum->color, vector_multiply(vector_multiply(light->color, passed), reflected));
     return strength > 0 && vector_largest(passed) > 0;
 }

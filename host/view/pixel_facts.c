@@ -28,10 +28,11 @@ static void branch_write(PathText *tree, const Branch *branch);
 static void branches_write(PathText *tree, const Branch *branch, const Material *material,
                            const TraceHit *hit)
 {
-    const bool is_total = material->transmission > 0 && hit->transmission == 0;
-    const double kept = is_total || material->fresnel ? material->transmission - hit->transmission : 0;
+    const bool is_total = material->transmission.largest > 0 && hit->transmission == 0;
+    const double kept =
+        is_total || material->fresnel ? material->transmission.largest - hit->transmission : 0;
     const Branch reflected = {is_total ? "totally reflected" : "reflected",
-                              branch->weight * (material->reflection + kept),
+                              branch->weight * (material->reflection.largest + kept),
                               branch->depth + 1,
                               {hit->reflected_origin, hit->reflected_direction, 0, INFINITY}};
     const Branch refracted = {"refracted",

@@ -175,7 +175,7 @@ static Material material_of(const Importer *importer)
     // assimp sets a specular color even for Lambertian materials, which have none
     int shading = aiShadingMode_Phong;
     aiGetMaterialIntegerArray(importer->material, AI_MATKEY_SHADING_MODEL, &shading, NULL);
-    if (shading != aiShadingMode_Gouraud) material.specular = (specular.x + specular.y + specular.z) / 3;
+    if (shading != aiShadingMode_Gouraud) material.specular.largest = vector_mean(specular);
     material.shininess = number_of(importer, AI_MATKEY_SHININESS, NUMBER_MAX, material.shininess);
     if (importer->draft->import->view) material.ambient = 0;
     const double opacity = number_of(importer, AI_MATKEY_OPACITY, 1, 1),
@@ -207,7 +207,7 @@ static void material_add(Importer *importer, const struct aiMaterial *from, Impo
     material.image.texture = to->texture;
     memcpy(material.image.wraps, wraps, sizeof wraps);
     material.diffuse = vector_multiply(material.diffuse, color);
-    material.ambient *= importer->draft->import->view ? 0 : (color.x + color.y + color.z) / 3;
+    material.ambient *= importer->draft->import->view ? 0 : vector_mean(color);
     to->scene_index[1] = scene_add_material(scene, &material, name.data);
 }
 

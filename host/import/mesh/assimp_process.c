@@ -38,10 +38,9 @@ typedef struct {
     char text[512];
 } ReplyMessage;
 
+// A material, whose image is 1 + the index of a texture of the reply.
 typedef struct {
-    Color color, diffuse, emission;
-    double ambient, specular, shininess, transmission, ior;
-    uint32_t texture, wraps[2];
+    Material look;
     char name[64];
 } ReplyMaterial;
 
@@ -111,17 +110,7 @@ static void textures_write(FILE *reply, const Scene *scene)
 static void materials_write(FILE *reply, const Scene *scene)
 {
     for (size_t i = 0; i < scene->materials.count; i++) {
-        const Material *from = &scene->materials.items[i];
-        ReplyMaterial material = {.color = from->color,
-                                  .diffuse = from->diffuse,
-                                  .emission = from->emission,
-                                  .ambient = from->ambient,
-                                  .specular = from->specular,
-                                  .shininess = from->shininess,
-                                  .transmission = from->transmission,
-                                  .ior = from->ior,
-                                  .texture = from->image.texture,
-                                  .wraps = {from->image.wraps[0], from->image.wraps[1]}};
+        ReplyMaterial material = {.look = scene->materials.items[i]};
         snprintf(material.name, sizeof material.name, "%s", scene->material_names.items[i]);
         fwrite(&material, sizeof material, 1, reply);
     }
@@ -238,32 +227,42 @@ static bool textures_read(MeshDraft *draft, FILE *reply, uint64_t count,
     return true;
 }
 
+// Copies the members of a material that assimp_read sets. Returns false if one is out of range.
+static bool material_copy(const Material *from, const uint32_t *textures, uint64_t texture_count,
+                          Material *material)
+{
+    const uint32_t texture = from->image.texture;
+    if (!color_is_sound(from->color) || !color_is_sound(from->diffuse) || !color_is_sound(from->emission) ||
+        !number_is_sound(from->ambient) || !number_is_sound(from->specular.largest) ||
+        !number_is_sound(from->shininess) || !range_holds(&range_unit, from->transmission.largest) ||
+        !(from->ior > 0 && from->ior <= NUMBER_MAX) || texture > texture_count ||
+        from->image.wraps[0] > TEXTURE_MIRRORED || from->image.wraps[1] > TEXTURE_MIRRORED)
+        return false;
+    *material = material_default();
+    material->color = from->color;
+    material->ambient = from->ambient;
+    material->diffuse = from->diffuse;
+    material->specular.largest = from->specular.largest;
+    material->shininess = from->shininess;
+    material->transmission.largest = from->transmission.largest;
+    material->emission = from->emission;
+    material->ior = from->ior;
+    memcpy(material->image.wraps, from->image.wraps, sizeof from->image.wraps);
+    material->image.texture = texture > 0 ? textures[texture - 1] : 0;
+    return true;
+}
+
 static bool materials_read(MeshDraft *draft, FILE *reply, uint64_t count, const uint32_t *textures,
                            uint64_t texture_count)
 {
     if (count > MATERIALS_MAX) return false;
     for (uint64_t i = 0; i < count; i++) {
         ReplyMaterial from;
-        if (fread(&from, sizeof from, 1, reply) != 1 || !color_is_sound(from.color) ||
-            !color_is_sound(from.diffuse) || !color_is_sound(from.emission) ||
-            !number_is_sound(from.ambient) || from.texture > texture_count ||
-            from.wraps[0] > TEXTURE_MIRRORED || from.wraps[1] > TEXTURE_MIRRORED ||
-            !number_is_sound(from.specular) || !number_is_sound(from.shininess) ||
-            !(from.transmission >= 0 && from.transmission <= 1) || !(from.ior > 0 && from.ior <= NUMBER_MAX))
+        Material material;
+        if (fread(&from, sizeof from, 1, reply) != 1 ||
+            !material_copy(&from.look, textures, texture_count, &material))
             return false;
         from.name[sizeof from.name - 1] = '\0';
-        Material material = material_default();
-        material.color = from.color;
-        material.diffuse = from.diffuse;
-        material.emission = from.emission;
-        material.ambient = from.ambient;
-        material.image.texture = from.texture > 0 ? textures[from.texture - 1] : 0;
-        for (int axis = 0; axis < 2; axis++)
-            material.image.wraps[axis] = (TextureWrap)from.wraps[axis];
-        material.specular = from.specular;
-        material.shininess = from.shininess;
-        material.transmission = from.transmission;
-        material.ior = from.ior;
         scene_add_material(draft->scene, &material, from.name);
     }
     return true;

@@ -187,12 +187,12 @@ static void gloss_set(Gltf *gltf, const GltfItem *item, const GltfSurface *surfa
     const Color base = {surface->base[0], surface->base[1], surface->base[2]},
                 facing = vector_add(vector_scale(base, metal), vector_all(0.04 * (1 - metal)));
     look->diffuse = vector_all(1 - metal * smooth);
-    look->specular = alpha > 0 ? fmin(smooth * vector_largest(facing) / (4 * alpha * alpha), 1) : 1;
+    look->specular.largest = alpha > 0 ? fmin(smooth * vector_largest(facing) / (4 * alpha * alpha), 1) : 1;
     look->shininess = fmin(0.5 / fmax(alpha * alpha, 1e-12) - 0.5, SHININESS_MAX);
-    look->specular_tint = color_tint(facing);
-    look->reflection = clamped(metal * smooth * smooth * vector_largest(base));
-    if (look->reflection == 0) return;
-    look->reflection_tint = color_tint(base);
+    look->specular.tint = color_tint(facing);
+    look->reflection.largest = clamped(metal * smooth * smooth * vector_largest(base));
+    if (look->reflection.largest == 0) return;
+    look->reflection.tint = color_tint(base);
     if (surface->base_texture.json) gltf_lose(gltf, GLTF_METAL_COLOR, item);
 }
 
@@ -223,7 +223,7 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
         if (material->texture.number > 0 && (base[0] != base[1] || base[1] != base[2]))
             gltf_lose(gltf, GLTF_UNLIT_TINT, item);
         look->emission = look->color;
-        look->ambient = look->specular = look->reflection = 0;
+        look->ambient = look->specular.largest = look->reflection.largest = 0;
         look->diffuse = vector_all(0);
         return;
     }
@@ -273,8 +273,8 @@ static void transparency_set(Gltf *gltf, const GltfItem *item, const GltfSurface
         look->specular = opaque.specular;
         look->reflection = opaque.reflection;
         look->emission = opaque.emission;
-        look->transmission *= fmin(vector_largest(look->color), 1);
-        look->transmission_tint = color_tint(look->color);
+        look->transmission.largest *= fmin(vector_largest(look->color), 1);
+        look->transmission.tint = color_tint(look->color);
         if (surface->base_texture.json) gltf_lose(gltf, GLTF_GLASS_COLOR, item);
         // without thickness a surface has no inside
         if (surface->thickness > 0 && surface->ior > 0) look->ior = surface->ior;

@@ -64,7 +64,7 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
                is_glass = refracts || illumination == 4 || illumination == 9, has_dissolve = !isnan(dissolve),
                has_transparency = !isnan(transparency);
     Material *look = &material->material;
-    if (illumination >= 3 && illumination <= 8 && look->specular > 0 && !reader->has_reflection) {
+    if (illumination >= 3 && illumination <= 8 && look->specular.largest > 0 && !reader->has_reflection) {
         report_warning(&reader->report, material->illumination.offset,
                        "the reflections of illum 3 to 8 are not shown");
         reader->has_reflection = true;
@@ -81,10 +81,11 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
                        dissolve);
     const double opacity = has_dissolve ? dissolve : has_transparency ? 1 - transparency : 1;
     if (opacity == 1) return;
-    const double specular = look->specular, ior = look->ior;
+    const TintedFactor specular = look->specular;
+    const double ior = look->ior;
     material_set_opacity(look, opacity);
-    look->transmission *= fmin(vector_largest(material->filter), 1);
-    look->transmission_tint = color_tint(vector_min(material->filter, vector_all(1)));
+    look->transmission.largest *= fmin(vector_largest(material->filter), 1);
+    look->transmission.tint = color_tint(vector_min(material->filter, vector_all(1)));
     if (is_glass) look->specular = specular;
     if (refracts || isnan(illumination)) look->ior = ior;
 }
@@ -180,7 +181,7 @@ static bool strength_read(MtlReader *reader, const Statement *statement, void *t
 {
     Color color;
     if (!color_read(reader, statement, &color)) return false;
-    *(double *)target = (color.x + color.y + color.z) / 3;
+    *(double *)target = vector_mean(color);
     return true;
 }
 
@@ -240,7 +241,7 @@ static const Range range_illumination = {0, 10, false, "from 0 to 10"};
 
 static const Statement statements[] = {
     {"Kd", color_read, LOOK(color), &range_not_negative},
-    {"Ks", strength_read, LOOK(specular), &range_not_negative},
+    {"Ks", strength_read, LOOK(specular.largest), &range_not_negative},
     {"Ns", factor_read, LOOK(shininess), &range_not_negative},
     {"Ni", factor_read, LOOK(ior), &range_positive},
     {"Tr", placed_factor_read, offsetof(MtlMaterial, transparency), &range_unit},
@@ -409,7 +410,7 @@ static void textures_use(MeshDraft *draft, MtlMaterial *material)
     look->image.texture = image_add(draft, material, color);
     if (look->image.texture > 0) {
         look->diffuse = vector_multiply(look->diffuse, look->color);
-        look->ambient *= (look->color.x + look->color.y + look->color.z) / 3;
+        look->ambient *= vector_mean(look->color);
     }
     look->normal_map.texture = image_add(draft, material, &material->normal_image);
     if (look->normal_map.texture > 0) look->normal_map.strength = material->normal_image.strength;

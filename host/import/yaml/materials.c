@@ -155,37 +155,19 @@ static bool read_normal_map(YamlReader *reader, const Field *field, const YamlNo
     return content_read(reader, field, node, TEXTURE_NORMALS, target);
 }
 
-// Reads a factor or a color in the field's range. Sets the largest channel and the tint.
-static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *node, double *largest,
-                        Color *tint)
+// Reads a factor or a color in the field's range into a TintedFactor.
+static bool read_tinted(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
 {
+    TintedFactor *factor = target;
     Color channels = {0, 0, 0};
     const char *text = yaml_text(&reader->tree, node);
-    *tint = vector_all(0);
-    if (text[0] != '\0' && strchr("+-.0123456789", text[0])) return read_number(reader, field, node, largest);
+    *factor = (TintedFactor){0};
+    if (text[0] != '\0' && strchr("+-.0123456789", text[0]))
+        return read_number(reader, field, node, &factor->largest);
     if (!read_strength(reader, field, node, &channels)) return false;
-    *largest = vector_largest(channels);
-    *tint = color_tint(channels);
-    return *largest <= field->range->high ||
+    *factor = (TintedFactor){vector_largest(channels), color_tint(channels)};
+    return factor->largest <= field->range->high ||
            report_error(&reader->report, node->offset, "'%s' must be %s", field->name, field->range->must);
-}
-
-static bool read_reflection(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    Material *material = target;
-    return read_tinted(reader, field, node, &material->reflection, &material->reflection_tint);
-}
-
-static bool read_transmission(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    Material *material = target;
-    return read_tinted(reader, field, node, &material->transmission, &material->transmission_tint);
-}
-
-static bool read_specular(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
-{
-    Material *material = target;
-    return read_tinted(reader, field, node, &material->specular, &material->specular_tint);
 }
 
 static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *node, void *target)
@@ -200,7 +182,7 @@ static bool read_shadow(YamlReader *reader, const Field *field, const YamlNode *
 // diffuse light, most of which remains under reflection by angle, as in plastic. Sums of decimals round.
 static void energy_check(YamlReader *reader, const Material *material, const YamlNode *node)
 {
-    const double reflection = material->reflection, transmission = material->transmission;
+    const double reflection = material->reflection.largest, transmission = material->transmission.largest;
     const bool is_fraction_of_transmission = material->fresnel && transmission > 0;
     if (reflection + transmission <= 1 + 1e-9) return;
     report_warning(&reader->report, field_node(reader, node, "reflection")->offset,
@@ -234,10 +216,10 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
          &range_not_negative},
         {"ambient", read_number, offsetof(Material, ambient), OPTIONAL, &range_not_negative},
         {"diffuse", read_strength, offsetof(Material, diffuse)},
-        {"specular", read_specular, 0, OPTIONAL, &range_not_negative},
+        {"specular", read_tinted, offsetof(Material, specular), OPTIONAL, &range_not_negative},
         {"shininess", read_number, offsetof(Material, shininess), OPTIONAL, &range_not_negative},
-        {"reflection", read_reflection, 0, OPTIONAL, &range_unit},
-        {"transmission", read_transmission, 0, OPTIONAL, &range_unit},
+        {"reflection", read_tinted, offsetof(Material, reflection), OPTIONAL, &range_unit},
+        {"transmission", read_tinted, offsetof(Material, transmission), OPTIONAL, &range_unit},
         {"ior", read_number, offsetof(Material, ior), OPTIONAL, &range_positive},
         {"absorption", read_absorption, offsetof(Material, absorption)},
         {"emission", read_strength, offsetof(Material, emission)},
@@ -248,14 +230,14 @@ static void material_append(YamlReader *reader, const YamlNode *node, const char
     Material material = material_default();
     const YamlNode *conductor = node ? field_node(reader, node, "conductor") : NULL;
     if (conductor != node) { // the default of a metal
-        material.reflection = 1;
+        material.reflection.largest = 1;
         material.ambient = 0;
         material.diffuse = vector_all(0);
     }
     const bool is_read = node && fields_read(reader, node, "material", fields, COUNT_OF(fields), &material);
     if (is_read) textures_check(reader, &material, node);
     if (material.cutout.threshold > 0) material.cutout.texture = material.image.texture;
-    if (conductor != node && (material.fresnel || material.transmission > 0))
+    if (conductor != node && (material.fresnel || material.transmission.largest > 0))
         report_error(&reader->report, conductor->offset, "'conductor' cannot be combined with '%s'",
                      material.fresnel ? "fresnel" : "transmission");
     else if (is_read)
