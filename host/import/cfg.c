@@ -18,20 +18,21 @@ typedef struct {
     double radius, angle, specular;
 } BlockValues;
 
-static const LineField keys[] = {
-    {"position", line_blank_vector, offsetof(BlockValues, position), NULL},
-    {"look_at", line_blank_vector, offsetof(BlockValues, look_at), NULL},
-    {"center", line_blank_vector, offsetof(BlockValues, center), NULL},
-    {"normal", line_blank_vector, offsetof(BlockValues, normal), NULL},
-    {"radius", line_number, offsetof(BlockValues, radius), &range_positive},
-    {"angle", line_number, offsetof(BlockValues, angle), &range_radians},
-    {"intensity", line_blank_vector, offsetof(BlockValues, intensity), &range_not_negative},
-    {"color", line_blank_vector, offsetof(BlockValues, color), &range_color},
-    {"diffuse", line_blank_vector, offsetof(BlockValues, diffuse), &range_not_negative},
-    {"specular", line_number, offsetof(BlockValues, specular), &range_not_negative},
-};
+// The keys, in the order in which messages name those that a block lacks.
+enum { POSITION, LOOK_AT, INTENSITY, RADIUS, ANGLE, CENTER, NORMAL, COLOR, DIFFUSE, SPECULAR, KEY_COUNT };
 
-enum { KEY_COUNT = COUNT_OF(keys), BLOCK_KEYS_MAX = 8 };
+static const LineField keys[KEY_COUNT] = {
+    [POSITION] = {"position", line_blank_vector, offsetof(BlockValues, position), NULL},
+    [LOOK_AT] = {"look_at", line_blank_vector, offsetof(BlockValues, look_at), NULL},
+    [INTENSITY] = {"intensity", line_blank_vector, offsetof(BlockValues, intensity), &range_not_negative},
+    [RADIUS] = {"radius", line_number, offsetof(BlockValues, radius), &range_positive},
+    [ANGLE] = {"angle", line_number, offsetof(BlockValues, angle), &range_radians},
+    [CENTER] = {"center", line_blank_vector, offsetof(BlockValues, center), NULL},
+    [NORMAL] = {"normal", line_blank_vector, offsetof(BlockValues, normal), NULL},
+    [COLOR] = {"color", line_blank_vector, offsetof(BlockValues, color), &range_color},
+    [DIFFUSE] = {"diffuse", line_blank_vector, offsetof(BlockValues, diffuse), &range_not_negative},
+    [SPECULAR] = {"specular", line_number, offsetof(BlockValues, specular), &range_not_negative},
+};
 
 typedef struct {
     Report report;
@@ -45,7 +46,7 @@ typedef enum { BLOCK_CAMERA, BLOCK_LIGHT, BLOCK_OBJECT } BlockType;
 typedef struct {
     const char *name;
     BlockType type;
-    const char *keys[BLOCK_KEYS_MAX]; // all required; ended by NULL
+    unsigned keys; // bits, all required
     void (*finish)(CfgReader *reader, const BlockValues *values);
 } Block;
 
@@ -105,47 +106,40 @@ static void cone_finish(CfgReader *reader, const BlockValues *values)
     object_finish(reader, values, object);
 }
 
-#define OBJECT_KEYS "color", "diffuse", "specular"
+enum { OBJECT_KEYS = 1 << COLOR | 1 << DIFFUSE | 1 << SPECULAR };
 
 static const Block blocks[] = {
-    {"camera", BLOCK_CAMERA, {"position", "look_at"}, camera_finish},
-    {"light", BLOCK_LIGHT, {"position", "intensity"}, light_finish},
-    {"sphere", BLOCK_OBJECT, {"radius", "center", OBJECT_KEYS}, sphere_finish},
-    {"plane", BLOCK_OBJECT, {"position", "normal", OBJECT_KEYS}, plane_finish},
-    {"cylinder", BLOCK_OBJECT, {"radius", "center", "normal", OBJECT_KEYS}, cylinder_finish},
-    {"cone", BLOCK_OBJECT, {"angle", "center", "normal", OBJECT_KEYS}, cone_finish},
+    {"camera", BLOCK_CAMERA, 1 << POSITION | 1 << LOOK_AT, camera_finish},
+    {"light", BLOCK_LIGHT, 1 << POSITION | 1 << INTENSITY, light_finish},
+    {"sphere", BLOCK_OBJECT, 1 << RADIUS | 1 << CENTER | OBJECT_KEYS, sphere_finish},
+    {"plane", BLOCK_OBJECT, 1 << POSITION | 1 << NORMAL | OBJECT_KEYS, plane_finish},
+    {"cylinder", BLOCK_OBJECT, 1 << RADIUS | 1 << CENTER | 1 << NORMAL | OBJECT_KEYS, cylinder_finish},
+    {"cone", BLOCK_OBJECT, 1 << ANGLE | 1 << CENTER | 1 << NORMAL | OBJECT_KEYS, cone_finish},
 };
 
-static const LineField *key_find(const Block *block, Word word)
-{
-    bool belongs = false;
-    for (size_t i = 0; i < BLOCK_KEYS_MAX && block->keys[i]; i++)
-        belongs |= word_is(word, block->keys[i]);
-    for (size_t i = 0; belongs && i < KEY_COUNT; i++) {
-        if (word_is(word, keys[i].name)) return &keys[i];
-    }
-    return NULL;
-}
-
-static bool key_read(CfgReader *reader, const Block *block, BlockValues *values, bool *seen)
+// Reads a key and its value, and adds the key to those that were seen.
+static bool key_read(CfgReader *reader, const Block *block, BlockValues *values, unsigned *seen)
 {
     Line *line = &reader->line;
-    Word word = line_word(line);
+    const Word word = line_word(line);
+    unsigned key = 0;
     if (word_is(word, "transfo") && block->type == BLOCK_OBJECT) {
         report_warning(&reader->report, word.offset, "skipped 'transfo': an object stays where it is");
         return true;
     }
-    const LineField *key = key_find(block, word);
-    if (!key)
+    while (key < KEY_COUNT && !((block->keys >> key & 1) && word_is(word, keys[key].name)))
+        key++;
+    if (key == KEY_COUNT)
         return report_error(&reader->report, word.offset, "unknown %s key '%.*s'", block->name,
                             WORD_TEXT(word));
-    if (seen[key - keys]) return report_error(&reader->report, word.offset, "'%s' is given twice", key->name);
-    seen[key - keys] = true;
-    size_t offset = line_peek(line).offset;
-    const bool read = line_field(line, key, values);
-    if (read && !strcmp(key->name, "normal") && vector_is_zero(values->normal))
+    if (*seen >> key & 1)
+        return report_error(&reader->report, word.offset, "'%s' is given twice", keys[key].name);
+    *seen |= 1u << key;
+    const size_t offset = line_peek(line).offset;
+    const bool read = line_field(line, &keys[key], values);
+    if (read && key == NORMAL && vector_is_zero(values->normal))
         return report_error(&reader->report, offset, "'normal' must not be zero");
-    if (read && !strcmp(key->name, "color") && vector_largest(values->color) > COLOR_MAX) {
+    if (read && key == COLOR && vector_largest(values->color) > COLOR_MAX) {
         report_warning(&reader->report, offset, "'color' exceeds 255, and is cut to it");
         values->color = vector_min(values->color, vector_all(COLOR_MAX));
     }
@@ -161,7 +155,8 @@ static bool word_opens_block(Word word)
 static bool block_read(CfgReader *reader, const Block *block, size_t start, BlockValues *values)
 {
     Line *line = &reader->line;
-    bool seen[KEY_COUNT] = {false}, all_read = true;
+    unsigned seen = 0;
+    bool all_read = true;
     for (;;) {
         if (!line_next_filled(line))
             return report_error(&reader->report, reader->report.source->length, "'}' is missing");
@@ -171,17 +166,13 @@ static bool block_read(CfgReader *reader, const Block *block, size_t start, Bloc
             return report_error(&reader->report, word.offset, "'}' is missing");
         }
         if (word_is(word, "}")) break;
-        all_read &= key_read(reader, block, values, seen);
+        all_read &= key_read(reader, block, values, &seen);
     }
     line_word(line);
     all_read &= line_end(line);
-    for (size_t i = 0; i < BLOCK_KEYS_MAX && block->keys[i]; i++) {
-        Word name = {.text = block->keys[i], .length = strlen(block->keys[i])};
-        if (!seen[key_find(block, name) - keys]) {
-            report_error(&reader->report, start, "%s lacks '%s'", block->name, block->keys[i]);
-            all_read = false;
-        }
-    }
+    for (unsigned key = 0; key < KEY_COUNT; key++)
+        if ((block->keys & ~seen) >> key & 1)
+            all_read = report_error(&reader->report, start, "%s lacks '%s'", block->name, keys[key].name);
     return all_read;
 }
 
