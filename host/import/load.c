@@ -11,6 +11,11 @@
 #include <string.h>
 #include <strings.h>
 
+void scene_file_named(const SceneOptions *options, const char *path)
+{
+    if (options && options->file_named) options->file_named(options->context, path);
+}
+
 bool scene_finish(Scene *scene, Report *report, const SceneOptions *options)
 {
     if (report->error_count == 0) textures_decode(scene, report, options);
@@ -119,7 +124,7 @@ static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *
     SceneOptions own = *options;
     own.camera = NULL;
     own.override_count = 0;
-    if (own.file_named) own.file_named(own.context, options->camera);
+    scene_file_named(options, options->camera);
     Scene other;
     MessageList found = {0};
     const bool is_read = file_load(&other, options->camera, &own, &found);

@@ -24,6 +24,9 @@ typedef struct {
     const char *mesh_program;
 } SceneOptions;
 
+// Passes the path of a file that the scene names to the options' file_named. The options may be NULL.
+void scene_file_named(const SceneOptions *options, const char *path);
+
 // Returns whether the name's ending is that of a scene or a mesh that glint reads.
 bool scene_is_known(const char *path);
 // Returns whether the name's ending is that of a YAML scene.

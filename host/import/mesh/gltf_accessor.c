@@ -75,8 +75,7 @@ static bool buffer_read_file(Gltf *gltf, GltfBuffer *buffer, const GltfItem *uri
 {
     char *path = gltf_path(gltf, uri);
     if (!path) return gltf_fails(gltf, uri, "must be a relative path or base64 data");
-    const SceneOptions *options = gltf->draft->import->options;
-    if (options && options->file_named) options->file_named(options->context, path);
+    scene_file_named(gltf->draft->import->options, path);
     const char *obstacle = file_obstacle(path);
     struct stat status = {0};
     MessageList problems = {0};

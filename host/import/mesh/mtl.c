@@ -221,8 +221,7 @@ static bool texture_read(MtlReader *reader, const Statement *statement, void *ta
     char *path = draft_find_file(reader->path, name.text, name.length, &is_moved);
     if (is_moved)
         report_warning(&reader->report, name.offset, "no '%.*s': '%s' is used", WORD_TEXT(name), path);
-    const SceneOptions *options = reader->draft->import->options;
-    if (options && options->file_named) options->file_named(options->context, path);
+    scene_file_named(reader->draft->import->options, path);
     const char *obstacle = file_obstacle(path), *fallback = texture_fallback(statement->content);
     if (obstacle)
         report_warning(&reader->report, name.offset, "cannot read '%s': %s: %s", path, obstacle, fallback);
@@ -294,8 +293,7 @@ static bool library_read(MtlReader *reader, const char *path)
 {
     struct stat file = {0};
     if (stat(path, &file) == 0 && file_was_read(reader, &file)) return true;
-    const SceneOptions *options = reader->draft->import->options;
-    if (options && options->file_named) options->file_named(options->context, path);
+    scene_file_named(reader->draft->import->options, path);
     Text text = {0};
     MessageList ignored = {0}, messages = {0};
     const bool is_there = !file_obstacle(path) && text_read_file(&text, path, &ignored);

@@ -111,8 +111,7 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
     const char *slash = strrchr(naming_file, '/');
     int folder_length = slash && file[0] != '/' ? (int)(slash + 1 - naming_file) : 0;
     char *path = text_format("%.*s%s", folder_length, naming_file, file);
-    const SceneOptions *options = reader->options;
-    if (options->file_named) options->file_named(options->context, path);
+    scene_file_named(reader->options, path);
     return path;
 }
 
