@@ -365,6 +365,20 @@ class Test(TestCase):
         self.assertEqual(report["lights"], 3)
         self.assertEqual(set(report["features"]), {"TRIANGLES", "POINT_LIGHTS", "DIRECTIONAL_LIGHTS", "SPOT_LIGHTS", "FADING_LIGHTS", "ORTHOGRAPHIC"})
 
+    def test_view_of_a_flat_node(self):
+        """A node scaled to a point leaves its camera and its light no direction."""
+        gltf = Gltf(extensions={"KHR_lights_punctual": {"lights": [{"type": "directional"}, {"type": "point"}]}})
+        gltf.square()
+        gltf.place(camera=gltf.add("cameras", type="perspective", perspective={"yfov": 1}), scale=[0, 0, 0])
+        for light in 0, 1:
+            gltf.place(scale=[0, 0, 0], translation=[0, 0, 1], extensions={"KHR_lights_punctual": {"light": light}})
+        report = self.checked(
+            gltf.write("a.gltf"),
+            "the camera lacks a direction or has a number out of range: one frames the mesh",
+            "lights without a direction or with a number out of range, not used: 1",
+        )
+        self.assertEqual(report["lights"], 1)
+
     def test_parallel_rays(self):
         """From near and afar the square fills half of the frame's height and a quarter of its width."""
         for distance in 3, 4000:

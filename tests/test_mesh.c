@@ -293,7 +293,8 @@ TEST(faults_name_file_and_vertex)
     static const struct {
         const char *name, *text, *message;
     } cases[] = {
-        {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n", "4:18: error: a.obj: no triangles"},
+        {"a.obj", "v 0 0 0\nv 1 0 0\nf 1 2\n",
+         "4:18: warning: a.obj: faces of one or two corners are not shown\n4:18: error: a.obj: no triangles"},
         {"a.ply", PLY_OF("nan", "2"), "12:3: error: 'nan' is not a coordinate: a number up to 1e+30"},
         {"a.ply", PLY_OF("1", "7"), "13:8: error: a face names vertex 7 (from 0); there are 3"},
         {"a.ply", PLY_OF_FACES("3 0 1 2", "4 0 1 3 -1"), "15:11: error: face 1 (from 0) names vertex -1"},
@@ -301,7 +302,8 @@ TEST(faults_name_file_and_vertex)
          "15:18: error: a face names vertex 400000000 (from 0); there are 4"},
         {"a.ply", PLY_OF_FACES("5 0 1 3 2 400000000", "3 0 1 2"),
          "14:20: error: a face names vertex 400000000 (from 0); there are 4"},
-        {"a.ply", PLY_OF_FACES("0", "2 0 1"), "4:18: error: a.ply: no triangles"},
+        {"a.ply", PLY_OF_FACES("0", "2 0 1"),
+         "4:18: warning: a.ply: faces of one or two corners are not shown\n4:18: error: a.ply: no triangles"},
         {"a.ply", PLY_HEADER("3", "1"), "9:1: error: the header lacks its end, a line 'end_header'"},
         {"a.ply", PLY_HEADER("3", "1") "end_header too\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
          "14:1: error: the header lacks its end, a line 'end_header'"},

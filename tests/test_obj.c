@@ -46,10 +46,10 @@ static Vector3 corner_of(const Mesh *mesh, size_t corner)
     return mesh->vertices[mesh->triangles[corner / 3][corner % 3]];
 }
 
-static void assert_unit_square(const char *obj)
+static void assert_unit_square(const char *obj, const char *messages)
 {
     static const double expected[6][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
-    Scene scene = scene_of_obj(obj, "");
+    Scene scene = scene_of_obj(obj, messages);
     const Mesh *mesh = &scene.meshes.items[0];
     assert_int_equal(mesh->triangle_count, 2);
     for (size_t i = 0; i < 6; i++) {
@@ -73,18 +73,26 @@ TEST(layouts_are_read)
         "v 0 0 \\\n0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 \\\n3 \\\n  4\n",
         "# continues \\\nv 7 7 7\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nfo +1 2 3 4\n",
         "v 0 0 0 1\nv 2 0 0 2\nv -1 -1 0 -1\nv 0 0.5 0 0.5\nf 1 2 3 4\n",
-        "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2// 3/1 4//1\nf 1 2\n",
-        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 1 2\n",
+        "\xEF\xBB\xBFv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2// 3/1 4//1\n",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n",
         // what no face has is not checked
         "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv nan 0\nv 1e31 0 0\nf 1 2 3 4\n",
     };
     for (size_t i = 0; i < COUNT_OF(texts); i++) {
         for (int ends = 0; ends < 3; ends++) {
             Text text = text_with_line_ends(texts[i], ends);
-            assert_unit_square(text_c(&text));
+            assert_unit_square(text_c(&text), "");
             text_free(&text);
         }
     }
+}
+
+TEST(short_faces_are_reported)
+{
+    const char *warning = "scene.yaml:4:18: warning: a.obj: faces of one or two corners are not shown\n";
+    assert_unit_square(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2// 3/1 4//1\nf 1 2\nf 3\n", warning);
+    assert_unit_square("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\nf 1 2\n", warning);
 }
 
 // The same position with other normals and texture coordinates is another vertex. The same of all is not.
@@ -517,7 +525,8 @@ TEST(faults_have_their_place)
         {CORNERS "f 1 2 3/1/1/1\n", "a.obj:4:7: error: '3/1/1/1' is not a corner of a face\n"},
         {CORNERS "f 1 2 3.5\n", "a.obj:4:7: error: '3.5' is not a corner of a face\n"},
         {CORNERS "f 1 2 -\n", "a.obj:4:7: error: '-' is not a corner of a face\n"},
-        {CORNERS "f 1 2\n", "scene.yaml:4:18: error: a.obj: no triangles\n"},
+        {CORNERS "f 1 2\n", "scene.yaml:4:18: warning: a.obj: faces of one or two corners are not shown\n"
+                            "scene.yaml:4:18: error: a.obj: no triangles\n"},
         {"", "scene.yaml:4:18: error: a.obj: no triangles\n"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); i++) {

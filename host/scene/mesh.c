@@ -193,11 +193,12 @@ const uint32_t *mesh_materials(const Mesh *mesh, const Object *object)
     return object->as.mesh.has_own_material ? NULL : mesh->materials;
 }
 
-void mesh_bound(Mesh *mesh)
+Bounds mesh_vertex_bounds(const Mesh *mesh)
 {
-    mesh->bounds = bounds_empty();
+    Bounds bounds = bounds_empty();
     for (size_t i = 0; i < mesh->vertex_count; i++)
-        mesh->bounds = bounds_join(mesh->bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+        bounds = bounds_join(bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
+    return bounds;
 }
 
 Bounds instance_bounds(const Mesh *mesh, const Object *object)

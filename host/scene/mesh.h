@@ -20,8 +20,8 @@ typedef struct {
 MeshTriangle mesh_triangle_at(const Mesh *mesh, const Object *object, size_t part);
 // Returns the materials of the object's triangles, or NULL if all have the object's.
 const uint32_t *mesh_materials(const Mesh *mesh, const Object *object);
-// Sets the bounds, as instances need them.
-void mesh_bound(Mesh *mesh);
+// Returns the bounds of the vertices.
+Bounds mesh_vertex_bounds(const Mesh *mesh);
 // Returns a box around the instance's box.
 Bounds instance_bounds(const Mesh *mesh, const Object *object);
 

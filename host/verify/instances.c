@@ -36,7 +36,7 @@ static Mesh ball_make(void)
             }
             mesh.triangle_count++;
         }
-    mesh_bound(&mesh);
+    mesh.bounds = mesh_vertex_bounds(&mesh);
     return mesh;
 }
 

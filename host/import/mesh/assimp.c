@@ -226,8 +226,8 @@ static void vertices_add(MeshDraft *draft, const struct aiMesh *from, const Affi
     const struct aiVector3D *uvs = from->mTextureCoords[material ? material->uv_set : 0];
     struct aiUVTransform change = {.mScaling = {1, 1}};
     if (material && material->texture > 0) change = material->uv_transform;
-    if (from->mNormals) draft_share_part(draft, DRAFT_NORMAL, draft->positions.count);
-    if (uvs) draft_share_part(draft, DRAFT_UV, draft->positions.count);
+    if (from->mNormals) draft_share_part(draft, DRAFT_NORMAL);
+    if (uvs) draft_share_part(draft, DRAFT_UV);
     for (unsigned i = 0; i < from->mNumVertices; i++) {
         array_push(draft->positions, affine_point(affine, vector_of(&from->mVertices[i])));
         if (from->mNormals)
@@ -370,9 +370,7 @@ static bool file_add(Importer *importer)
     const bool added =
         !importer->file->mRootNode || node_add(importer, importer->file->mRootNode, &affine_identity);
     free(importer->materials);
-    for (DraftPart part = DRAFT_UV; part <= DRAFT_NORMAL; part++)
-        if (importer->draft->is_shared[part])
-            draft_share_part(importer->draft, part, importer->draft->positions.count);
+    draft_fill_parts(importer->draft);
     return added;
 }
 

@@ -92,13 +92,18 @@ void draft_drop_missing(MeshDraft *draft)
     indices_drop(draft, DRAFT_NORMAL);
 }
 
-void draft_share_part(MeshDraft *draft, DraftPart part, size_t count)
+void draft_fill_parts(MeshDraft *draft)
+{
+    while (draft->is_shared[DRAFT_NORMAL] && draft->normals.count < draft->positions.count)
+        array_push(draft->normals, ((Vector3){0, 0, 0}));
+    while (draft->is_shared[DRAFT_UV] && draft->uvs.count < draft->positions.count)
+        draft_add_uv(draft, 0, 0);
+}
+
+void draft_share_part(MeshDraft *draft, DraftPart part)
 {
     draft->is_shared[part] = true;
-    while (part == DRAFT_NORMAL && draft->normals.count < count)
-        array_push(draft->normals, ((Vector3){0, 0, 0}));
-    while (part == DRAFT_UV && draft->uvs.count < count)
-        draft_add_uv(draft, 0, 0);
+    draft_fill_parts(draft);
 }
 
 static bool is_absolute(const char *path)
@@ -140,8 +145,7 @@ static uint32_t texture_add(MeshDraft *draft, const char *path, TextureContent c
 
 uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent content, const char *owner)
 {
-    const SceneOptions *options = draft->import->options;
-    if (options && options->file_named) options->file_named(options->context, path);
+    scene_file_named(draft->import->options, path);
     const char *obstacle = file_obstacle(path);
     if (!obstacle && image_is_known(path)) return texture_add(draft, path, content, owner);
     draft_warn(draft, "%s: cannot read '%.100s': %s: %s", owner, path,
@@ -170,6 +174,9 @@ bool draft_end_face(MeshDraft *draft, size_t offset)
     if (count > DRAFT_POLYGON_MAX)
         return draft_fails(draft, offset, "a face of %zu corners; %d is the most", count, DRAFT_POLYGON_MAX);
     if (count < 3) {
+        if (count > 0 && !draft->has_short_faces)
+            draft_warn(draft, "faces of one or two corners are not shown");
+        draft->has_short_faces |= count > 0;
         for (int part = 0; part < DRAFT_PART_COUNT; part++)
             if (draft->corners[part].count > first) draft->corners[part].count = first;
         return true;

@@ -60,6 +60,7 @@ typedef struct {
     size_t first_index;   // the first index in the file, 0 or 1, for messages
     size_t face_start;    // the first corner of the face that is being added
     size_t crossed_count; // polygons that cross themselves, for a warning
+    bool has_short_faces; // whether faces of one or two corners were warned of
 } MeshDraft;
 
 extern const char *const draft_part_names[DRAFT_PART_COUNT];
@@ -75,9 +76,11 @@ size_t draft_part_count(const MeshDraft *draft, DraftPart part);
 // Starts a part's list, with DRAFT_NONE for all corners before `corner`.
 void draft_begin_part(MeshDraft *draft, DraftPart part, size_t corner);
 void draft_record_index(MeshDraft *draft, DraftPart part, size_t index, size_t offset);
-// Makes the part share the indices of the positions, and adds a value of 0 for each of the first `count`
-// positions that has none. A reader calls it before it adds values and after the last position.
-void draft_share_part(MeshDraft *draft, DraftPart part, size_t count);
+// Makes the part share the indices of the positions, and adds a value of 0 for each position that has none.
+// A reader calls it before it adds positions with values.
+void draft_share_part(MeshDraft *draft, DraftPart part);
+// Adds a value of 0 to shared parts for each position that has none.
+void draft_fill_parts(MeshDraft *draft);
 
 // Drops the indices of texture coordinates and normals that the file lacks, with a warning. Removes a part
 // that has no remaining index.
@@ -128,7 +131,8 @@ uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent co
 uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, TextureContent content,
                                     const char *owner);
 
-// Ends the face, which consists of the corners since the last face. Skips points and lines. Returns false if
+// Ends the face, which consists of the corners since the last face. Skips points and lines, and
+// warns of them once. Returns false if
 // there are too many corners.
 bool draft_end_face(MeshDraft *draft, size_t offset);
 

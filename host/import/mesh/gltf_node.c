@@ -100,8 +100,8 @@ static void vertices_add(MeshDraft *draft, const Vertices *vertices, const GltfM
     static const double plain[2][3] = {{1, 0, 0}, {0, 1, 0}};
     const double(*rows)[3] = material ? material->texture.uv_rows : plain;
     const Affine for_normals = affine_for_normals(affine);
-    if (vertices->normals.count > 0) draft_share_part(draft, DRAFT_NORMAL, vertices->first);
-    if (vertices->uvs.count > 0) draft_share_part(draft, DRAFT_UV, vertices->first);
+    if (vertices->normals.count > 0) draft_share_part(draft, DRAFT_NORMAL);
+    if (vertices->uvs.count > 0) draft_share_part(draft, DRAFT_UV);
     for (size_t i = 0; i < vertices->positions.count; i++)
         array_push(draft->positions, affine_point(affine, vector_at(&vertices->positions, i)));
     for (size_t i = 0; i < vertices->normals.count; i++) {
@@ -332,7 +332,6 @@ bool gltf_scene_read(Gltf *gltf)
     } else {
         read = false;
     }
-    for (DraftPart part = DRAFT_UV; part <= DRAFT_NORMAL; part++)
-        if (draft->is_shared[part]) draft_share_part(draft, part, draft->positions.count);
+    draft_fill_parts(draft);
     return read;
 }

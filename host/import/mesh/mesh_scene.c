@@ -3,26 +3,12 @@
 #include "host/base/memory.h"
 #include "host/import/mesh/mesh_import.h"
 #include "host/import/number.h"
-#include "host/scene/bounds.h"
 
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
 static const double gray = 0.18; // of the background
-
-static Bounds mesh_bounds(const Mesh *mesh)
-{
-    Bounds bounds = bounds_empty();
-    for (size_t i = 0; i < mesh->vertex_count; i++)
-        bounds = bounds_join(bounds, (Bounds){mesh->vertices[i], mesh->vertices[i]});
-    return bounds;
-}
-
-static Vector3 mesh_center(const Mesh *mesh)
-{
-    return bounds_center(mesh_bounds(mesh));
-}
 
 // Returns the upward direction, which is z in STL by custom and y in other formats.
 static Vector3 upward(const char *path)
@@ -82,17 +68,15 @@ static bool light_is_sound(const Light *light)
            (light->type != LIGHT_SPOT || has_cone);
 }
 
-// Clears fading factors that are negative, out of range or all zero.
-static void fading_check(Light *light)
+// Clears fading factors that are all zero, negative or out of range. Returns false in the latter two cases.
+static bool fading_check(Light *light)
 {
-    double sum = 0;
-    bool is_sound = light->type != LIGHT_DIRECTIONAL;
-    for (int i = 0; i < 3; i++) {
-        sum += light->fading[i];
-        is_sound = is_sound && light->fading[i] >= 0 && light->fading[i] <= NUMBER_MAX;
-    }
-    if (!is_sound || sum == 0) memset(light->fading, 0, sizeof light->fading);
+    const Vector3 fading = {light->fading[0], light->fading[1], light->fading[2]};
+    const bool is_sound =
+        vector_is_within(fading, NUMBER_MAX) && vector_is_zero(vector_min(fading, vector_all(0)));
+    if (!is_sound || light->type == LIGHT_DIRECTIONAL) memset(light->fading, 0, sizeof light->fading);
     light_fold_fading(light);
+    return is_sound || light->type == LIGHT_DIRECTIONAL;
 }
 
 // Returns the largest channel of the light that arrives at a point, whose distance counts as at least
@@ -104,21 +88,32 @@ static double light_arriving(const Light *light, Vector3 point, double least)
     return vector_largest(light->color) / (light_fades(light) ? fmax(divisor, 1 / NUMBER_MAX) : 1);
 }
 
-// Adds the lights and scales them if they would make the image white or black.
-static void lights_add(Scene *scene, const MeshView *view, Report *report)
+// Adds the lights of a mesh with the bounds, and scales them if they would make the image white or black.
+static void lights_add(Scene *scene, const MeshView *view, Bounds bounds, Report *report)
 {
     const double brightest = 4, darkest = 0x1p-6;
-    const Bounds bounds = mesh_bounds(&scene->meshes.items[0]);
     const Vector3 center = bounds_center(bounds);
     const double radius = vector_length(vector_subtract(bounds.max, bounds.min)) / 2;
     double sum = 0;
+    size_t unsound_count = 0, unsound_fading_count = 0;
     for (size_t i = 0; i < view->lights.count; i++) {
         Light light = view->lights.items[i];
-        fading_check(&light);
-        if (!light_is_sound(&light)) continue;
+        unsound_fading_count += !fading_check(&light);
+        if (!light_is_sound(&light)) {
+            unsound_count++;
+            continue;
+        }
         array_push(scene->lights, light);
         sum += light_arriving(&light, center, light.type == LIGHT_DIRECTIONAL ? 0 : radius);
     }
+    if (unsound_fading_count > 0)
+        report_warning(report, MESSAGE_WHOLE_FILE,
+                       "lights whose attenuation is negative or too large, which do not fade: %zu",
+                       unsound_fading_count);
+    if (unsound_count > 0)
+        report_warning(report, MESSAGE_WHOLE_FILE,
+                       "lights without a direction or with a number out of range, not used: %zu",
+                       unsound_count);
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
     report_warning(
         report, MESSAGE_WHOLE_FILE,
@@ -137,27 +132,28 @@ static bool camera_is_sound(const Camera *camera)
            camera->frame_aspect <= NUMBER_MAX && camera->lens.radius == 0;
 }
 
-static void scene_show(Scene *scene, const MeshView *view, const char *path, Report *report)
+static void scene_show(Scene *scene, const MeshView *view, Vector3 up, Report *report)
 {
     const Mesh *mesh = &scene->meshes.items[0];
-    const Vector3 center = mesh_center(mesh);
+    const Bounds bounds = mesh_vertex_bounds(mesh);
     const bool has_camera = view->has_camera && camera_is_sound(&view->camera);
-    scene->camera = has_camera ? view->camera : camera_around(mesh, center, upward(path));
+    if (view->has_camera && !has_camera)
+        report_warning(report, MESSAGE_WHOLE_FILE,
+                       "the camera lacks a direction or has a number out of range: one frames the mesh");
+    scene->camera = has_camera ? view->camera : camera_around(mesh, bounds_center(bounds), up);
     scene->background = vector_all(gray);
-    lights_add(scene, view, report);
+    lights_add(scene, view, bounds, report);
     if (scene->lights.count == 0) lights_around(scene);
 }
 
 void scene_of_mesh(Scene *scene, Mesh *mesh)
 {
     const Material material = material_default();
-    *scene = (Scene){.background = vector_all(gray)};
+    *scene = (Scene){0};
     array_push(scene->meshes, *mesh);
     *mesh = (Mesh){0};
     scene_add_object(scene, (Object){.type = SHAPE_MESH}, &material);
-    const Mesh *own = &scene->meshes.items[0];
-    scene->camera = camera_around(own, mesh_center(own), (Vector3){0, 1, 0});
-    lights_around(scene);
+    scene_show(scene, &(MeshView){0}, (Vector3){0, 1, 0}, NULL);
 }
 
 bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options, MessageList *messages)
@@ -178,7 +174,7 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
         const Material material = material_default();
         scene->meshes.items[0].path = memory_copy_text(path);
         scene_add_object(scene, object, &material);
-        scene_show(scene, &view, path, &report);
+        scene_show(scene, &view, upward(path), &report);
     }
     free(view.lights.items);
     return scene_finish(scene, &report, options);

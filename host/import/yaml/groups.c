@@ -88,7 +88,8 @@ static Definition definition_move(YamlReader *reader, const YamlNode *key, size_
         Object *object = &definition.objects[i];
         *object = scene->objects.items[first_object + i];
         if (object->type != SHAPE_MESH || object->as.mesh.is_instance) continue;
-        mesh_bound(&scene->meshes.items[object->as.mesh.index]);
+        Mesh *mesh = &scene->meshes.items[object->as.mesh.index];
+        mesh->bounds = mesh_vertex_bounds(mesh);
         object->as.mesh.is_instance = true;
         object->as.mesh.transform = affine_identity;
     }
