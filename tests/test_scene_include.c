@@ -128,6 +128,19 @@ TEST(test_scene_has_precedence)
     scene_free(&scene);
 }
 
+// The values of an animation are the scene's, else those of the first file.
+TEST(test_animations_of_files)
+{
+    file_write("timing.yaml", "frames: 8\nfps: 30\nshutter: 0.5\n");
+    file_write("other.yaml", "frames: 9\nfps: 31\nshutter: 0.25\n");
+    write_forest("include: [parts/trees.yaml, timing.yaml, other.yaml]\nfps: 12\n");
+    Scene scene = scene_set("forest.yaml", NULL, 0);
+    assert_int_equal(scene.frame_count, 8);
+    assert_number(scene.frame_rate, 12);
+    assert_number(scene.shutter, 0.5);
+    scene_free(&scene);
+}
+
 TEST(test_hash_covers_the_files)
 {
     write_forest(FOREST);

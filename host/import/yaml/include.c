@@ -28,21 +28,18 @@ typedef struct {
     bool is_full; // more than FILES_MAX were named
 } Includes;
 
-// The keys of a scene that an included file may have. Collections are joined. Other values apply only if the
-// scene has none.
-enum { SECTION_COUNT = 9 };
+// The keys of a scene that an included file may have. Lists and mappings are joined. A YAML_SCALAR stands for
+// any value, which applies only if the scene has none.
 static const struct {
     const char *name;
-    bool is_joined;
     YamlType type;
-    const char *must; // be
-} sections[SECTION_COUNT] = {
-    {"camera", false, YAML_MAPPING, NULL},       {"background", false, YAML_MAPPING, NULL},
-    {"frames", false, YAML_SCALAR, NULL},        {"ambient", false, YAML_SCALAR, NULL},
-    {"lights", true, YAML_SEQUENCE, "a list"},   {"materials", true, YAML_MAPPING, "a mapping"},
-    {"define", true, YAML_MAPPING, "a mapping"}, {"objects", true, YAML_SEQUENCE, "a list"},
-    {"shutter", false, YAML_SCALAR, NULL},
+} sections[] = {
+    {"camera", YAML_SCALAR},    {"background", YAML_SCALAR}, {"frames", YAML_SCALAR},
+    {"fps", YAML_SCALAR},       {"shutter", YAML_SCALAR},    {"ambient", YAML_SCALAR},
+    {"lights", YAML_SEQUENCE},  {"materials", YAML_MAPPING}, {"define", YAML_MAPPING},
+    {"objects", YAML_SEQUENCE},
 };
+enum { SECTION_COUNT = COUNT_OF(sections) };
 
 // A mapping to which included files are added.
 typedef struct {
@@ -119,16 +116,19 @@ static void pair_join(const Includes *includes, Joined *joined, size_t section, 
 {
     YamlReader *reader = includes->reader;
     const uint32_t value = node_at(includes, key)->next, own = joined->values[section];
-    if (sections[section].is_joined && node_at(includes, value)->type != sections[section].type) {
-        expected_report(reader, sections[section].name, sections[section].must, node_at(includes, value));
+    const YamlType type = sections[section].type;
+    const bool is_joined = type != YAML_SCALAR;
+    if (is_joined && node_at(includes, value)->type != type) {
+        expected_report(reader, sections[section].name, type == YAML_SEQUENCE ? "a list" : "a mapping",
+                        node_at(includes, value));
     } else if (own == 0) {
         joined->values[section] = value;
-        if (sections[section].is_joined && node_at(includes, value)->child_count > 0) {
+        if (is_joined && node_at(includes, value)->child_count > 0) {
             yaml_children_unshare(&reader->tree, value);
             joined->joined[section] = last_child(includes, value);
         }
         pair_append(includes, joined, key);
-    } else if (sections[section].is_joined && node_at(includes, own)->type == sections[section].type) {
+    } else if (is_joined && node_at(includes, own)->type == type) {
         children_join(includes, joined, section, value);
     }
 }
