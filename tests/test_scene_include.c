@@ -135,9 +135,9 @@ TEST(test_animations_of_files)
     file_write("other.yaml", "frames: 9\nfps: 31\nshutter: 0.25\n");
     write_forest("include: [parts/trees.yaml, timing.yaml, other.yaml]\nfps: 12\n");
     Scene scene = scene_set("forest.yaml", NULL, 0);
-    assert_int_equal(scene.frame_count, 8);
-    assert_number(scene.frame_rate, 12);
-    assert_number(scene.shutter, 0.5);
+    assert_int_equal(scene.animation.frame_count, 8);
+    assert_number(scene.animation.frame_rate, 12);
+    assert_number(scene.animation.shutter, 0.5);
     scene_free(&scene);
 }
 

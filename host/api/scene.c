@@ -134,7 +134,7 @@ size_t glint_scene_light_count(const GlintScene *scene)
 
 uint32_t glint_scene_frame_count(const GlintScene *scene)
 {
-    return scene->scene.frame_count;
+    return scene->scene.animation.frame_count;
 }
 
 void glint_scene_image_size(const GlintScene *scene, uint32_t *width, uint32_t *height)

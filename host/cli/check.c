@@ -98,8 +98,8 @@ static void text_print(const char *path, const Scene *scene, const SceneFacts *f
     else
         printf("%g %g %g to %g %g %g", low.x, low.y, low.z, high.x, high.y, high.z);
     if (facts->unbounded_count > 0) printf(", plus %zu unbounded", facts->unbounded_count);
-    if (scene->frame_count > 0) printf("\n  frames     %" PRIu32, scene->frame_count);
-    if (scene->frame_rate > 0) printf("\n  fps        %g", scene->frame_rate);
+    if (scene->animation.frame_count > 0) printf("\n  frames     %" PRIu32, scene->animation.frame_count);
+    if (scene->animation.frame_rate > 0) printf("\n  fps        %g", scene->animation.frame_rate);
     printf("\n  features  ");
     for (unsigned i = 0; i < FEATURE_COUNT; i++) {
         if (!(facts->features >> i & 1)) continue;
@@ -150,8 +150,8 @@ static void json_report(const char *path, const Scene *scene, bool loaded, const
         json_count(json, "unbounded", facts.unbounded_count);
         json_count(json, "lights", scene->lights.count);
         json_count(json, "materials", scene->materials.count);
-        json_int64(json, "frames", scene->frame_count);
-        json_number(json, "fps", scene->frame_rate);
+        json_int64(json, "frames", scene->animation.frame_count);
+        json_number(json, "fps", scene->animation.frame_rate);
         if (bounds_is_empty(&facts.bounds)) {
             json_none(json, "bounds");
         } else {

@@ -51,7 +51,7 @@ static void scene_notes_add(ImageNotes *notes, const ImageOrigin *origin)
     Text *text = scene->overrides ? note_begin(notes, "Set") : NULL;
     for (const Source *set = scene->overrides; set; set = set->next)
         text_appendf(text, "%s%s", set->bytes, set->next ? "\n" : "");
-    if (scene->is_animated) text_appendf(note_begin(notes, "Frame"), "%g", scene->frame);
+    if (scene->animation.has_keys) text_appendf(note_begin(notes, "Frame"), "%g", scene->animation.frame);
 }
 
 typedef enum { NOTE_DEVICE, NOTE_DRIVER, NOTE_LANES, NOTE_KERNEL } DeviceNote;

@@ -266,7 +266,7 @@ static bool scene_advance(ImageRender *render)
     render->options->common.frame = shutter_frame(&render->shutter);
     const bool is_read =
         scene_open_once(render->scene, render->options->scene, &render->options->common, render->printed);
-    render->scene->frame = render->shutter.frame;
+    render->scene->animation.frame = render->shutter.frame;
     render->times->parse_seconds += clock_seconds() - start;
     return is_read;
 }
@@ -299,7 +299,7 @@ static int scene_render(ImageRender *render)
 {
     const RenderOptions *options = render->options;
     RenderDevices *open = render->open;
-    if (options->frame_count > 0 && !render->scene->is_animated && !open->has_warned_of_frames)
+    if (options->frame_count > 0 && !render->scene->animation.has_keys && !open->has_warned_of_frames)
         fprintf(stderr, "glint: warning: '%s' has no keys: all frames are alike\n", options->scene);
     open->has_warned_of_frames = true;
     stage_begin(render->times->stage, "opening the devices", NULL, 0);

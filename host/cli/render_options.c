@@ -148,8 +148,8 @@ static bool frames_count(RenderOptions *options)
     const bool is_read = scene_load(&scene, path, &scene_options, &messages);
     if (is_read) {
         message_list_free(&messages); // the warnings, which the first frame's scene repeats
-        options->frame_count = scene.frame_count;
-        if (scene.frame_count == 0)
+        options->frame_count = scene.animation.frame_count;
+        if (scene.animation.frame_count == 0)
             message_error(&messages, "--frames all: '%s' has no 'frames'; name them, such as 0-47", path);
         scene_free(&scene);
     }

@@ -10,10 +10,10 @@ enum { TIMES_MAX = 256 };
 
 Shutter shutter_open(const Scene *scene, uint32_t sample_count)
 {
-    const bool moves = scene->is_animated && scene->shutter > 0;
+    const bool moves = scene->animation.has_keys && scene->animation.shutter > 0;
     return (Shutter){.is_open = moves,
-                     .frame = scene->frame,
-                     .duration = scene->shutter,
+                     .frame = scene->animation.frame,
+                     .duration = scene->animation.shutter,
                      .sample_count = sample_count,
                      .time_count = !moves                     ? 1
                                    : sample_count < TIMES_MAX ? sample_count

@@ -106,7 +106,7 @@ static bool file_load(Scene *scene, const char *path, const SceneOptions *option
             scene->text_hash = hash_bytes(scene->text_hash, &scene->included.items[i].hash, sizeof(uint64_t));
         for (const Source *set = scene->overrides; set; set = set->next)
             scene->text_hash = hash_bytes(scene->text_hash, set->bytes, set->length + 1);
-        if (scene->is_animated)
+        if (scene->animation.has_keys)
             scene->text_hash = hash_bytes(scene->text_hash, &options->frame, sizeof options->frame);
     }
     text_free(&text);
@@ -130,11 +130,11 @@ static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *
     const bool is_read = file_load(&other, options->camera, &own, &found);
     if (is_read) {
         scene->camera = other.camera;
-        scene->is_animated |= other.is_animated;
-        scene->frame = options->frame;
-        if (scene->frame_count == 0) scene->frame_count = other.frame_count;
-        if (scene->frame_rate == 0) scene->frame_rate = other.frame_rate;
-        if (!scene->has_shutter) scene->shutter = other.shutter;
+        scene->animation.has_keys |= other.animation.has_keys;
+        scene->animation.frame = options->frame;
+        if (scene->animation.frame_count == 0) scene->animation.frame_count = other.animation.frame_count;
+        if (scene->animation.frame_rate == 0) scene->animation.frame_rate = other.animation.frame_rate;
+        if (!scene->animation.has_shutter) scene->animation.shutter = other.animation.shutter;
         scene->text_hash = hash_bytes(scene->text_hash, &other.text_hash, sizeof other.text_hash);
         const IncludedFile file = {memory_copy_text(options->camera), other.text_hash};
         array_push(scene->included, file);

@@ -292,6 +292,15 @@ enum { SKY_CELL_ROWS = 128, SKY_CELL_COLUMNS = 128 };
 typedef enum { COLORS_LINEAR, COLORS_DISPLAY } ColorMeaning;
 
 typedef struct {
+    bool has_keys;        // values depend on the frame
+    uint32_t frame_count; // 0: not given
+    double frame_rate;    // frames per second; 0: not given
+    double frame;         // named by the options
+    double shutter;       // the part of the time to the next frame for which the shutter is open, 0 to 1
+    bool has_shutter;     // whether it is given
+} SceneAnimation;
+
+typedef struct {
     Camera camera;
     Color background, ambient;
     // The background of the directions along `up`, against it, and, by the cosine, of those in between;
@@ -321,13 +330,8 @@ typedef struct {
     ARRAY_OF(SceneTexture) textures;
     uint64_t text_hash; // of the bytes of all files and the overrides; hash_bytes
     ARRAY_OF(IncludedFile) included;
-    Source *overrides;    // what replaced values of the file, PATH=VALUE each, in order; NULL if none
-    bool is_animated;     // values depend on the frame
-    uint32_t frame_count; // of the animation; 0: not given
-    double frame_rate;    // its frames per second; 0: not given
-    double frame;         // named by the options
-    double shutter;       // the part of the time to the next frame for which the shutter is open, 0 to 1
-    bool has_shutter;     // whether it is given
+    Source *overrides; // what replaced values of the file, PATH=VALUE each, in order; NULL if none
+    SceneAnimation animation;
     ColorMeaning color_meaning;
     unsigned width, height; // the file's own image size, or 0
 } Scene;

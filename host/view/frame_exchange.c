@@ -227,8 +227,8 @@ void scene_publish(FrameLoop *loop)
                               (update->frame == loop->scene_frame && !cameras_equal(&update->camera, camera));
     update->camera = *camera;
     update->frame = loop->scene_frame;
-    update->frame_count = can_reread ? loop->scene.frame_count : 0;
-    update->frame_rate = loop->scene.frame_rate;
+    update->frame_count = can_reread ? loop->scene.animation.frame_count : 0;
+    update->frame_rate = loop->scene.animation.frame_rate;
     shared->has_update = true;
     shared->scene_state = SCENE_LOADED;
     shared->scene_size = size;

@@ -166,8 +166,8 @@ static bool value_animate(YamlReader *reader, uint32_t index)
         YamlNode value = *node_at(reader, keys_value(reader, &keys, animation.ease, reader->options->frame));
         value.next = node_at(reader, index)->next;
         reader->tree.nodes.items[index] = value;
-        reader->scene->is_animated = true;
-        reader->scene->frame = reader->options->frame;
+        reader->scene->animation.has_keys = true;
+        reader->scene->animation.frame = reader->options->frame;
     }
     free(keys.items);
     return is_read;

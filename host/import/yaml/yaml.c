@@ -123,8 +123,7 @@ static bool read_frames(YamlReader *reader, const Field *field, const YamlNode *
 typedef struct {
     Background background;
     Color ambient;
-    uint32_t frame_count;
-    double frame_rate, shutter;
+    SceneAnimation animation;
     const YamlNode *camera, *lights, *materials, *definitions, *objects;
 } Document;
 
@@ -135,9 +134,9 @@ static void document_read(YamlReader *reader)
     static const Field fields[] = {
         {"include", read_include, 0},
         {"camera", read_node, offsetof(Document, camera)},
-        {"frames", read_frames, offsetof(Document, frame_count), OPTIONAL, &range_frames},
-        {"fps", read_number, offsetof(Document, frame_rate), OPTIONAL, &range_frame_rate},
-        {"shutter", read_number, offsetof(Document, shutter), OPTIONAL, &range_unit},
+        {"frames", read_frames, offsetof(Document, animation.frame_count), OPTIONAL, &range_frames},
+        {"fps", read_number, offsetof(Document, animation.frame_rate), OPTIONAL, &range_frame_rate},
+        {"shutter", read_number, offsetof(Document, animation.shutter), OPTIONAL, &range_unit},
         {"background", read_background, offsetof(Document, background)},
         {"ambient", read_strength, offsetof(Document, ambient)},
         {"lights", read_node, offsetof(Document, lights)},
@@ -145,13 +144,11 @@ static void document_read(YamlReader *reader)
         {"define", read_node, offsetof(Document, definitions)},
         {"objects", read_node, offsetof(Document, objects)},
     };
-    Document document = {.ambient = vector_all(NAN), .shutter = NAN};
+    Document document = {.ambient = vector_all(NAN), .animation = reader->scene->animation};
     const YamlNode *root = reader->tree.nodes.items;
     fields_read(reader, root, "scene", fields, COUNT_OF(fields), &document);
-    reader->scene->frame_count = document.frame_count;
-    reader->scene->frame_rate = document.frame_rate;
-    reader->scene->has_shutter = !isnan(document.shutter);
-    if (reader->scene->has_shutter) reader->scene->shutter = document.shutter;
+    document.animation.has_shutter = field_node(reader, root, "shutter") != root;
+    reader->scene->animation = document.animation;
     yaml_set_background(reader, &document.background, document.ambient);
     if (document.camera)
         yaml_read_camera(reader, document.camera);
