@@ -28,6 +28,8 @@ typedef long scalar_integer;
 #define REAL_BASE        double
 #define INTEGER_BASE     long
 #define UNIT_ROUNDOFF    0x1p-53
+#define EXPONENT_SHIFT   52
+#define BITS_OF_ONE      0x3ff0000000000000L
 #define INFINITY_BITS    0x7ff0000000000000L
 #define LARGEST          DBL_MAX
 #define INTEGER_MAX      0x7fffffffffffffffL
@@ -40,6 +42,8 @@ typedef int scalar_integer;
 #define REAL_BASE        float
 #define INTEGER_BASE     int
 #define UNIT_ROUNDOFF    0x1p-24f
+#define EXPONENT_SHIFT   23
+#define BITS_OF_ONE      0x3f800000
 #define INFINITY_BITS    0x7f800000
 #define LARGEST          FLT_MAX
 #define INTEGER_MAX      0x7fffffff
@@ -86,7 +90,7 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define unsigned_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
 #define integer_from_unsigned LANES_AS(INTEGER_BASE)
 
-// The tile of a packet (types.h), and the position of each lane in it.
+// The tile of a packet (types.h), the position of each lane in it, and its bit in a mask as bits.
 #define TILE_WIDTH              TILE_WIDTH_OF(LANES)
 #define TILE_HEIGHT             TILE_HEIGHT_OF(LANES)
 #define MACRO_TILE_COLUMNS      MACRO_TILE_COLUMNS_OF(LANES)
@@ -101,14 +105,17 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define LANE_X ((integer)(0))
 #define LANE_Y ((integer)(0))
 #elif LANES == 4
-#define LANE_X ((integer)(0, 1, 0, 1))
-#define LANE_Y ((integer)(0, 0, 1, 1))
+#define LANE_X   ((integer)(0, 1, 0, 1))
+#define LANE_Y   ((integer)(0, 0, 1, 1))
+#define LANE_BIT ((integer)(1, 2, 4, 8))
 #elif LANES == 8
-#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
-#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
+#define LANE_X   ((integer)(0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y   ((integer)(0, 0, 0, 0, 1, 1, 1, 1))
+#define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128))
 #elif LANES == 16
-#define LANE_X ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
-#define LANE_Y ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
+#define LANE_X   ((integer)(0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3))
+#define LANE_Y   ((integer)(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3))
+#define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
 #endif
 
 // Marks a rare branch, so that the compiler keeps its values out of registers.
@@ -147,80 +154,46 @@ typedef union {
     scalar_integer each[LANES];
 } IntegerLanes;
 
-#if LANES == 4
-#define LANE_BIT ((integer)(1, 2, 4, 8))
-#elif LANES == 8
-#define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128))
-#elif LANES == 16
-#define LANE_BIT ((integer)(1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 1024, 2048, 4096, 8192, 16384, 32768))
+#ifndef __has_builtin
+#define __has_builtin(name) 0
 #endif
 
-// clang for a CPU has reductions that take few instructions, while halving written out takes several times as
-// many. clang for SPIR may lack them.
-#if defined(__x86_64__) || defined(__aarch64__)
-#if defined(__has_builtin)
-#if __has_builtin(__builtin_reduce_or) && __has_builtin(__builtin_reduce_min)
+// clang for a CPU has reductions that take few instructions. clang for SPIR may lack them.
+#if (defined(__x86_64__) || defined(__aarch64__)) && __has_builtin(__builtin_reduce_or) &&                   \
+    __has_builtin(__builtin_reduce_min)
 #define IS_CPU_CLANG 1
-#endif
-#endif
-#endif
-#ifndef IS_CPU_CLANG
+#else
 #define IS_CPU_CLANG 0
 #endif
 
+static inline bool lanes_any(mask condition)
+{
 #if LANES == 1
-static inline bool lanes_any(mask condition)
-{
     return condition != 0;
-}
-
-static inline scalar_integer lanes_smallest(integer value)
-{
-    return value;
-}
 #elif IS_CPU_CLANG
-static inline bool lanes_any(mask condition)
-{
     return __builtin_reduce_or(condition != (mask)(0)) != 0;
+#else
+    return any(condition);
+#endif
 }
 
+// Returns the smallest lane.
 static inline scalar_integer lanes_smallest(integer value)
 {
+#if LANES > 1 && IS_CPU_CLANG
     return __builtin_reduce_min(value);
-}
 #else
-static inline bool lanes_any(mask condition)
-{
-#if LANES == 16
-    JOIN(INTEGER_BASE, 8) eight = condition.lo | condition.hi;
-    JOIN(INTEGER_BASE, 4) four = eight.lo | eight.hi;
-#elif LANES == 8
-    JOIN(INTEGER_BASE, 4) four = condition.lo | condition.hi;
-#else
-    JOIN(INTEGER_BASE, 4) four = condition;
+    IntegerLanes lanes = {value};
+    scalar_integer least = lanes.each[0];
+    for (uint lane = 1; lane < LANES; lane++)
+        least = min(least, lanes.each[lane]);
+    return least;
 #endif
-    JOIN(INTEGER_BASE, 2) two = four.lo | four.hi;
-    return (two.x | two.y) != 0;
 }
-
-static inline scalar_integer lanes_smallest(integer value)
-{
-#if LANES == 16
-    JOIN(INTEGER_BASE, 8) eight = min(value.lo, value.hi);
-    JOIN(INTEGER_BASE, 4) four = min(eight.lo, eight.hi);
-#elif LANES == 8
-    JOIN(INTEGER_BASE, 4) four = min(value.lo, value.hi);
-#else
-    JOIN(INTEGER_BASE, 4) four = value;
-#endif
-    JOIN(INTEGER_BASE, 2) two = min(four.lo, four.hi);
-    return min(two.x, two.y);
-}
-#endif
 
 // clang's builtin for the x86 instruction that packs a mask into bits. The fallback below takes about ten
 // instructions.
-#if defined(__x86_64__) && defined(__has_builtin)
+#ifdef __x86_64__
 #if __clang_major__ >= 18 && __clang_major__ <= 20 && !defined(__EVEX512__)
 // these need EVEX512 for vectors of 512 bits
 #elif LANES == 16 && !IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_cvtd2mask512)
@@ -234,8 +207,7 @@ static inline scalar_integer lanes_smallest(integer value)
 #endif
 #endif
 
-// Estimates of 1 / a and 1 / sqrt(a) with a relative error of at most 2^-14. MASK_BITS implies that the
-// compiler knows __has_builtin.
+// Estimates of 1 / a and 1 / sqrt(a) with a relative error of at most 2^-14.
 #ifdef MASK_BITS
 #if LANES == 16 && __has_builtin(__builtin_ia32_rcp14ps512_mask)
 #define RECIPROCAL_14_BITS(a)   __builtin_ia32_rcp14ps512_mask(a, a, 0xffff)
@@ -249,12 +221,12 @@ static inline scalar_integer lanes_smallest(integer value)
 // Returns floor(a), by one instruction if the processor has it. PoCL's floor takes ten.
 static inline real real_floor(real a)
 {
-#if IS_CPU_CLANG && LANES > 1 && (defined(__SSE4_1__) || defined(__aarch64__))
-#if __has_builtin(__builtin_elementwise_floor)
+#if IS_CPU_CLANG && LANES > 1 && (defined(__SSE4_1__) || defined(__aarch64__)) &&                            \
+    __has_builtin(__builtin_elementwise_floor)
     return __builtin_elementwise_floor(a);
-#endif
-#endif
+#else
     return floor(a);
+#endif
 }
 
 // Returns the mask as bits, with lane 0 lowest.

@@ -15,51 +15,42 @@
 // nothing overflows or underflows, brought within an ulp by a Newton step, then chosen among three neighbors
 // by exact comparisons. A Newton step alone does not suffice, because the root of 1 - 2^-24 lies 2^-27 ulp
 // from the midpoint of two floats.
-//
-// FLOAT_… and float_… assume the bit patterns of floats.
-#define FLOAT_EXPONENT_BITS ((integer)(0x7f800000))
-#define FLOAT_SIGN_BIT      ((integer)(~0x7fffffff))
-#define FLOAT_BITS_OF_ONE   ((integer)(0x3f800000))
-
 static inline mask float_is_normal(real a)
 {
     return (fabs(a) >= (real)(0x1p-126f)) & (fabs(a) <= (real)(LARGEST));
 }
 
-static inline real float_power_of_two(integer exponent)
+static inline real real_power_of_two(integer exponent)
 {
-    return real_from_bits(FLOAT_BITS_OF_ONE + (exponent << 23));
+    return real_from_bits((integer)(BITS_OF_ONE) + (exponent << EXPONENT_SHIFT));
 }
 
-// Return the neighbors of a > 0.
-static inline real float_above(real a)
+// Returns the number `steps` numbers above a > 0.
+static inline real real_neighbor(real a, scalar_integer steps)
 {
-    return real_from_bits(bits_from_real(a) + (integer)(1));
-}
-
-static inline real float_below(real a)
-{
-    return real_from_bits(bits_from_real(a) - (integer)(1));
+    return real_from_bits(bits_from_real(a) + (integer)(steps));
 }
 
 // Returns the correctly rounded quotient. The remainder of a quotient within an ulp is exact, and so is its
 // comparison with half the gap to a neighbor.
 static inline real repaired_quotient(real a, real b)
 {
-    integer a_bits = bits_from_real(a), b_bits = bits_from_real(b);
-    a = real_from_bits((a_bits & MANTISSA) | FLOAT_BITS_OF_ONE);
-    b = real_from_bits((b_bits & MANTISSA) | FLOAT_BITS_OF_ONE);
+    const integer a_bits = bits_from_real(a), b_bits = bits_from_real(b), one = (integer)(BITS_OF_ONE),
+                  exponent_bits = (integer)(INFINITY_BITS), sign_bit = (integer)(~INTEGER_MAX);
+    a = real_from_bits((a_bits & MANTISSA) | one);
+    b = real_from_bits((b_bits & MANTISSA) | one);
     real quotient = device_divide(a, b);
     quotient = real_fma(real_fma(-quotient, b, a), device_divide((real)(1), b), quotient);
     real residual = real_fma(-quotient, b, a), half_b = (real)(0.5f) * b;
-    real up = float_above(quotient), down = float_below(quotient);
+    real up = real_neighbor(quotient, 1), down = real_neighbor(quotient, -1);
     mask rises = residual > (up - quotient) * half_b, falls = residual < (down - quotient) * half_b;
     quotient = lanes_select(rises, up, lanes_select(falls, down, quotient));
-    quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & FLOAT_SIGN_BIT));
+    quotient = real_from_bits(bits_from_real(quotient) | ((a_bits ^ b_bits) & sign_bit));
     // in two factors, because one alone may overflow where the product does not
-    integer exponent = ((a_bits & FLOAT_EXPONENT_BITS) >> 23) - ((b_bits & FLOAT_EXPONENT_BITS) >> 23);
+    integer exponent =
+        ((a_bits & exponent_bits) >> EXPONENT_SHIFT) - ((b_bits & exponent_bits) >> EXPONENT_SHIFT);
     integer half_exponent = exponent >> 1;
-    return quotient * float_power_of_two(half_exponent) * float_power_of_two(exponent - half_exponent);
+    return quotient * real_power_of_two(half_exponent) * real_power_of_two(exponent - half_exponent);
 }
 
 // Returns the correctly rounded root by Tuckerman's test, root (root - ulp) < a <= root (root + ulp)
@@ -67,13 +58,14 @@ static inline real repaired_quotient(real a, real b)
 // the IBM System/370, IBM Journal of Research and Development 30(2), 1986).
 static inline real repaired_root(real a)
 {
-    integer half_exponent = (bits_from_real(a) - FLOAT_BITS_OF_ONE) >> 24; // rounded down: a becomes 1 .. 4
-    a = real_from_bits(bits_from_real(a) - (half_exponent << 24));
+    // rounded down, so that a becomes 1 .. 4
+    integer half_exponent = (bits_from_real(a) - (integer)(BITS_OF_ONE)) >> (EXPONENT_SHIFT + 1);
+    a = real_from_bits(bits_from_real(a) - (half_exponent << (EXPONENT_SHIFT + 1)));
     real root = device_sqrt(a);
     root = real_fma(real_fma(-root, root, a), device_divide((real)(0.5f), root), root);
-    real up = float_above(root), down = float_below(root);
+    real up = real_neighbor(root, 1), down = real_neighbor(root, -1);
     mask rises = real_fma(-root, up, a) > (real)(0), falls = real_fma(-root, down, a) <= (real)(0);
-    return lanes_select(rises, up, lanes_select(falls, down, root)) * float_power_of_two(half_exponent);
+    return lanes_select(rises, up, lanes_select(falls, down, root)) * real_power_of_two(half_exponent);
 }
 
 // Returns a / b, correctly rounded at `strict` on every device, except for subnormal numbers. The repaired
@@ -146,12 +138,7 @@ static inline real real_sqrt(real a)
 // Returns the reciprocal of the largest power of two <= a, for a > 0, and a huge number for 0.
 static inline real real_inverse_power_of_two(real a)
 {
-#if IS_DOUBLE
-    return real_from_bits((integer)(0x7fe0000000000000L) -
-                          (bits_from_real(a) & (integer)(0x7ff0000000000000L)));
-#else
-    return real_from_bits((integer)(0x7f000000) - (bits_from_real(a) & (integer)(0x7f800000)));
-#endif
+    return real_from_bits((integer)(2 * BITS_OF_ONE) - (bits_from_real(a) & (integer)(INFINITY_BITS)));
 }
 
 // Returns a b - c d within 1.5 ulp, hence with the right sign (Jeannerod, Louvet, Muller, Further analysis of
@@ -178,11 +165,6 @@ static inline Pair fast_two_sum(real larger, real smaller)
     return (Pair){sum, smaller - (sum - larger)};
 }
 
-static inline Pair pair_negate(Pair a)
-{
-    return (Pair){-a.high, -a.low};
-}
-
 static inline Pair pair_add(Pair a, Pair b)
 {
     Pair high = two_sum(a.high, b.high);
@@ -193,7 +175,7 @@ static inline Pair pair_add(Pair a, Pair b)
 
 static inline Pair pair_subtract(Pair a, Pair b)
 {
-    return pair_add(a, pair_negate(b));
+    return pair_add(a, (Pair){-b.high, -b.low});
 }
 
 static inline Pair pair_multiply(Pair a, Pair b)
@@ -214,55 +196,54 @@ static inline Pair pair_difference_of_products(Pair a, Pair b, Pair c, Pair d)
     return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
 }
 
-// LN_2 + LN_2_REST is ln(2), and LOG2_E its reciprocal.
+// LN_2 + LN_2_REST is ln(2), LOG2_E its reciprocal, and ROOT_HALF_BITS are the bits of the root of 1/2. Below
+// EXP_LOWEST, real_exp_negative returns 0.
 #if IS_DOUBLE
-#define LN_2      0x1.62e42fefa39efp-1
-#define LN_2_REST 0x1.abc9e3b39803fp-56
-#define LOG2_E    0x1.71547652b82fep0
+#define LN_2           0x1.62e42fefa39efp-1
+#define LN_2_REST      0x1.abc9e3b39803fp-56
+#define LOG2_E         0x1.71547652b82fep0
+#define ROOT_HALF_BITS 0x3fe6a09e667f3bcdL
+#define EXP_LOWEST     (-708.0)
 #else
-#define LN_2      0x1.62e43p-1f
-#define LN_2_REST (-0x1.05c61p-29f)
-#define LOG2_E    0x1.715476p0f
+#define LN_2           0x1.62e43p-1f
+#define LN_2_REST      (-0x1.05c61p-29f)
+#define LOG2_E         0x1.715476p0f
+#define ROOT_HALF_BITS 0x3f3504f3
+#define EXP_LOWEST     (-87.0f)
 #endif
 
-// Returns ln(1 - s) for 0 <= s < 1 as -2 artanh(s / (2 - s)) after extracting the power of two, by its Taylor
-// series (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27). Small s keep all bits, which 1 - s
-// would lose.
+// Returns 1/3 + x/5 + x^2/7 + ..., the series of the logarithm and of the arctangent after their first terms
+// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27 and 4.4.42), up to 1/9 or, in double, to
+// one over `last`. In float the quotients are literals, since a device's may be inexact.
+static inline real series_of_odd_reciprocals(real x, scalar last)
+{
+#if IS_DOUBLE
+    real series = (real)(0);
+    for (scalar n = last; n >= 3; n -= 2)
+        series = real_fma(series, x, (real)(1.0 / n));
+#else
+    real series = real_fma(x, (real)(1.0f / 9), (real)(1.0f / 7));
+    series = real_fma(series, x, (real)(1.0f / 5));
+    series = real_fma(series, x, (real)(1.0f / 3));
+#endif
+    return series;
+}
+
+// Returns ln(1 - s) for 0 <= s < 1 as -2 artanh(s / (2 - s)), after extracting the power of two. Small s keep
+// all bits, which 1 - s would lose.
 static inline real real_log_complement(real s)
 {
     real rest = (real)(1) - s;
     // rest = 2^exponent m with m in [0.7, 1.4]; s <= 0.29 keeps exponent 0 and s itself
-#if IS_DOUBLE
-    integer exponent = (bits_from_real(rest) - (integer)(0x3fe6a09e667f3bcdL)) >> 52;
-    real m = real_from_bits(bits_from_real(rest) - (exponent << 52));
-#else
-    integer exponent = (bits_from_real(rest) - (integer)(0x3f3504f3)) >> 23;
-    real m = real_from_bits(bits_from_real(rest) - (exponent << 23));
-#endif
+    integer exponent = (bits_from_real(rest) - (integer)(ROOT_HALF_BITS)) >> EXPONENT_SHIFT;
+    real m = real_from_bits(bits_from_real(rest) - (exponent << EXPONENT_SHIFT));
     real f = lanes_select(exponent == (integer)(0), -s, m - (real)(1));
     real z = real_divide(f, (real)(2) + f);
-    real zz = z * z;
-    real series = (real)(0);
-#if IS_DOUBLE
-    for (scalar n = 23; n >= 3; n -= 2)
-        series = real_fma(series, zz, (real)(1.0 / n));
-#else
-    series = real_fma(zz, (real)(1.0f / 9), (real)(1.0f / 7));
-    series = real_fma(series, zz, (real)(1.0f / 5));
-    series = real_fma(series, zz, (real)(1.0f / 3));
-#endif
-    real two_z = z + z;
-    real log_m = real_fma(two_z * zz, series, two_z);
+    real zz = z * z, two_z = z + z;
+    real log_m = real_fma(two_z * zz, series_of_odd_reciprocals(zz, 23), two_z);
     real k = real_from_integer(exponent);
     return real_fma(k, (real)(LN_2), real_fma(k, (real)(LN_2_REST), log_m));
 }
-
-// Below this argument real_exp_negative returns 0.
-#if IS_DOUBLE
-#define EXP_LOWEST (-708.0)
-#else
-#define EXP_LOWEST (-87.0f)
-#endif
 
 // Returns e^x for x <= 0: 2^k times the Taylor series of the remainder, at most ln(2)/2 (Abramowitz, Stegun,
 // 4.2.1). Returns 0 if the result would be subnormal.
@@ -277,7 +258,6 @@ static inline real real_exp_negative(real x)
     series = (real)(1);
     for (scalar n = 13; n >= 1; n -= 1)
         series = real_fma(series, r * (real)(1 / n), (real)(1));
-    real power = real_from_bits((integer_from_real(k) + (integer)(1023)) << 52);
 #else
     series = real_fma(r, (real)(1.0f / 5040), (real)(1.0f / 720));
     series = real_fma(series, r, (real)(1.0f / 120));
@@ -286,9 +266,8 @@ static inline real real_exp_negative(real x)
     series = real_fma(series, r, (real)(0.5f));
     series = real_fma(series, r, (real)(1));
     series = real_fma(series, r, (real)(1));
-    real power = real_from_bits((integer_from_real(k) + (integer)(127)) << 23);
 #endif
-    return lanes_select(x < lowest, (real)(0), series * power);
+    return lanes_select(x < lowest, (real)(0), series * real_power_of_two(integer_from_real(k)));
 }
 
 // Returns (1 - s)^n for 0 <= s < 1 and n >= 0; at most 1.

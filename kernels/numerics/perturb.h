@@ -34,19 +34,15 @@ static inline unsigned_integer perturb_hash(uint operation, integer a, integer b
     return (hash ^ (hash >> HALF_WORD)) * HASH_MULTIPLIER;
 }
 
-// Returns a hashed number from -largest to largest.
-static inline integer perturb_steps(unsigned_integer hash, uint largest)
-{
-    return integer_from_unsigned(mul_hi(hash, (unsigned_integer)(2 * largest + 1))) - integer_of(largest);
-}
-
 // Moves the value by a hashed number of ulp, up to `largest`. Does not change 0 and values near underflow or
 // overflow.
 static inline real perturb(real value, unsigned_integer hash, uint largest)
 {
-    integer steps = perturb_steps(hash, largest * PERTURB_SCALE);
+    largest *= PERTURB_SCALE;
+    const unsigned_integer steps = mul_hi(hash, (unsigned_integer)(2 * largest + 1)); // 0 to 2 largest
     mask ordinary = (fabs(value) > (real)(SMALLEST_RATIO)) & (fabs(value) < (real)(1 / SMALLEST_RATIO));
-    return lanes_select(ordinary, real_from_bits(bits_from_real(value) + steps), value);
+    const integer moved = bits_from_real(value) + integer_from_unsigned(steps) - integer_of(largest);
+    return lanes_select(ordinary, real_from_bits(moved), value);
 }
 
 static inline real device_divide(real a, real b)
