@@ -1,11 +1,4 @@
 // Finds the closest hits of explicit rays.
 #define TRACES_BOUNCES 0
+#define TRACE_KERNEL   closest
 #include "trace.h"
-
-kernel void closest(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, global scalar *results,
-                    global int *objects_hit)
-{
-    Scene scene = SCENE_FROM_ARGUMENTS;
-    uint first = (uint)get_global_id(0) * LANES;
-    if (first < ray_count) rays_trace(&scene, first, rays, ray_count, results, objects_hit);
-}

@@ -1,5 +1,5 @@
-// Traces explicit rays. Finds the closest hit and, if TRACES_BOUNCES, the bounces there and the
-// transmittance along each ray.
+// Traces explicit rays by the kernel TRACE_KERNEL. Finds the closest hit and, if TRACES_BOUNCES, the bounces
+// there and the transmittance along each ray.
 #ifndef TRACE_H
 #define TRACE_H
 
@@ -81,6 +81,14 @@ static OUT_OF_LINE void rays_trace(const Scene *scene, uint first, global const 
             results[index * RESULTS + i] = result[i].each[lane];
         objects_hit[index] = (int)object.each[lane];
     }
+}
+
+kernel void TRACE_KERNEL(SCENE_ARGUMENTS, global const scalar *rays, uint ray_count, global scalar *results,
+                         global int *objects_hit)
+{
+    Scene scene = SCENE_FROM_ARGUMENTS;
+    uint first = (uint)get_global_id(0) * LANES;
+    if (first < ray_count) rays_trace(&scene, first, rays, ray_count, results, objects_hit);
 }
 
 #endif
