@@ -97,21 +97,17 @@ static inline integer tile_index(const Tile *tile)
 }
 
 // Stores one of `stride` values per pixel.
-static inline void film_store(global scalar *film, const Tile *tile, uint stride, uint channel, real value)
-{
-    RealLanes values = {value};
-    IntegerLanes inside = {tile->inside}, index = {tile_index(tile)};
-    for (uint lane = 0; lane < LANES; lane++)
-        if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = values.each[lane];
-}
-
-static inline void film_store_integer(global int *film, const Tile *tile, uint stride, uint channel,
-                                      integer value)
-{
-    IntegerLanes values = {value}, inside = {tile->inside}, index = {tile_index(tile)};
-    for (uint lane = 0; lane < LANES; lane++)
-        if (inside.each[lane]) film[(size_t)index.each[lane] * stride + channel] = (int)values.each[lane];
-}
+#define FILM_STORE(name, Stored, Value, ValueLanes)                                                          \
+    static inline void name(global Stored *film, const Tile *tile, uint stride, uint channel, Value value)   \
+    {                                                                                                        \
+        ValueLanes values = {value};                                                                         \
+        IntegerLanes inside = {tile->inside}, index = {tile_index(tile)};                                    \
+        for (uint lane = 0; lane < LANES; lane++)                                                            \
+            if (inside.each[lane])                                                                           \
+                film[(size_t)index.each[lane] * stride + channel] = (Stored)values.each[lane];               \
+    }
+FILM_STORE(film_store, scalar, real, RealLanes)
+FILM_STORE(film_store_integer, int, integer, IntegerLanes)
 
 // Shuffles each row of four lanes of two vectors. i, j, k and l are lanes of the first row, where LANES is
 // the second vector's first lane.
@@ -244,15 +240,13 @@ static inline void compensated_add(Vector *sum, Vector *lost, Vector added)
 
 static inline Vector film_load_color(global const scalar *film, const Tile *tile)
 {
-    RealLanes x = {(real)(0)}, y = x, z = x;
+    VectorLanes colors = vector_lanes_zero();
     IntegerLanes inside = {tile->inside}, index = {tile_index(tile)};
     for (uint lane = 0; lane < LANES; lane++) {
-        if (!inside.each[lane]) continue;
-        x.each[lane] = film[(size_t)index.each[lane] * 3];
-        y.each[lane] = film[(size_t)index.each[lane] * 3 + 1];
-        z.each[lane] = film[(size_t)index.each[lane] * 3 + 2];
+        global const scalar *pixel = film + (size_t)index.each[lane] * 3;
+        if (inside.each[lane]) vector_lanes_set(&colors, lane, (scalar4)(pixel[0], pixel[1], pixel[2], 0));
     }
-    return (Vector){x.all, y.all, z.all};
+    return vector_of_lanes(&colors);
 }
 
 #endif
