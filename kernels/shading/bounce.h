@@ -66,13 +66,11 @@ static inline Bounces bounces_none(const Ray *ray, uint depth)
 
 static inline Color3 conductor_reflectance(const Surface *surface, Vector direction)
 {
-    const real one = (real)(1), zero = (real)(0);
-    real cosine = real_clamp(-vector_dot(direction, surface->shading_normal), zero, one);
-    real cosine_squared = cosine * cosine, sine_squared = one - cosine_squared;
+    real cosine = real_clamp(-vector_dot(direction, surface->shading_normal), (real)(0), (real)(1));
     Color3 index_real = surface->conductor_real, squared = surface->conductor_imaginary_squared;
-    return (Color3){conductor_channel(cosine, cosine_squared, sine_squared, index_real.x, squared.x),
-                    conductor_channel(cosine, cosine_squared, sine_squared, index_real.y, squared.y),
-                    conductor_channel(cosine, cosine_squared, sine_squared, index_real.z, squared.z)};
+    return (Color3){conductor_channel(cosine, index_real.x, squared.x),
+                    conductor_channel(cosine, index_real.y, squared.y),
+                    conductor_channel(cosine, index_real.z, squared.z)};
 }
 
 // Reflects a direction at the shading normal, or at the geometric one if the former would send the ray

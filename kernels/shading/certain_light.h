@@ -78,20 +78,8 @@ static inline real light_color_error(const Surface *surface, const LightRay *to_
     return real_fma(real_fma(brightest, largest, shiny), errors->strength + COLOR_ROUNDING, error);
 }
 
-// Returns the bounds of a directional light, which those of other lights extend.
-static inline LightErrors light_errors(const Light *light, const Surface *surface)
-{
-    LightErrors errors;
-    errors.place = surface->place_error;
-    if (HAS_SMOOTH_NORMALS) errors.place = errors.place + surface->lift_error;
-    errors.angle = DIRECTION_ROUNDING;
-    errors.strength = (real)(0);
-    errors.brightest = (real)(light->color.w);
-    errors.far_off = errors.skips_culling = mask_none();
-    return errors;
-}
-
-// Extends the bounds to those of a light at a distance, a point or spot light, at which its shadow ray ends.
+// Extends the bounds of a directional light to those of a light at a distance, a point or spot light, at
+// which its shadow ray ends.
 static inline void light_add_distance_errors(const Light *light, const Surface *surface, LightRay *to_light,
                                              LightErrors *errors)
 {
@@ -197,7 +185,9 @@ static inline mask light_set_errors(const Light *light, const Surface *surface, 
                                     LightVisibility *visibility)
 {
     Ray *shadow_ray = &to_light->shadow_ray;
-    LightErrors errors = light_errors(light, surface);
+    LightErrors errors = {
+        .place = surface->place_error, .angle = DIRECTION_ROUNDING, .brightest = (real)(light->color.w)};
+    if (HAS_SMOOTH_NORMALS) errors.place = errors.place + surface->lift_error;
     if (!light_is_directional(light)) light_add_distance_errors(light, surface, to_light, &errors);
     errors.facing = surface->normal_error + errors.angle;
     shadow_ray->direction_error = (real)(2 * UNIT_ROUNDOFF);

@@ -62,15 +62,6 @@ static inline void surface_set_line_error(Surface *surface, const SurfacePoint *
     surface->start_error = lanes_select(flat, surface->start_error, (real)(0));
 }
 
-// Sets the chord's end where rays hit a sphere.
-static inline void surface_set_chord_end(Surface *surface, const Sphere *sphere, const Ray *ray,
-                                         const Hit *hit, const LaneSurfacePoints *found)
-{
-    ChordEnd end = chord_end(sphere, ray, hit, found->point.position, found->lanes);
-    real_replace(&surface->place_error, found->lanes, real_min(surface->place_error, end.place));
-    surface->chord_end = chord_end_select(found->lanes, end, surface->chord_end);
-}
-
 // Sets the bounds of the lanes that hit one object, for their position and for their point's normal.
 static inline void surface_set_point_errors(Surface *surface, LaneSurfacePoints *found, const Scene *scene,
                                             const Ray *ray, const Hit *hit)
@@ -80,7 +71,9 @@ static inline void surface_set_point_errors(Surface *surface, LaneSurfacePoints 
     point->position = ray_point(ray, hit->t);
     if (HAS_CHORDS && found->entry.x == TYPE_SPHERES) {
         Sphere sphere = scene->spheres[found->entry.y];
-        surface_set_chord_end(surface, &sphere, ray, hit, found);
+        const ChordEnd end = chord_end(&sphere, ray, hit, point->position, found->lanes);
+        real_replace(&surface->place_error, found->lanes, real_min(surface->place_error, end.place));
+        surface->chord_end = chord_end_select(found->lanes, end, surface->chord_end);
     }
     shape_set_errors(scene, found, ray, hit->t, surface->place_error);
     if (!HAS_TRIANGLES || found->entry.x != TYPE_TRIANGLES)

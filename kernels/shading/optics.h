@@ -47,10 +47,10 @@ static inline real fresnel_reflectance(Vector direction, Vector normal, mask ent
 // (a^2 + b^2 - 2 a c + c^2) / (a^2 + b^2 + 2 a c + c^2), and along it that times
 // (c^2 (a^2 + b^2) - 2 a c s^2 + s^4) / (c^2 (a^2 + b^2) + 2 a c s^2 + s^4) (Born, Wolf, section 14.2). The
 // smaller of a^2 and b^2 is computed from their product, which does not cancel.
-static inline real conductor_channel(real cosine, real cosine_squared, real sine_squared, real index_real,
-                                     real index_imaginary_squared)
+static inline real conductor_channel(real cosine, real index_real, real index_imaginary_squared)
 {
     const real zero = (real)(0), one_half = (real)(0.5f);
+    const real cosine_squared = cosine * cosine, sine_squared = (real)(1) - cosine_squared;
     real difference = index_real - sine_squared;                                     // a^2 - b^2
     real sum = real_sqrt(real_fma(difference, difference, index_imaginary_squared)); // a^2 + b^2
     real larger = one_half * (sum + fabs(difference));

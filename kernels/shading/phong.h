@@ -15,12 +15,6 @@ static inline real highlight_power(mask wanted, real s, real shininess)
     return lanes_select(shininess == (real)(0), (real)(1), highlight);
 }
 
-// Returns max(0, cos)^shininess of the angle between two unit vectors, for the lanes in `wanted`.
-static inline real phong_highlight(mask wanted, Vector reflected, Vector to_eye, real shininess)
-{
-    return highlight_power(wanted, cosine_complement(reflected, to_eye), shininess);
-}
-
 // Returns the light's direction mirrored by the shading normal.
 static inline Vector light_mirrored(const Surface *surface, const LightRay *light)
 {
@@ -34,8 +28,9 @@ static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_li
     Color3 color = vector_scale(surface->diffuse, to_light->facing);
     mask glossy = lit & (surface->specular > (real)(0));
     if (!lanes_any(glossy)) return color;
-    real highlight = surface->specular * phong_highlight(glossy, light_mirrored(surface, to_light),
-                                                         surface->to_eye, surface->shininess);
+    // 1 - s is the cosine between the mirrored light and the eye's direction
+    const real s = cosine_complement(light_mirrored(surface, to_light), surface->to_eye);
+    real highlight = surface->specular * highlight_power(glossy, s, surface->shininess);
     if (HAS_TINTS) return vector_fma(surface->specular_tint, highlight, color);
     return (Color3){color.x + highlight, color.y + highlight, color.z + highlight};
 }

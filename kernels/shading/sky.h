@@ -32,20 +32,15 @@ static inline Vector sky_texel_color(const Scene *scene, real longitude_turns, r
     return vector_of_lanes(&colors);
 }
 
-// Returns the color of the sky's image along a unit direction, for the lanes in `wanted`. The footprint is
-// measured in texels at the horizon or of their height, whichever are denser.
+// Returns the color of the sky's image along a unit direction, for the lanes in `wanted`.
 static inline Vector sky_image_color(const Scene *scene, Vector direction, mask wanted)
 {
     global const SceneHeader *header = scene->header;
-    const real one_half = (real)(0.5f), two = (real)(2);
-    uint4 level = scene->texture_levels[header->sky_texture.x - 1].place;
-    real x = vector_dot(direction, vector_of(header->sky_right));
-    real y = vector_dot(direction, vector_of(header->sky_up));
-    real z = vector_dot(direction, vector_of(header->sky_forward));
-    real across = real_sqrt(real_fma(x, x, z * z));
-    scalar texels = max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
-    Vector color = image_color(scene, image_wrapped(header->sky_texture, true), one_half + real_turns(z, x),
-                               real_fma(two, real_turns(across, y), one_half),
+    const scalar texels = globe_density(scene->texture_levels[header->sky_texture.x - 1].place);
+    const GridCoordinates place = globe_coordinates((Vector){
+        vector_dot(direction, vector_of(header->sky_right)), vector_dot(direction, vector_of(header->sky_up)),
+        vector_dot(direction, vector_of(header->sky_forward))});
+    Vector color = image_color(scene, image_wrapped(header->sky_texture, true), place.u, place.v,
                                (real)(header->sample.x * texels), wanted);
     return vector_scale(color, (real)(header->sky_forward.w));
 }

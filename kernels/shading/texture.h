@@ -14,22 +14,37 @@ typedef struct {
     real density; // texels of the full texture per unit of length
 } TextureCoordinates;
 
-// Returns a sphere's texture coordinates. The poles lie along y, the texture's center faces +z, and seen from
-// outside u grows eastward. Textures of globes vary little along rows near the poles, so the density is that
-// of texels at the equator or of their height.
-static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere, Vector outward, uint4 level)
+typedef struct {
+    real u, v; // in texture repeats or checker squares
+} GridCoordinates;
+
+// Returns the coordinates of a direction in an image of all directions. The poles lie along y and the image's
+// center along z.
+static inline GridCoordinates globe_coordinates(Vector direction)
 {
-    real equator = real_sqrt(real_fma(outward.x, outward.x, outward.z * outward.z));
-    const real one_half = (real)(0.5f), two = (real)(2), inverse_pi = (real)(0x1.45f306p-2f);
-    TextureCoordinates coordinates;
-    coordinates.u = one_half + real_turns(outward.z, outward.x);
-    coordinates.v = real_fma(two, real_turns(equator, outward.y), one_half);
-    real texels = inverse_pi * real_max((real)((scalar)level.y) * one_half, (real)((scalar)level.z));
-    coordinates.density = real_divide(texels, fabs((real)(sphere->center_radius.w)));
-    return coordinates;
+    const real one_half = (real)(0.5f), x = direction.x, y = direction.y, z = direction.z,
+               across = real_sqrt(real_fma(x, x, z * z));
+    return (GridCoordinates){one_half + real_turns(z, x),
+                             real_fma((real)(2), real_turns(across, y), one_half)};
 }
 
-// Returns whether shapes of this type have a grid in the surface, as planes and discs do.
+// Returns the texels of such an image, of this level, per radian: at the equator or of their height,
+// whichever are denser, as images of globes vary little along rows near the poles.
+static inline scalar globe_density(uint4 level)
+{
+    return max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
+}
+
+// Returns a sphere's texture coordinates. Seen from outside u grows eastward.
+static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere, Vector outward, uint4 level)
+{
+    const GridCoordinates place = globe_coordinates(outward);
+    const real radius = fabs((real)(sphere->center_radius.w));
+    return (TextureCoordinates){place.u, place.v, real_divide((real)(globe_density(level)), radius)};
+}
+
+// Returns whether shapes of this type have a grid in the surface, as planes and discs do. One expression
+// would make clang warn of constant operands.
 static inline bool type_has_grid(uint type)
 {
     if (HAS_PLANES && type == TYPE_PLANES) return true;
@@ -50,10 +65,6 @@ static inline GridAxes grid_axes(const Scene *scene, uint type, uint index)
         return (GridAxes){scene->discs[index].grid_u, scene->discs[index].grid_v};
     return (GridAxes){(scalar4)(0), (scalar4)(0)};
 }
-
-typedef struct {
-    real u, v; // in checker squares, or texture repeats
-} GridCoordinates;
 
 // Returns the grid coordinates of a point of a plane or disc, (0, 0) for other types.
 static inline GridCoordinates grid_coordinates(const Scene *scene, uint type, uint index, Vector position)
