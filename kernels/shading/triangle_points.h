@@ -98,7 +98,8 @@ static OUT_OF_LINE LaneSurfacePoints triangles_surface_point(const Scene *scene,
         heights = triangle_lift(corners, normals, weights, side, &hit.point);
     }
     if (IS_CERTIFIED) {
-        const real slimness = triangle_slimness(corners), cosine = least_cosine(hit.point.normal, ray),
+        const real slimness = triangle_slimness(corners_edges(corners)),
+                   cosine = least_cosine(hit.point.normal, ray),
                    height = triangle_height(corners.a, hit.point.normal, ray_point(ray, t)),
                    weights_error = triangle_weights_error(corners, ray, cosine);
         triangle_set_normal_errors(normals, weights, slimness, weights_error, &hit.point);

@@ -49,8 +49,9 @@ typedef struct {
 static inline TriangleSigns triangle_signs(const TriangleEdges *edges, real error)
 {
     const real zero = (real)(0);
-    real a_sum = fabs(edges->ax) + fabs(edges->ay) + error, b_sum = fabs(edges->bx) + fabs(edges->by) + error,
-         c_sum = fabs(edges->cx) + fabs(edges->cy) + error;
+    const CornerReals x = edges->x, y = edges->y;
+    real a_sum = fabs(x.a) + fabs(y.a) + error, b_sum = fabs(x.b) + fabs(y.b) + error,
+         c_sum = fabs(x.c) + fabs(y.c) + error;
     real u_error = error * (b_sum + c_sum), v_error = error * (c_sum + a_sum),
          w_error = error * (a_sum + b_sum);
     real u_low = edges->u - u_error, v_low = edges->v - v_error, w_low = edges->w - w_error;
@@ -77,7 +78,7 @@ static inline real triangle_place_error(const Ray *ray, real distance, real size
 // Returns a bound on the error of the vertices' coordinates in the ray's frame.
 static inline real triangle_frame_error(const TriangleEdges *edges, const Ray *ray, real size)
 {
-    const real distance = vector_norm1(corners_max_abs((Corners){edges->a, edges->b, edges->c}));
+    const real distance = vector_norm1(corners_max_abs(edges->seen));
     return triangle_place_error(ray, distance, size) * ray->across_length;
 }
 
@@ -110,10 +111,8 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
 {
     const real error = signs.error;
     mask perhaps = signs.perhaps;
-    const Vector along = ray_along(ray);
-    real a_t = vector_dot(edges->a, along), b_t = vector_dot(edges->b, along),
-         c_t = vector_dot(edges->c, along);
-    real low = real_min_of_3(a_t, b_t, c_t), high = real_max_of_3(a_t, b_t, c_t);
+    const CornerReals ts = corners_dot(edges->seen, ray_along(ray));
+    real low = real_min_of_3(ts.a, ts.b, ts.c), high = real_max_of_3(ts.a, ts.b, ts.c);
     real distance = real_fma(real_max(-low, high), ray->length, (real)(sizes.longest)) + (real)(4) * error;
     real place = triangle_place_error(ray, distance, (real)(sizes.size));
     real vertex_error = ray_inverse_length(ray) * real_fma((real)(12 * UNIT_ROUNDOFF), distance, place);
@@ -124,7 +123,7 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
     // applies to uncertain lanes, which are hit, if at all, where the weights say
     mask narrows = perhaps & (fabs(edges->determinant) > DIVISOR_MIN * edge_error);
     real inverse = real_divide((real)(1), lanes_select(narrows, edges->determinant, (real)(1)));
-    real t = c_t + real_fma(a_t - c_t, edges->u * inverse, (b_t - c_t) * (edges->v * inverse));
+    real t = ts.c + real_fma(ts.a - ts.c, edges->u * inverse, (ts.b - ts.c) * (edges->v * inverse));
     real part = WEIGHTS_ERROR * edge_error * fabs(inverse);
     real t_error = (high - low) * (part + (real)(16 * UNIT_ROUNDOFF)) +
                    real_fma((real)(4 * UNIT_ROUNDOFF), fabs(t), vertex_error);
@@ -146,9 +145,9 @@ static inline ALWAYS_INLINE CertainHit triangle_certain_crossing(const Triangle 
 // Edge-on, where all edge functions vanish, only this test decides.
 static inline mask triangle_is_passed(const TriangleEdges *edges, real error)
 {
-    real ax = edges->ax, ay = edges->ay, bx = edges->bx, by = edges->by, cx = edges->cx, cy = edges->cy;
-    return (real_min_of_3(ax, bx, cx) > error) | (real_max_of_3(ax, bx, cx) < -error) |
-           (real_min_of_3(ay, by, cy) > error) | (real_max_of_3(ay, by, cy) < -error);
+    const CornerReals x = edges->x, y = edges->y;
+    return (real_min_of_3(x.a, x.b, x.c) > error) | (real_max_of_3(x.a, x.b, x.c) < -error) |
+           (real_min_of_3(y.a, y.b, y.c) > error) | (real_max_of_3(y.a, y.b, y.c) < -error);
 }
 
 // Returns the hit with bounds. First rejects by one error for all edge functions (docs/numerics.md).
@@ -164,7 +163,7 @@ static inline CertainHit triangle_certain_hit(const Triangle *triangle, const Ra
     mask lanes = RAY_ACTIVE(ray) & !((highest > edge_error) & (lowest < -edge_error));
     if (!lanes_any(lanes)) return certain_miss();
     TriangleSigns signs = triangle_signs(&edges, error);
-    mask leaves = ray_cannot_rehit(ray, triangle->id.x, true), sinks = mask_none();
+    mask leaves = ray_starts_on(ray, triangle->id.x), sinks = mask_none();
     if (HAS_SMOOTH_NORMALS) sinks = leaves & ray->sinks;
     signs.perhaps = lanes & signs.perhaps & (!leaves | sinks);
     if (!lanes_any(signs.perhaps)) return certain_miss();

@@ -21,6 +21,30 @@ static inline Corners corners_of(scalar4 a, scalar4 b, scalar4 c)
     return (Corners){vector_of(a), vector_of(b), vector_of(c)};
 }
 
+// A number for each corner.
+typedef struct {
+    real a, b, c;
+} CornerReals;
+
+static inline CornerReals corners_dot(Corners corners, Vector v)
+{
+    return (CornerReals){vector_dot(corners.a, v), vector_dot(corners.b, v), vector_dot(corners.c, v)};
+}
+
+// Returns the corners seen from a point.
+static inline Corners corners_from(Corners corners, Vector point)
+{
+    return (Corners){vector_subtract(corners.a, point), vector_subtract(corners.b, point),
+                     vector_subtract(corners.c, point)};
+}
+
+// Returns the edges a - b, b - c and c - a.
+static inline Corners corners_edges(Corners corners)
+{
+    return (Corners){vector_subtract(corners.a, corners.b), vector_subtract(corners.b, corners.c),
+                     vector_subtract(corners.c, corners.a)};
+}
+
 // Returns the texture coordinates, u and v in x and y.
 static inline Corners corners_of_uvs(TriangleUvs uvs)
 {
@@ -36,33 +60,17 @@ static inline Corners corners_select(mask condition, Corners yes, Corners no)
 typedef struct {
     real u, v, w;     // the edge functions opposite a, b, c; all of one sign inside, edges included
     real determinant; // their sum
-    Vector a, b, c;   // the vertices, from the ray's start
-    real ax, ay, bx, by, cx, cy; // the vertices across the ray
+    Corners seen;     // the vertices, from the ray's start
+    CornerReals x, y; // the vertices across the ray
 } TriangleEdges;
 
 static inline TriangleEdges triangle_edges(Corners corners, const Ray *ray)
 {
-    Vector a = vector_subtract(corners.a, ray->origin);
-    Vector b = vector_subtract(corners.b, ray->origin);
-    Vector c = vector_subtract(corners.c, ray->origin);
-    real ax = vector_dot(a, ray->across_u), ay = vector_dot(a, ray->across_v);
-    real bx = vector_dot(b, ray->across_u), by = vector_dot(b, ray->across_v);
-    real cx = vector_dot(c, ray->across_u), cy = vector_dot(c, ray->across_v);
-    TriangleEdges edges;
-    edges.u = difference_of_products(cx, by, cy, bx);
-    edges.v = difference_of_products(ax, cy, ay, cx);
-    edges.w = difference_of_products(bx, ay, by, ax);
-    edges.determinant = edges.u + edges.v + edges.w;
-    edges.a = a;
-    edges.b = b;
-    edges.c = c;
-    edges.ax = ax;
-    edges.ay = ay;
-    edges.bx = bx;
-    edges.by = by;
-    edges.cx = cx;
-    edges.cy = cy;
-    return edges;
+    const Corners seen = corners_from(corners, ray->origin);
+    const CornerReals x = corners_dot(seen, ray->across_u), y = corners_dot(seen, ray->across_v);
+    const real u = difference_of_products(x.c, y.b, y.c, x.b), v = difference_of_products(x.a, y.c, y.a, x.c),
+               w = difference_of_products(x.b, y.a, y.b, x.a);
+    return (TriangleEdges){u, v, w, u + v + w, seen, x, y};
 }
 
 static inline Vector triangle_normal(const Triangle *triangle)
@@ -118,13 +126,10 @@ static inline TrianglePlane triangle_plane(const Triangle *triangle, Vector to_p
 // of rays in the triangle's plane.
 static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray, real in_plane)
 {
-    Vector a = vector_of(triangle->a);
+    const Vector a = vector_of(triangle->a);
+    const bool has_height = has_eye_height(triangle->id);
     real along, height;
-    if (has_eye_height(triangle->id)) {
-        Vector normal = triangle_normal(triangle);
-        along = vector_dot_compensated(normal, ray->direction);
-        height = (real)(as_float(triangle->id.w)) - vector_dot_compensated(normal, ray->origin);
-    } else if (IS_COMPENSATED) {
+    if (IS_COMPENSATED && !has_height) {
         PairVector ab = pair_vector_difference(vector_of(triangle->b), a);
         PairVector ac = pair_vector_difference(vector_of(triangle->c), a);
         PairVector normal = {pair_difference_of_products(ab.y, ac.z, ab.z, ac.y),
@@ -135,7 +140,8 @@ static inline real triangle_t_accurate(const Triangle *triangle, const Ray *ray,
     } else {
         Vector normal = triangle_normal(triangle);
         along = vector_dot_compensated(normal, ray->direction);
-        height = vector_dot_compensated(normal, vector_subtract(a, ray->origin));
+        height = has_height ? (real)(as_float(triangle->id.w)) - vector_dot_compensated(normal, ray->origin)
+                            : vector_dot_compensated(normal, vector_subtract(a, ray->origin));
     }
     return divide_or(height, along, in_plane);
 }
@@ -163,8 +169,8 @@ static inline Vector corners_max_abs(Corners corners)
 // triangle and within the boxes of the BVH, whose slack is four times this one.
 static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray, real accurate_t)
 {
-    Vector a = edges->a, b = edges->b, c = edges->c;
-    Vector max_abs = corners_max_abs((Corners){a, b, c});
+    Vector a = edges->seen.a, b = edges->seen.b, c = edges->seen.c;
+    Vector max_abs = corners_max_abs(edges->seen);
     real slack = (real)(16 * UNIT_ROUNDOFF) * vector_norm1(max_abs);
     real t = accurate_t;
     Vector inverse = HAS_BOXES ? ray->inverse : ray_inverse(ray);
@@ -175,16 +181,16 @@ static inline real triangle_t_clamped(const TriangleEdges *edges, const Ray *ray
     Vector along = ray_along(ray);
     real t_error = (real)(4 * UNIT_ROUNDOFF) *
                    (max_abs.x * fabs(along.x) + max_abs.y * fabs(along.y) + max_abs.z * fabs(along.z));
-    real a_t = vector_dot(a, along), b_t = vector_dot(b, along), c_t = vector_dot(c, along);
+    const CornerReals ts = corners_dot(edges->seen, along);
     return interval_clamp(
-        (Interval){real_min_of_3(a_t, b_t, c_t) - t_error, real_max_of_3(a_t, b_t, c_t) + t_error}, t);
+        (Interval){real_min_of_3(ts.a, ts.b, ts.c) - t_error, real_max_of_3(ts.a, ts.b, ts.c) + t_error}, t);
 }
 
 // Returns t by the accurate step and, at low angles or in double, the clamped one.
 static inline real triangle_t_robust(const Triangle *triangle, const TriangleEdges *edges, const Ray *ray,
                                      mask hit)
 {
-    real t = triangle_t_accurate(triangle, ray, vector_dot(edges->a, ray_along(ray)));
+    real t = triangle_t_accurate(triangle, ray, vector_dot(edges->seen.a, ray_along(ray)));
     // Above a sine of 1/4 (the normal's square is 3 at most) the accurate t is within a third of the boxes'
     // slack. In double a needle's normal may be worse.
     mask grazing = hit;
@@ -214,7 +220,7 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     if (!lanes_any(hit)) return hit;
     mask remaining = hit;
     if (!IS_COMPENSATED) {
-        TrianglePlane plane = triangle_plane(triangle, edges.a, ray);
+        TrianglePlane plane = triangle_plane(triangle, edges.seen.a, ray);
         hit = hit & !(plane.behind & (ray->tmin >= zero));
         if (!lanes_any(hit)) return hit;
         remaining = hit & !plane.well_conditioned;
@@ -224,10 +230,7 @@ static inline mask triangle_hit(const Triangle *triangle, const Ray *ray, real *
     return hit & (*t > ray->tmin);
 }
 
-// Barycentric coordinates of the hit point.
-typedef struct {
-    real a, b, c;
-} TriangleWeights;
+typedef CornerReals TriangleWeights; // barycentric coordinates of the hit point
 
 static inline TriangleWeights triangle_weights(Corners corners, const Ray *ray)
 {

@@ -25,11 +25,10 @@ typedef struct {
 static inline TriangleHeights triangle_lift(Corners corners, Corners normals, TriangleWeights weights,
                                             real side, SurfacePoint *point)
 {
-    Vector ab = vector_subtract(corners.a, corners.b), bc = vector_subtract(corners.b, corners.c),
-           ca = vector_subtract(corners.c, corners.a);
-    real ab_a = vector_dot(ab, normals.a), ca_a = vector_dot(ca, normals.a);
-    real bc_b = vector_dot(bc, normals.b), ab_b = vector_dot(ab, normals.b);
-    real ca_c = vector_dot(ca, normals.c), bc_c = vector_dot(bc, normals.c);
+    const Corners edges = corners_edges(corners);
+    real ab_a = vector_dot(edges.a, normals.a), ca_a = vector_dot(edges.c, normals.a);
+    real bc_b = vector_dot(edges.b, normals.b), ab_b = vector_dot(edges.a, normals.b);
+    real ca_c = vector_dot(edges.c, normals.c), bc_c = vector_dot(edges.b, normals.c);
     const real zero = (real)(0);
     TriangleHeights heights = {real_max(side * (weights.b * ab_a - weights.c * ca_a), zero),
                                real_max(side * (weights.c * bc_b - weights.a * ab_b), zero),
@@ -52,12 +51,10 @@ static inline real triangle_height(Vector vertex, Vector unit, Vector position)
 
 // Returns a bound on the ratio of a triangle's length to its height, over its length. A vertex that moves by
 // e turns the normal by at most e times this, and a point that moves by e moves its weights by as much.
-static inline real triangle_slimness(Corners corners)
+static inline real triangle_slimness(Corners edges)
 {
-    Vector ab = vector_subtract(corners.b, corners.a), ac = vector_subtract(corners.c, corners.a),
-           bc = vector_subtract(corners.c, corners.b);
-    Vector across = vector_cross(ab, ac);
-    real longest_squared = real_max_of_3(vector_dot(ab, ab), vector_dot(ac, ac), vector_dot(bc, bc)),
+    const Vector ab = edges.a, bc = edges.b, ca = edges.c, across = vector_cross(ab, ca);
+    real longest_squared = real_max_of_3(vector_dot(ab, ab), vector_dot(ca, ca), vector_dot(bc, bc)),
          area_squared = vector_dot(across, across);
     return real_sqrt(divide_or(longest_squared, area_squared, (real)(1 / SMALLEST_RATIO)));
 }
@@ -67,11 +64,8 @@ static inline real triangle_slimness(Corners corners)
 // over the cosine of incidence.
 static inline real triangle_weights_error(Corners corners, const Ray *ray, real cosine)
 {
-    const Corners from_start = {vector_subtract(corners.a, ray->origin),
-                                vector_subtract(corners.b, ray->origin),
-                                vector_subtract(corners.c, ray->origin)};
     const real size = vector_norm1(corners_max_abs(corners)),
-               distance = vector_norm1(corners_max_abs(from_start));
+               distance = vector_norm1(corners_max_abs(corners_from(corners, ray->origin)));
     const real across = (real)(UNIT_ROUNDOFF)*real_fma((real)(6), distance, (real)(2) * size);
     return real_fma((real)(4 * UNIT_ROUNDOFF), size, divide_or(across, cosine, NEVER));
 }
@@ -84,8 +78,8 @@ static inline real triangle_weights_error(Corners corners, const Ray *ray, real 
 static inline void triangle_set_normal_errors(Corners normals, TriangleWeights weights, real slimness,
                                               real weights_error, SurfacePoint *point)
 {
-    Vector ab = vector_subtract(normals.a, normals.b), bc = vector_subtract(normals.b, normals.c);
-    real apart_squared = (real)(2) * (vector_dot(ab, ab) + vector_dot(bc, bc));
+    const Corners apart = corners_edges(normals);
+    real apart_squared = (real)(2) * (vector_dot(apart.a, apart.a) + vector_dot(apart.b, apart.b));
     Vector blend = triangle_blend(weights, normals);
     real bend = real_sqrt(divide_or(apart_squared, vector_dot(blend, blend), (real)(0)));
     point->curvature = BLENDED_NORMAL_ERROR * bend * slimness;
@@ -97,9 +91,7 @@ static inline void triangle_set_lift_error(Corners corners, TriangleHeights heig
                                            real place_error, SurfacePoint *point)
 {
     real size = vector_norm1(corners_max_abs(corners));
-    Corners edges = {vector_subtract(corners.a, corners.b), vector_subtract(corners.b, corners.c),
-                     vector_subtract(corners.c, corners.a)};
-    real rounded = real_fma((real)(16 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(edges)),
+    real rounded = real_fma((real)(16 * UNIT_ROUNDOFF), vector_norm1(corners_max_abs(corners_edges(corners))),
                             (real)(4 * UNIT_ROUNDOFF) * size);
     real weight_error = real_fma((real)(36 * UNIT_ROUNDOFF), size, place_error) * slimness;
     real height_error = real_fma(weight_error, heights.steepest + rounded, rounded);
