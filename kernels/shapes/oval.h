@@ -10,14 +10,19 @@
 #include "shapes/sphere.h"
 #include "shapes/torus.h"
 
-// The unit shapes: feature, struct, name.
-#define OVAL_LIST(SHAPE)                                                                                     \
-    SHAPE(SPHERES, Sphere, sphere)                                                                           \
-    SHAPE(DISCS, Disc, disc)                                                                                 \
-    SHAPE(CYLINDERS, Cylinder, cylinder)                                                                     \
-    SHAPE(CONES, Cone, cone)                                                                                 \
-    SHAPE(TORI, Torus, torus)                                                                                \
-    SHAPE(PARABOLOIDS, Paraboloid, paraboloid)
+// Executes STATEMENT(name), with the unit shape as `shape`, for the shape that the oval maps.
+#define OVAL_SWITCH(STATEMENT)                                                                               \
+    OVAL_CASE(SPHERES, Sphere, sphere, STATEMENT)                                                            \
+    OVAL_CASE(DISCS, Disc, disc, STATEMENT)                                                                  \
+    OVAL_CASE(CYLINDERS, Cylinder, cylinder, STATEMENT)                                                      \
+    OVAL_CASE(CONES, Cone, cone, STATEMENT)                                                                  \
+    OVAL_CASE(TORI, Torus, torus, STATEMENT)                                                                 \
+    OVAL_CASE(PARABOLOIDS, Paraboloid, paraboloid, STATEMENT)
+#define OVAL_CASE(feature, Type, name, STATEMENT)                                                            \
+    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
+        const Type shape = oval_##name(oval);                                                                \
+        STATEMENT(name);                                                                                     \
+    }
 
 static inline uint4 oval_unit_id(const Oval *oval)
 {
@@ -113,14 +118,10 @@ static OUT_OF_LINE mask oval_hit(const Oval *oval, const Ray *ray, real *t)
 {
     OvalRay own = oval_ray(oval, ray);
     mask hit = mask_none();
-#define OVAL_HIT(feature, Type, name)                                                                        \
-    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
-        const Type shape = oval_##name(oval);                                                                \
-        hit = name##_hit(&shape, &own.ray, &unit_t);                                                         \
-    }
+#define OVAL_HIT(name) hit = name##_hit(&shape, &own.ray, &unit_t)
     for (;;) {
         real unit_t = own.ray.tmax;
-        OVAL_LIST(OVAL_HIT)
+        OVAL_SWITCH(OVAL_HIT)
         *t = unit_t + own.shift;
         // a ray that starts at a hit, whose t was rounded, hits the shape there once more
         mask passed = hit & !(*t > ray->tmin) & (unit_t > own.ray.tmin);
@@ -134,12 +135,8 @@ static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, 
 {
     const OvalRay own = oval_ray(oval, ray);
     SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
-#define OVAL_SURFACE_POINT(feature, Type, name)                                                              \
-    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
-        const Type shape = oval_##name(oval);                                                                \
-        unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
-    }
-    OVAL_LIST(OVAL_SURFACE_POINT)
+#define OVAL_SURFACE_POINT(name) unit = name##_surface_point(&shape, &own.ray, t - own.shift)
+    OVAL_SWITCH(OVAL_SURFACE_POINT)
     return affine_surface_point(oval->rows, oval->extent.w, unit.position,
                                 affine_normal(oval->inverses, unit.normal), unit.position,
                                 unit.rounding_scale);
@@ -148,12 +145,8 @@ static inline SurfacePoint oval_surface_point(const Oval *oval, const Ray *ray, 
 static OUT_OF_LINE CertainHit oval_certain_hit(const Oval *oval, const Ray *ray)
 {
     const OvalRay own = oval_ray(oval, ray);
-#define OVAL_CERTAIN_HIT(feature, Type, name)                                                                \
-    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
-        const Type shape = oval_##name(oval);                                                                \
-        return name##_certain_hit(&shape, &own.ray);                                                         \
-    }
-    OVAL_LIST(OVAL_CERTAIN_HIT)
+#define OVAL_CERTAIN_HIT(name) return name##_certain_hit(&shape, &own.ray)
+    OVAL_SWITCH(OVAL_CERTAIN_HIT)
     return certain_miss();
 }
 
@@ -175,16 +168,13 @@ static inline mask oval_set_errors(const Oval *oval, const Ray *ray, real t, rea
                moved = ray_place_error(&own.ray, own.ray.length * fabs(t)); // the mapped ray itself
     SurfacePoint unit = surface_point_make(own.ray.origin, own.ray.direction, (real)(0));
     mask at_edge = mask_none();
-#define OVAL_SET_ERRORS(feature, Type, name)                                                                 \
-    if (HAS_##feature && oval->id.z == TYPE_##feature) {                                                     \
-        const Type shape = oval_##name(oval);                                                                \
-        unit = name##_surface_point(&shape, &own.ray, t - own.shift);                                        \
-        at_edge =                                                                                            \
-            name##_set_errors(&shape, &own.ray, t - own.shift, real_fma(norm, place_error, moved), &unit);   \
-    }
-    OVAL_LIST(OVAL_SET_ERRORS)
+    const real unit_error = real_fma(norm, place_error, moved);
+#define OVAL_SET_ERRORS(name)                                                                                \
+    OVAL_SURFACE_POINT(name);                                                                                \
+    at_edge = name##_set_errors(&shape, &own.ray, t - own.shift, unit_error, &unit)
+    OVAL_SWITCH(OVAL_SET_ERRORS)
     real growth = divide_or(norm, vector_norm(affine_normal(oval->inverses, unit.normal)), NEVER);
-    const real first_order = growth * unit.curvature * real_fma(norm, place_error, moved);
+    const real first_order = growth * unit.curvature * unit_error;
     const real factor =
         lanes_select(first_order < MAPPED_NORMAL_LOW_MAX, MAPPED_NORMAL_LOW, MAPPED_NORMAL_HIGH);
     growth = growth * lanes_select(first_order < MAPPED_NORMAL_HIGH_MAX, factor, ANY_NORMAL);

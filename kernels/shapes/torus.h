@@ -21,17 +21,17 @@ typedef struct {
 
 static inline TorusTube torus_tube(const Torus *torus)
 {
-    TorusTube tube;
-    tube.axis = vector_of(torus->axis_minor);
-    tube.radial = vector_of(torus->radial);
-    tube.across = vector_cross(tube.axis, tube.radial);
-    tube.gradient = vector_of(torus->gradient);
-    tube.radial_gradient = (real)(torus->gradient.w);
-    tube.axial_gradient = vector_dot(tube.gradient, tube.axis);
-    tube.eye_rho = (real)(torus->radial.w);
-    tube.half_inverse_minor = real_divide((real)(0.5f), (real)(torus->axis_minor.w));
-    tube.power = eye_power_of(torus->id);
-    return tube;
+    const Vector axis = vector_of(torus->axis_minor), radial = vector_of(torus->radial),
+                 gradient = vector_of(torus->gradient);
+    return (TorusTube){axis,
+                       radial,
+                       vector_cross(axis, radial),
+                       gradient,
+                       (real)(torus->gradient.w),
+                       vector_dot(gradient, axis),
+                       (real)(torus->radial.w),
+                       real_divide((real)(0.5f), (real)(torus->axis_minor.w)),
+                       eye_power_of(torus->id)};
 }
 
 // Returns F / (2 r) at a point and its gradient, whose direction is the normal.
@@ -222,16 +222,13 @@ typedef struct {
 
 static inline CertainTorus certain_torus(const Torus *torus, const Ray *ray)
 {
-    CertainTorus certain;
-    certain.start = vector_subtract(ray->origin, vector_of(torus->center_major));
-    certain.axis = vector_of(torus->axis_minor);
-    certain.major = (real)(torus->center_major.w);
-    certain.minor = (real)(torus->axis_minor.w);
-    certain.start_rounding = (real)(UNIT_ROUNDOFF) * ((real)(3) * vector_norm1(certain.start) +
-                                                      (real)(2) * vector_norm1(ray->origin) +
-                                                      (real)(28) * (certain.major + certain.minor));
-    certain.rounding_per_t = (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction);
-    return certain;
+    const Vector start = vector_subtract(ray->origin, vector_of(torus->center_major));
+    const real major = (real)(torus->center_major.w), minor = (real)(torus->axis_minor.w),
+               per_t = (real)(3 * UNIT_ROUNDOFF) * vector_norm1(ray->direction),
+               at_start = (real)(UNIT_ROUNDOFF) *
+                          ((real)(3) * vector_norm1(start) + (real)(2) * vector_norm1(ray->origin) +
+                           (real)(28) * (major + minor));
+    return (CertainTorus){start, vector_of(torus->axis_minor), major, minor, at_start, per_t};
 }
 
 static inline TorusPoint torus_point(const CertainTorus *torus, const Ray *ray, real t)
