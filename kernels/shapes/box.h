@@ -37,10 +37,15 @@ static inline mask box_hit(const Box *box, const Ray *ray, real *t)
 // face, where a ray towards larger coordinates enters.
 static inline real slab_distance(Interval slab, real direction, real t, mask *low_face)
 {
-    real to_near = fabs(t - slab.near), to_far = fabs(t - slab.far);
-    mask entering = to_near <= to_far;
+    mask entering = fabs(t - slab.near) <= fabs(t - slab.far);
     *low_face = entering == (direction > (real)(0));
-    return real_min(to_near, to_far);
+    return interval_end_distance(slab, t);
+}
+
+// Returns a coordinate of a point on a box, which is that of a face in the lanes `on_face`.
+static inline real box_coordinate(real low, real high, mask on_face, mask low_face, real coordinate)
+{
+    return lanes_select(on_face, lanes_select(low_face, low, high), real_clamp(coordinate, low, high));
 }
 
 // Returns the point on the face whose crossing is nearest to t, or the first of x, y and z if several are.
@@ -57,14 +62,11 @@ static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, rea
     mask on_y = !on_x & (to_y <= to_z);
     mask on_z = !on_x & !on_y;
 
-    Vector position = ray_point(ray, t);
+    const Vector p = ray_point(ray, t);
+    const Vector position = {box_coordinate(low.x, high.x, on_x, low_x, p.x),
+                             box_coordinate(low.y, high.y, on_y, low_y, p.y),
+                             box_coordinate(low.z, high.z, on_z, low_z, p.z)};
     const real zero = (real)(0), one = (real)(1);
-    position.x =
-        lanes_select(on_x, lanes_select(low_x, low.x, high.x), real_clamp(position.x, low.x, high.x));
-    position.y =
-        lanes_select(on_y, lanes_select(low_y, low.y, high.y), real_clamp(position.y, low.y, high.y));
-    position.z =
-        lanes_select(on_z, lanes_select(low_z, low.z, high.z), real_clamp(position.z, low.z, high.z));
     Vector normal = {lanes_select(on_x, lanes_select(low_x, -one, one), zero),
                      lanes_select(on_y, lanes_select(low_y, -one, one), zero),
                      lanes_select(on_z, lanes_select(low_z, -one, one), zero)};
@@ -75,7 +77,7 @@ static inline SurfacePoint box_surface_point(const Box *box, const Ray *ray, rea
 // box lies within it.
 static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
 {
-    mask lanes = RAY_ACTIVE(ray) & !ray_cannot_rehit(ray, box->id.x, false);
+    mask leaves = ray_starts_on(ray, box->id.x), lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
     Vector to_low = vector_subtract(vector_of(box->low), ray->origin),
            to_high = vector_subtract(vector_of(box->high), ray->origin);
     real distance = vector_norm1((Vector){real_max(fabs(to_low.x), fabs(to_high.x)),
@@ -87,7 +89,7 @@ static inline CertainHit box_certain_hit(const Box *box, const Ray *ray)
     mask perhaps = lanes & (outer.near <= outer.far) & (outer.far >= ray->tmin);
     if (!lanes_any(perhaps)) return certain_miss();
     Interval inner = slabs_common(box_slabs(box, ray, -place));
-    mask certain = perhaps & (inner.near < inner.far), leaves = ray_starts_on(ray, box->id.x);
+    mask certain = perhaps & (inner.near < inner.far);
     const CertainInterval inside = {outer, inner, {-NEVER, NEVER}, certain, perhaps};
     return certain_interval_hit(&inside, ray, leaves & certain);
 }
@@ -100,9 +102,9 @@ static inline mask box_set_errors(const Box *box, const Ray *ray, real t, real p
     Vector position = point->position, normal = point->normal;
     const real zero = (real)(0), error = place_error + place_error;
     Vector low = vector_of(box->low), high = vector_of(box->high);
-    real x = real_min(fabs(position.x - low.x), fabs(position.x - high.x));
-    real y = real_min(fabs(position.y - low.y), fabs(position.y - high.y));
-    real z = real_min(fabs(position.z - low.z), fabs(position.z - high.z));
+    real x = interval_end_distance((Interval){low.x, high.x}, position.x);
+    real y = interval_end_distance((Interval){low.y, high.y}, position.y);
+    real z = interval_end_distance((Interval){low.z, high.z}, position.z);
     real along = lanes_select(normal.x != zero, x, lanes_select(normal.y != zero, y, z));
     point->height = real_fma((real)(4 * UNIT_ROUNDOFF), vector_norm1(position) + along, along);
     return ((normal.x == zero) & (x <= error)) | ((normal.y == zero) & (y <= error)) |

@@ -46,17 +46,11 @@ static inline real ray_place_error(const Ray *ray, real distance)
     return real_fma(ray->direction_error, distance, ray->origin_error);
 }
 
-// Returns the lanes whose ray starts on the object with this id.
+// Returns the lanes whose ray starts on the object with this id. It does not hit the object again if that is
+// flat, or convex and left outward.
 static inline mask ray_starts_on(const Ray *ray, uint id)
 {
     return ray->origin_object == integer_of(id);
-}
-
-// Returns the lanes whose ray starts on this shape and does not hit it again, because it is flat, or convex
-// and left outward.
-static inline mask ray_cannot_rehit(const Ray *ray, uint id, bool is_flat)
-{
-    return is_flat ? ray_starts_on(ray, id) : ray_starts_on(ray, id) & ray->leaves_outward;
 }
 
 // Returns a t that is not before the exact ray's end. For a ray to a light that is t = 1, and its tmax is 32
@@ -76,16 +70,11 @@ static inline mask ray_excludes(const Ray *ray, real low, real high)
 // may cross only in the lanes `perhaps`, between low and high.
 static inline CertainHit certain_crossing(const Ray *ray, mask certain, mask perhaps, real low, real high)
 {
-    CertainHit hit;
     const mask excluded = ray_excludes(ray, low, high);
     low = lanes_select(low == low, low, (real)(-LARGEST)); // beyond the range of numbers, it may be anywhere
     perhaps = perhaps & !excluded;
-    hit.found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
-    hit.uncertain = perhaps & !hit.found;
-    hit.t = (real)(0.5f) * (low + high);
-    hit.low = low;
-    hit.high = high;
-    return hit;
+    const mask found = certain & perhaps & (low > -ray->tmin) & (high < ray->tmax);
+    return (CertainHit){found, perhaps & !found, (real)(0.5f) * (low + high), low, high};
 }
 
 // Moves a hit to t, which may be far from the middle of its bounds, unless t is outside them.
@@ -127,13 +116,6 @@ static inline CertainHit certain_interval_hit(const CertainInterval *inside, con
                far = certain_crossing(ray, certain, perhaps, far_low, inside->outer.far);
     return certain_select(leaves | (near_high < ray->tmin), certain_at(far, inside->roots.far),
                           certain_at(near, inside->roots.near));
-}
-
-static inline CertainHit certain_restrict(CertainHit hit, mask lanes)
-{
-    hit.found = hit.found & lanes;
-    hit.uncertain = hit.uncertain & lanes;
-    return hit;
 }
 
 #endif

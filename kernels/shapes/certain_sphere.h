@@ -99,20 +99,19 @@ static inline void sphere_set_crossings(CertainSphere *sphere, const Ray *ray, r
 // Returns how the lines of the rays in `lanes` cross a sphere.
 static inline CertainSphere certain_sphere(Vector center, real radius, const Ray *ray, mask lanes)
 {
-    CertainSphere crossed;
-    crossed.start = vector_subtract(ray->origin, center);
-    crossed.radius = radius;
-    crossed.middle_t = -vector_dot(crossed.start, ray->direction) * ray->inverse_squared;
-    const Vector closest = vector_fma(ray->direction, crossed.middle_t, crossed.start);
+    const Vector start = vector_subtract(ray->origin, center);
+    const real middle_t = -vector_dot(start, ray->direction) * ray->inverse_squared;
+    const Vector closest = vector_fma(ray->direction, middle_t, start);
     const real squared = real_fma(radius, radius, -vector_dot(closest, closest));
-    const SphereErrors errors = sphere_errors(radius, crossed.middle_t, ray);
+    const SphereErrors errors = sphere_errors(radius, middle_t, ray);
     // excluded if all of it lies behind the start or beyond the end
     const real reach = ray_inverse_length(ray) * (radius + (real)(2) * (errors.place + errors.along));
-    const mask apart = ray_excludes(ray, crossed.middle_t - reach, crossed.middle_t + reach);
-    crossed.certain = lanes & (squared > errors.band);
-    crossed.perhaps = lanes & !((squared < -errors.band) | apart);
-    crossed.half_chord = crossed.inverse_slope = crossed.middle_error = crossed.t_error = (real)(0);
-    crossed.refines = mask_none();
+    const mask apart = ray_excludes(ray, middle_t - reach, middle_t + reach);
+    CertainSphere crossed = {.start = start,
+                             .radius = radius,
+                             .certain = lanes & (squared > errors.band),
+                             .perhaps = lanes & !((squared < -errors.band) | apart),
+                             .middle_t = middle_t};
     if (lanes_any(crossed.perhaps)) sphere_set_crossings(&crossed, ray, squared, &errors);
     return crossed;
 }

@@ -39,26 +39,15 @@ static inline DiscCrossing disc_crossing_compensated(const Disc *disc, const Ray
     };
 }
 
-// Returns whether the ray's point at t lies within the sphere that the power defines. The point's power is
-// the eye's plus p . (p - 2 center).
-static inline mask disc_contains(const Disc *disc, const Ray *ray, real t)
-{
-    Vector p = ray_point(ray, t), twice_center = vector_scale(vector_of(disc->center_radius), (real)(2));
-    return power_sum(pair_of(eye_power_of(disc->id)), p, pair_vector_difference(p, twice_center)) <=
-           (real)(0);
-}
-
 // Decides whether the crossing is inside the rim. With v the crossing from the center, (n . d) v = n x E for
 // the moment E = f x d, so that |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a
 // distance. At less than 4 degrees to the plane all three cancel, so pairs are used there at any precision.
+// Next to the eye the crossing's power with respect to the sphere around the disc decides.
 static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 {
     Vector center = vector_of(disc->center_radius), normal = vector_of(disc->normal);
-    DiscCrossing crossing;
-    if (IS_COMPENSATED) {
-        crossing = disc_crossing_compensated(disc, ray);
-    } else {
-        crossing = disc_crossing(disc, ray);
+    DiscCrossing crossing = IS_COMPENSATED ? disc_crossing_compensated(disc, ray) : disc_crossing(disc, ray);
+    if (!IS_COMPENSATED) {
         real steepest_squared = vector_dot(normal, normal) * ray->squared;
         mask grazing =
             RAY_ACTIVE(ray) & (crossing.along * crossing.along < (real)(0x1p-8f) * steepest_squared);
@@ -71,7 +60,8 @@ static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
     }
     mask hit = plane_quotient(crossing.height, crossing.along, ray, t);
     if (!lanes_any(hit)) return hit;
-    if (has_eye_power(disc->id)) return hit & disc_contains(disc, ray, *t) & (*t > ray->tmin);
+    if (has_eye_power(disc->id))
+        return hit & (eye_power_at(disc->id, center, ray_point(ray, *t)) <= (real)(0)) & (*t > ray->tmin);
     real radius = (real)(disc->center_radius.w);
     // nearly in the plane n . d hardly determines t, but the crossing is not farther from the center than the
     // rim
@@ -95,7 +85,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     Vector center = vector_of(disc->center_radius);
     real radius = (real)(disc->center_radius.w);
     CertainSphere bounding = certain_sphere(center, radius, ray, RAY_ACTIVE(ray));
-    mask lanes = bounding.perhaps & !ray_cannot_rehit(ray, disc->id.x, true);
+    mask lanes = bounding.perhaps & !ray_starts_on(ray, disc->id.x);
     if (!lanes_any(lanes)) return certain_miss();
     Interval crossing;
     mask crosses = certain_plane_of(disc_foot(disc), disc->normal, ray, &crossing);
@@ -117,8 +107,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
     real squared = real_fma(radius, radius, -vector_dot(across, across));
     real band = place * (radius + radius + place);
     mask within = squared > band, beyond = crosses & (squared < -band);
-    hit = certain_restrict(hit, !beyond);
-    hit.uncertain = hit.uncertain | (hit.found & !within);
+    hit.uncertain = (hit.uncertain | (hit.found & !within)) & !beyond;
     hit.found = hit.found & within;
     return hit;
 }
@@ -126,10 +115,7 @@ static inline CertainHit disc_certain_hit(const Disc *disc, const Ray *ray)
 static inline mask disc_set_errors(const Disc *disc, const Ray *ray, real t, real place_error,
                                    SurfacePoint *point)
 {
-    const real inverse_length = (real)(disc->normal.w);
-    point->height =
-        inverse_length * certain_plane_height(disc_foot(disc), vector_of(disc->normal), 0, point->position);
-    return mask_none();
+    return plane_point_set_height(disc_foot(disc), disc->normal, point);
 }
 
 #endif

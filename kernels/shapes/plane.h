@@ -101,7 +101,7 @@ static inline mask certain_plane_of(Vector point, scalar4 normal, const Ray *ray
 
 static inline CertainHit plane_certain_hit(const Plane *plane, const Ray *ray)
 {
-    mask lanes = RAY_ACTIVE(ray) & !ray_cannot_rehit(ray, plane->id.x, true);
+    mask lanes = RAY_ACTIVE(ray) & !ray_starts_on(ray, plane->id.x);
     if (!lanes_any(lanes)) return certain_miss();
     Interval crossing;
     mask crosses = certain_plane_of(vector_of(plane->point), plane->normal, ray, &crossing);
@@ -116,13 +116,17 @@ static inline real certain_plane_height(Vector point, Vector normal, scalar norm
     return (fabs(height.value) + height.error) * BOUND_SLACK;
 }
 
+// Sets the height of a point over a plane, whose normal's w is one over its length. No lane is uncertain.
+static inline mask plane_point_set_height(Vector on_plane, scalar4 normal, SurfacePoint *point)
+{
+    point->height = (real)(normal.w) * certain_plane_height(on_plane, vector_of(normal), 0, point->position);
+    return mask_none();
+}
+
 static inline mask plane_set_errors(const Plane *plane, const Ray *ray, real t, real place_error,
                                     SurfacePoint *point)
 {
-    const real inverse_length = (real)(plane->normal.w);
-    point->height = inverse_length * certain_plane_height(vector_of(plane->point), vector_of(plane->normal),
-                                                          0, point->position);
-    return mask_none();
+    return plane_point_set_height(vector_of(plane->point), plane->normal, point);
 }
 
 #endif
