@@ -8,6 +8,7 @@
 #define CERTAIN_ROUND_H
 
 #include "shapes/certain.h"
+#include "shapes/eye_power.h"
 #include "shapes/quadratic.h"
 #include "shapes/surface_point.h"
 
@@ -88,29 +89,23 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
 typedef struct {
     Vector m, q; // the ray's origin and direction across the axis
     real rise;   // the direction along it
+    real h;      // growth of the radius per t
     real a, b, c, discriminant;
-    real h; // growth of the radius per t
 } RoundQuadratic;
 
 static inline RoundQuadratic round_quadratic(const Round *round, const Ray *ray)
 {
-    RoundQuadratic quadratic;
     const RoundPoint start = round_point(round, ray, (real)(0));
     Vector m = start.across, q = round_across(round, ray->direction);
     real rise = vector_dot(round->axis, ray->direction), z = vector_dot(round->axis, round->start);
     real mq = vector_dot(m, q), qq = vector_dot(q, q), h = round->slope * rise;
     real half_k = (real)(0.5f) * round->k, bend = half_k * rise;
-    quadratic.m = m;
-    quadratic.q = q;
-    quadratic.rise = rise;
-    quadratic.h = h;
-    quadratic.a = real_fma(-h, h, qq);
-    quadratic.b = round->curves ? mq - bend : real_fma(-start.radius, h, mq);
-    quadratic.c = start.value;
+    const real a = real_fma(-h, h, qq), b = round->curves ? mq - bend : real_fma(-start.radius, h, mq);
+    RoundQuadratic quadratic = {m, q, rise, h, a, b, start.value};
     if (!round->has_power && !round->curves)
         quadratic.c = (start.rho - fabs(start.radius)) * (start.rho + fabs(start.radius));
     if (round->has_power) {
-        quadratic.discriminant = difference_of_products(quadratic.b, quadratic.b, quadratic.a, quadratic.c);
+        quadratic.discriminant = difference_of_products(b, b, a, quadratic.c);
         return quadratic;
     }
     real moment = fabs(vector_dot(round->axis, vector_cross(m, q)));
@@ -260,6 +255,19 @@ static inline Interval round_range(const Ray *ray, real size)
 {
     const real range = (real)(0x1p-10f / UNIT_ROUNDOFF) * size * ray_inverse_length(ray);
     return (Interval){-range, range};
+}
+
+// Returns a round shape of radius 0, seen from the eye if it has the eye's power and else from the foot. Its
+// unit axis is `inverse` times `axis`. Its errors remain to be set.
+static inline Round round_around(uint4 id, Vector foot, Vector axis, real inverse, const Ray *ray)
+{
+    const bool has_power = has_eye_power(id);
+    return (Round){.start = has_power ? ray->origin : vector_subtract(ray->origin, foot),
+                   .foot = foot,
+                   .axis = vector_scale(axis, inverse),
+                   .power = has_power ? eye_power_of(id) * inverse * inverse : (real)(0),
+                   .foot_norm1 = vector_norm1(foot),
+                   .has_power = has_power};
 }
 
 // The error in u of the coordinates that the axis' direction and the products add. If the radius depends on

@@ -191,18 +191,18 @@ static inline mask round_set_errors(const RoundSolid *solid, uint flags, const R
     return near_end & near_side;
 }
 
-// The functions with bounds of a shape whose name_round returns it as a RoundSolid.
-#define ROUND_SHAPE(name, Type, two_nappes)                                                                  \
+// The functions with bounds of a shape, which SOLID returns as a RoundSolid.
+#define ROUND_SHAPE(name, Type, two_nappes, SOLID)                                                           \
     static inline CertainHit name##_certain_hit(const Type *shape, const Ray *ray)                           \
     {                                                                                                        \
-        const RoundSolid solid = name##_round(shape, ray);                                                   \
+        const RoundSolid solid = SOLID;                                                                      \
         return round_solid_hit(&solid, shape->id, two_nappes, ray);                                          \
     }                                                                                                        \
                                                                                                              \
     static inline mask name##_set_errors(const Type *shape, const Ray *ray, real t, real place_error,        \
                                          SurfacePoint *point)                                                \
     {                                                                                                        \
-        const RoundSolid solid = name##_round(shape, ray);                                                   \
+        const RoundSolid solid = SOLID;                                                                      \
         return round_set_errors(&solid, shape->id.y, ray, t, place_error, point);                            \
     }
 

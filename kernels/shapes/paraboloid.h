@@ -13,9 +13,9 @@
 #ifndef PARABOLOID_H
 #define PARABOLOID_H
 
+#include "shapes/axial_ray.h"
 #include "shapes/certain_solid.h"
 #include "shapes/ends.h"
-#include "shapes/eye_power.h"
 #include "shapes/quadratic.h"
 #include "shapes/surface_point.h"
 
@@ -30,49 +30,43 @@ static inline Interval paraboloid_slab(real end, Pair from, real towards)
                       lanes_select(leaving | parallel, t, (real)(LARGEST))};
 }
 
+// Returns the apex or, with the eye's power, the axis' point nearest to the eye.
+static inline Vector paraboloid_foot(const Paraboloid *shape)
+{
+    return vector_of(has_eye_power(shape->id) ? shape->foot_lift : shape->apex_k);
+}
+
 static inline EndedCrossings paraboloid_crossings(const Paraboloid *shape, const Ray *ray)
 {
-    Vector axis = vector_of(shape->axis_end);
+    const Vector axis = vector_of(shape->axis_end), foot = paraboloid_foot(shape);
     const real half_k = (real)(0.5f * shape->apex_k.w), k = (real)(shape->apex_k.w);
-    const Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
-    PairVector f = pair_vector_difference(ray->origin, vector_of(shape->apex_k));
-    PairVector d = pair_vector_of(ray->direction), o = pair_vector_of(ray->origin);
     const bool has_power = has_eye_power(shape->id);
-    Vector foot = vector_of(shape->foot_lift);
-    PairVector from_axis = has_power ? pair_vector_difference(ray->origin, foot) : f;
-    PairVector m = pair_vector_cross(from_axis, axis), q = pair_vector_cross(d, axis);
-    PairVector moment = pair_vector_cross(from_axis, ray->direction);
-    Pair height = pair_vector_dot_vector(has_power ? o : f, axis), rise = pair_vector_dot_vector(d, axis);
-    Pair moment_on_axis = pair_vector_dot_vector(moment, axis), bend = pair_scale(rise, half_k);
-    Pair squared_q = pair_vector_dot(q, q), half_b = pair_subtract(pair_vector_dot(m, q), bend);
-    Pair squared_m = pair_vector_dot(m, m), power = squared_m;
+    const AxialRay axial = axial_ray(shape->id, foot, axis, ray);
+    const PairVector m = axial.m, q = axial.q;
+    const Pair squared_m = pair_vector_dot(m, m), a = pair_vector_dot(q, q),
+               bend = pair_scale(axial.rise, half_k), b = pair_subtract(pair_vector_dot(m, q), bend);
+    Pair c = squared_m;
+    Pair off = pair_add(pair_scale(pair_vector_dot(axial.moment, q), k),
+                        pair_multiply(axial.moment_on_axis, axial.moment_on_axis));
     if (has_power) {
-        PairVector beyond = pair_vector_difference(ray->origin, vector_scale(foot, (real)(2)));
-        Pair rest = pair_vector_dot(pair_vector_cross(o, axis), pair_vector_cross(beyond, axis));
-        power = pair_add(pair_of(eye_power_of(shape->id)), rest);
+        c = pair_add(pair_of(eye_power_of(shape->id)), axial_power_change(foot, axis, ray));
+        real lift = real_divide(k * (real)(shape->foot_lift.w), axial.squared_axis.high);
+        off = pair_subtract(off, pair_scale(a, lift));
     }
-    power = pair_subtract(power, pair_scale(height, k));
-    real a = squared_q.high, b = half_b.high, c = power.high;
-    Pair off =
-        pair_add(pair_scale(pair_vector_dot(moment, q), k), pair_multiply(moment_on_axis, moment_on_axis));
+    c = pair_subtract(c, pair_scale(axial.height, k));
+    real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(axial.squared_axis, off)).high;
     if (has_power) {
-        real lift = real_divide(k * (real)(shape->foot_lift.w), squared_axis.high);
-        off = pair_subtract(off, pair_scale(squared_q, lift));
-    }
-    real discriminant = pair_subtract(pair_multiply(bend, bend), pair_multiply(squared_axis, off)).high;
-    if (has_power) {
-        real exact = pair_subtract(pair_multiply(half_b, half_b), pair_multiply(squared_q, power)).high;
-        mask near_side = fabs(c) < (real)(0.5f) * squared_m.high;
-        discriminant = lanes_select(near_side, exact, discriminant);
+        const mask near_side = fabs(c.high) < (real)(0.5f) * squared_m.high;
+        real_replace(&discriminant, near_side, pair_subtract(pair_multiply(b, b), pair_multiply(a, c)).high);
     }
 
     EndedCrossings crossings;
     crossings.real_roots = discriminant >= (real)(0);
     // a ray along the axis has a = 0 and one root, since the other is infinitely far on the open side
-    crossings.side = quadratic_interval(quadratic_roots(a, b, c, discriminant));
+    crossings.side = quadratic_interval(quadratic_roots(a.high, b.high, c.high, discriminant));
     crossings.slab = (Interval){(real)(-LARGEST), (real)(LARGEST)};
     if (shape->id.y & REVOLUTION_FINITE)
-        crossings.slab = paraboloid_slab((real)(shape->axis_end.w), height, rise.high);
+        crossings.slab = paraboloid_slab((real)(shape->axis_end.w), axial.height, axial.rise.high);
     return crossings;
 }
 
@@ -126,18 +120,12 @@ static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ra
 {
     RoundSolid solid;
     Round *round = &solid.round;
-    Vector axis = vector_of(shape->axis_end), apex = vector_of(shape->apex_k);
+    const Vector axis = vector_of(shape->axis_end), foot = paraboloid_foot(shape);
     real inverse = real_divide((real)(1), vector_norm(axis));
     solid.is_finite = shape->id.y & REVOLUTION_FINITE;
-    round->has_power = has_eye_power(shape->id);
+    *round = round_around(shape->id, foot, axis, inverse, ray);
     round->curves = true;
-    round->foot = round->has_power ? vector_of(shape->foot_lift) : apex;
-    round->axis = vector_scale(axis, inverse);
-    round->radius = round->slope = (real)(0);
     round->k = (real)(shape->apex_k.w) * inverse;
-    round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
-    round->foot_norm1 = vector_norm1(round->foot);
-    round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, apex);
     real lift = round->has_power ? (real)(shape->foot_lift.w) * inverse : (real)(0);
     solid.high = (real)(shape->axis_end.w) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high + lift);
@@ -150,6 +138,6 @@ static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ra
     return solid;
 }
 
-ROUND_SHAPE(paraboloid, Paraboloid, false)
+ROUND_SHAPE(paraboloid, Paraboloid, false, paraboloid_round(shape, ray))
 
 #endif

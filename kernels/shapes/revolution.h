@@ -27,25 +27,18 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 // Returns the interval of t between the planes of a finite shape's ends.
 static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
 {
-    Vector axis = vector_of(shape->axis_slope);
+    const Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
     real from, towards;
     if (IS_COMPENSATED) {
-        from = revolution_height(shape, ray).high;
-        towards = pair_vector_dot_vector(pair_vector_of(ray->direction), axis).high;
+        const AxialRay axial = axial_ray(shape->id, base, axis, ray);
+        from = axial.height.high;
+        towards = axial.rise.high;
     } else {
-        Vector f = vector_subtract(ray->origin, vector_of(shape->base_radius));
-        from = vector_dot(has_eye_power(shape->id) ? ray->origin : f, axis);
+        from = vector_dot(has_eye_power(shape->id) ? ray->origin : vector_subtract(ray->origin, base), axis);
         towards = vector_dot(ray->direction, axis);
     }
     return slab_crossings((real)(shape->range.w), (real)(shape->range.x), (real)(0), from, towards,
                           real_inverse_or_zero(towards));
-}
-
-// Returns the lanes whose line may cross the unbounded surface: those with roots, those within a cone except
-// for an interval between its nappes, and those along the side.
-static inline mask revolution_line_crosses(const RevolutionQuadric *quadric)
-{
-    return (quadric->discriminant >= (real)(0)) | (quadric->a <= (real)(0));
 }
 
 // Returns the roots, polished where they are not compensated. A ray along the side has a = 0, one root, c /
@@ -120,7 +113,9 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
         if (!lanes_any(hit)) return hit;
     }
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
-    hit = hit & revolution_line_crosses(&quadric);
+    // Without roots the line misses the side, unless it is within a cone everywhere but between its nappes or
+    // runs along the side.
+    hit = hit & ((quadric.discriminant >= (real)(0)) | (quadric.a <= (real)(0)));
     if (!lanes_any(hit)) return hit;
     const EndedCrossings crossings = revolution_crossings(shape, sloped, ray, &quadric);
     hit = hit & ends_first_hit(shape->id.y, ray, &crossings, t);
@@ -226,16 +221,9 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     Vector base = vector_of(shape->base_radius);
     real inverse = real_divide((real)(1), (real)(shape->range.y));
     solid.is_finite = shape->id.y & REVOLUTION_FINITE;
-    round->has_power = has_eye_power(shape->id);
-    round->curves = false;
-    round->foot = base;
-    round->axis = vector_scale(vector_of(shape->axis_slope), inverse);
+    *round = round_around(shape->id, base, vector_of(shape->axis_slope), inverse, ray);
     round->radius = (real)(shape->base_radius.w) * inverse;
-    round->slope = sloped ? (real)(shape->axis_slope.w) : (real)(0);
-    round->k = (real)(0);
-    round->power = round->has_power ? eye_power_of(shape->id) * inverse * inverse : (real)(0);
-    round->foot_norm1 = vector_norm1(base);
-    round->start = round->has_power ? ray->origin : vector_subtract(ray->origin, base);
+    if (sloped) round->slope = (real)(shape->axis_slope.w);
     solid.low = (real)(shape->range.w) * inverse;
     solid.high = (real)(shape->range.x) * inverse;
     solid.half_height = (real)(0.5f) * (solid.high - solid.low);
@@ -261,12 +249,7 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
         return revolution_surface_point(shape, sloped, ray, t);                                              \
     }                                                                                                        \
                                                                                                              \
-    static inline RoundSolid name##_round(const Revolution *shape, const Ray *ray)                           \
-    {                                                                                                        \
-        return round_of_revolution(shape, sloped, ray);                                                      \
-    }                                                                                                        \
-                                                                                                             \
-    ROUND_SHAPE(name, Revolution, sloped)
+    ROUND_SHAPE(name, Revolution, sloped, round_of_revolution(shape, sloped, ray))
 
 REVOLUTION_SHAPE(cylinder, false)
 REVOLUTION_SHAPE(cone, true)

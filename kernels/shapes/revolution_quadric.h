@@ -13,7 +13,7 @@
 #ifndef REVOLUTION_QUADRIC_H
 #define REVOLUTION_QUADRIC_H
 
-#include "shapes/eye_power.h"
+#include "shapes/axial_ray.h"
 
 typedef struct {
     real a, b, c, discriminant;
@@ -22,79 +22,54 @@ typedef struct {
     mask compensated; // all of these are rounded about once
 } RevolutionQuadric;
 
-// Returns f . w, rounded about once.
-static inline Pair revolution_height(const Revolution *shape, const Ray *ray)
-{
-    Vector axis = vector_of(shape->axis_slope);
-    if (has_eye_power(shape->id)) return pair_vector_dot_vector(pair_vector_of(ray->origin), axis);
-    return pair_vector_dot_vector(pair_vector_difference(ray->origin, vector_of(shape->base_radius)), axis);
-}
-
 static inline mask revolution_near_side(real c, Vector m)
 {
     return fabs(c) < (real)(0.5f) * vector_dot(m, m);
 }
 
-// Computes c by the eye's power, and next to the side the discriminant.
-static inline void revolution_quadric_from_eye(RevolutionQuadric *quadric, const Revolution *shape,
-                                               bool sloped, const Ray *ray, Pair a, Pair b)
+// Returns c by the eye's power.
+static inline Pair revolution_power(const Revolution *shape, bool sloped, const AxialRay *axial,
+                                    const Ray *ray)
 {
-    Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
-    PairVector beyond = pair_vector_difference(ray->origin, vector_scale(base, (real)(2)));
-    Pair c = pair_vector_dot(pair_vector_cross(pair_vector_of(ray->origin), axis),
-                             pair_vector_cross(beyond, axis));
+    Pair c = axial_power_change(vector_of(shape->base_radius), vector_of(shape->axis_slope), ray);
     if (sloped) {
-        real slope = (real)(shape->axis_slope.w), twice_radius = (real)(2) * (real)(shape->base_radius.w);
-        Pair rise = pair_scale(revolution_height(shape, ray), slope);
+        const real twice_radius = (real)(2) * (real)(shape->base_radius.w);
+        const Pair rise = pair_scale(axial->height, (real)(shape->axis_slope.w));
         c = pair_subtract(c, pair_multiply(rise, pair_add(pair_of(twice_radius), rise)));
     }
-    c = pair_add(pair_of(eye_power_of(shape->id)), c);
-    mask near_side = revolution_near_side(c.high, quadric->m);
-    real discriminant = pair_subtract(pair_multiply(b, b), pair_multiply(a, c)).high;
-    quadric->c = c.high;
-    real_replace(&quadric->discriminant, near_side, discriminant);
+    return pair_add(pair_of(eye_power_of(shape->id)), c);
 }
 
 static inline RevolutionQuadric revolution_quadric_compensated(const Revolution *shape, bool sloped,
                                                                const Ray *ray)
 {
-    Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
-    Vector d = ray->direction;
-    real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
-    PairVector f = pair_vector_difference(ray->origin, base);
-    PairVector m = pair_vector_cross(f, axis);
-    PairVector q = pair_vector_cross(pair_vector_of(d), axis);
-    PairVector moment = pair_vector_cross(f, d);
+    const real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
+    const AxialRay axial =
+        axial_ray(shape->id, vector_of(shape->base_radius), vector_of(shape->axis_slope), ray);
+    const PairVector m = axial.m, q = axial.q;
     Pair g = pair_of(radius), h = pair_of((real)(0));
-    PairVector v;
+    PairVector v = {pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};
     if (sloped) {
-        g = pair_add(g, pair_scale(revolution_height(shape, ray), slope));
-        h = pair_scale(pair_vector_dot_vector(pair_vector_of(d), axis), slope);
+        g = pair_add(g, pair_scale(axial.height, slope));
+        h = pair_scale(axial.rise, slope);
         v = (PairVector){pair_difference_of_products(g, q.x, h, m.x),
                          pair_difference_of_products(g, q.y, h, m.y),
                          pair_difference_of_products(g, q.z, h, m.z)};
-    } else {
-        v = (PairVector){pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};
     }
-    Pair moment_on_axis = pair_vector_dot_vector(moment, axis);
-    Pair squared_axis = pair_vector_dot(pair_vector_of(axis), pair_vector_of(axis));
-    Pair a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h));
-    Pair b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h));
-    RevolutionQuadric quadric;
-    quadric.a = a.high;
-    quadric.b = b.high;
-    quadric.c = pair_subtract(pair_vector_dot(m, m), pair_multiply(g, g)).high;
-    quadric.discriminant =
-        pair_subtract(pair_vector_dot(v, v),
-                      pair_multiply(squared_axis, pair_multiply(moment_on_axis, moment_on_axis)))
-            .high;
-    quadric.q = pair_vector_high(q);
-    quadric.m = pair_vector_high(m);
-    quadric.g = g.high;
-    quadric.h = h.high;
-    quadric.compensated = mask_all();
-    if (has_eye_power(shape->id)) revolution_quadric_from_eye(&quadric, shape, sloped, ray, a, b);
-    return quadric;
+    const Pair a = pair_subtract(pair_vector_dot(q, q), pair_multiply(h, h)),
+               b = pair_subtract(pair_vector_dot(m, q), pair_multiply(g, h)),
+               squared_moment = pair_multiply(axial.moment_on_axis, axial.moment_on_axis);
+    Pair c = pair_subtract(pair_vector_dot(m, m), pair_multiply(g, g));
+    real discriminant =
+        pair_subtract(pair_vector_dot(v, v), pair_multiply(axial.squared_axis, squared_moment)).high;
+    if (has_eye_power(shape->id)) {
+        c = revolution_power(shape, sloped, &axial, ray);
+        const mask near_side = revolution_near_side(c.high, pair_vector_high(m));
+        real_replace(&discriminant, near_side, pair_subtract(pair_multiply(b, b), pair_multiply(a, c)).high);
+    }
+    return (RevolutionQuadric){
+        a.high, b.high, c.high,    discriminant, pair_vector_high(q), pair_vector_high(m),
+        g.high, h.high, mask_all()};
 }
 
 static inline RevolutionQuadric revolution_quadric_plain(const Revolution *shape, bool sloped, const Ray *ray)
@@ -114,18 +89,11 @@ static inline RevolutionQuadric revolution_quadric_plain(const Revolution *shape
     } else {
         scaled_radius = radius * vector_norm(q);
     }
-    real scaled_moment = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
-    RevolutionQuadric quadric;
-    quadric.a = real_fma(-h, h, vector_dot(q, q));
-    quadric.b = real_fma(-g, h, vector_dot(m, q));
-    quadric.c = real_fma(-g, g, vector_dot(m, m));
-    quadric.discriminant = (scaled_radius - scaled_moment) * (scaled_radius + scaled_moment);
-    quadric.q = q;
-    quadric.m = m;
-    quadric.g = g;
-    quadric.h = h;
-    quadric.compensated = mask_none();
-    return quadric;
+    const real scaled_moment = (real)(shape->range.y) * fabs(vector_dot(vector_cross(f, d), axis));
+    const real a = real_fma(-h, h, vector_dot(q, q)), b = real_fma(-g, h, vector_dot(m, q)),
+               c = real_fma(-g, g, vector_dot(m, m)),
+               discriminant = (scaled_radius - scaled_moment) * (scaled_radius + scaled_moment);
+    return (RevolutionQuadric){a, b, c, discriminant, q, m, g, h, mask_none()};
 }
 
 static inline RevolutionQuadric revolution_quadric_select(mask condition, RevolutionQuadric yes,

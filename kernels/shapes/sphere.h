@@ -8,55 +8,51 @@
 #include "shapes/quadratic.h"
 
 typedef struct {
-    real b, c;
-} SphereCoefficients;
+    real b, c, discriminant;
+    Vector moment; // E = f x d
+} SphereQuadratic;
 
-// Computes the coefficients, each rounded about once. `to_center` is -f. c is the origin's power: f . f -
-// r^2, or the eye's plus o . (o - 2 center), in which the center's rounding counts only by the origin's
-// distance from the eye.
-static inline SphereCoefficients sphere_coefficients(const Sphere *sphere, PairVector to_center,
-                                                     const Ray *ray)
+// Computes b and c, each rounded about once. c is the origin's power.
+static inline SphereQuadratic sphere_coefficients(const Sphere *sphere, const Ray *ray)
 {
-    SphereCoefficients coefficients = {.b = -pair_vector_dot_once(to_center, ray->direction)};
+    const Vector center = vector_of(sphere->center_radius);
+    const PairVector to_center = pair_vector_difference(center, ray->origin); // -f
+    SphereQuadratic quadratic;
+    quadratic.b = -pair_vector_dot_once(to_center, ray->direction);
     if (has_eye_power(sphere->id)) {
-        Vector twice_center = vector_scale(vector_of(sphere->center_radius), (real)(2));
-        coefficients.c = power_sum(pair_of(eye_power_of(sphere->id)), ray->origin,
-                                   pair_vector_difference(ray->origin, twice_center));
-        return coefficients;
+        quadratic.c = eye_power_at(sphere->id, center, ray->origin);
+        return quadratic;
     }
-    real radius = (real)(sphere->center_radius.w);
-    Pair rr = two_product(radius, radius);
+    const Pair rr = two_product((real)(sphere->center_radius.w), (real)(sphere->center_radius.w));
     PairVector twice_low = to_center;
     twice_low.x.low *= (real)(2);
     twice_low.y.low *= (real)(2);
     twice_low.z.low *= (real)(2);
-    coefficients.c = power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
-    return coefficients;
+    quadratic.c = power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
+    return quadratic;
 }
 
 // Computes the discriminant from rounded b and c, off by 2 u (b^2 + |a c|), for rays that start near the
 // closest approach.
-static inline real sphere_discriminant_near(SphereCoefficients compensated, const Ray *ray)
+static inline real sphere_discriminant_near(const SphereQuadratic *quadratic, const Ray *ray)
 {
-    return difference_of_products(compensated.b, compensated.b, ray->squared, compensated.c);
+    return difference_of_products(quadratic->b, quadratic->b, ray->squared, quadratic->c);
 }
 
-// Computes the discriminant as a r^2 - |E|^2 for the line's moment E = f x d (Lagrange's identity), off by
-// about 10 u a r^2 at any distance.
-static inline real sphere_discriminant_far(Vector moment, real radius, const Ray *ray)
+// Returns the compensated quadratic. Far from the closest approach its discriminant is a r^2 - |E|^2
+// (Lagrange's identity), off by about 10 u a r^2 at any distance.
+static inline SphereQuadratic sphere_quadratic(const Sphere *sphere, const Ray *ray)
 {
-    return real_fma(ray->squared * radius, radius, -vector_dot(moment, moment));
-}
-
-// Returns the more accurate of the two discriminants.
-static inline real sphere_discriminant(SphereCoefficients compensated, Vector moment, real radius,
-                                       const Ray *ray)
-{
-    real discriminant = sphere_discriminant_far(moment, radius, ray);
-    mask near_surface = compensated.b * compensated.b < ray->squared * radius * radius;
+    const real radius = (real)(sphere->center_radius.w);
+    SphereQuadratic quadratic = sphere_coefficients(sphere, ray);
+    quadratic.moment = pair_vector_cross_once(
+        pair_vector_difference(vector_of(sphere->center_radius), ray->origin), ray->direction);
+    quadratic.discriminant =
+        real_fma(ray->squared * radius, radius, -vector_dot(quadratic.moment, quadratic.moment));
+    mask near_surface = quadratic.b * quadratic.b < ray->squared * radius * radius;
     if (lanes_any(near_surface))
-        discriminant = lanes_select(near_surface, sphere_discriminant_near(compensated, ray), discriminant);
-    return discriminant;
+        real_replace(&quadratic.discriminant, near_surface, sphere_discriminant_near(&quadratic, ray));
+    return quadratic;
 }
 
 // Returns the lanes whose rays start outside the sphere and leave it outward. b and c are the coefficients
@@ -101,10 +97,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 
     real discriminant;
     if (IS_COMPENSATED) {
-        PairVector to_center = pair_vector_difference(center, ray->origin);
-        SphereCoefficients compensated = sphere_coefficients(sphere, to_center, ray);
-        Vector moment = pair_vector_cross_once(to_center, ray->direction);
-        discriminant = sphere_discriminant(compensated, moment, radius, ray);
+        const SphereQuadratic compensated = sphere_quadratic(sphere, ray);
+        discriminant = compensated.discriminant;
         b = compensated.b;
         c = compensated.c;
         hit = hit & (discriminant >= (real)(0));
@@ -115,12 +109,10 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         mask hits = half_chord_squared >= (real)(0),
              near_surface = hit & (fabs(c) < (real)(0.5f) * squared_distance);
         if (RARELY(lanes_any(near_surface))) {
-            PairVector to_center = pair_vector_difference(center, ray->origin);
-            SphereCoefficients compensated = sphere_coefficients(sphere, to_center, ray);
-            b = lanes_select(near_surface, compensated.b, b);
-            c = lanes_select(near_surface, compensated.c, c);
-            discriminant =
-                lanes_select(near_surface, sphere_discriminant_near(compensated, ray), discriminant);
+            const SphereQuadratic compensated = sphere_coefficients(sphere, ray);
+            real_replace(&b, near_surface, compensated.b);
+            real_replace(&c, near_surface, compensated.c);
+            real_replace(&discriminant, near_surface, sphere_discriminant_near(&compensated, ray));
             hits = lanes_select(near_surface, discriminant >= (real)(0), hits);
         }
         hit = hit & hits;
@@ -129,21 +121,16 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
     return hit & (*t > ray->tmin);
 }
 
-// Returns the point seen from the center. The compensated form is n = (l -+ h d) / r with l = d x E / a and h
-// the root of the discriminant over a, which loses no bits with distance.
+// Returns the outward normal. The compensated form is n = (l -+ h d) / r with l = d x E / a and h the root of
+// the discriminant over a, which loses no bits with distance.
 static inline Vector sphere_normal(const Sphere *sphere, const Ray *ray, real t)
 {
-    Vector center = vector_of(sphere->center_radius);
-    real radius = (real)(sphere->center_radius.w);
-    if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, center, t));
-    PairVector to_center = pair_vector_difference(center, ray->origin);
-    SphereCoefficients compensated = sphere_coefficients(sphere, to_center, ray);
-    Vector moment = pair_vector_cross_once(to_center, ray->direction);
-    real discriminant = real_max(sphere_discriminant(compensated, moment, radius, ray), (real)(0));
+    if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, vector_of(sphere->center_radius), t));
+    const SphereQuadratic quadratic = sphere_quadratic(sphere, ray);
     real inverse = real_divide((real)(1), ray->squared);
-    Vector l = vector_scale(vector_cross(moment, ray->direction), inverse);
-    real h = real_sqrt(discriminant) * inverse;
-    mask far_side = real_fma(ray->squared, t, compensated.b) > (real)(0);
+    Vector l = vector_scale(vector_cross(quadratic.moment, ray->direction), inverse);
+    real h = real_sqrt(real_max(quadratic.discriminant, (real)(0))) * inverse;
+    mask far_side = real_fma(ray->squared, t, quadratic.b) > (real)(0);
     return vector_normalize(vector_fma(ray->direction, lanes_select(far_side, h, -h), l));
 }
 
@@ -158,22 +145,14 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
     return point;
 }
 
-static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray)
+static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray, mask lanes,
+                                                  mask leaves)
 {
     const real zero = (real)(0);
-    mask leaves = ray_starts_on(ray, sphere->id.x);
-    mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
-    Round round;
-    round.start = ray->origin;
-    round.foot = vector_of(sphere->center_radius);
-    round.axis = (Vector){zero, zero, zero};
+    const Vector no_axis = {zero, zero, zero};
+    Round round = round_around(sphere->id, vector_of(sphere->center_radius), no_axis, (real)(1), ray);
     round.radius = (real)(sphere->center_radius.w);
-    round.slope = round.k = zero;
-    round.power = eye_power_of(sphere->id);
-    round.foot_norm1 = vector_norm1(round.foot);
     round_set_place_errors(&round, ray, zero, ROUND_ERROR);
-    round.has_power = true;
-    round.curves = false;
     const Interval range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));
     CertainInterval side = round_interval(&round, ray, lanes, range, false), slab = round_unbounded();
     return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, leaves);
@@ -185,9 +164,9 @@ static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ra
 
 static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray)
 {
-    if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray);
     mask leaves = ray_starts_on(ray, sphere->id.x);
     mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
+    if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray, lanes, leaves);
     if (!lanes_any(lanes)) return certain_miss();
     CertainSphere crossed =
         certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);

@@ -1,0 +1,37 @@
+// A ray seen from the axis w of a shape, in pairs, from a point F of the axis. With f from F to the ray's
+// start, m = f x w and q = d x w lead away from the axis, turned by a quarter, and E = f x d is the moment.
+#ifndef AXIAL_RAY_H
+#define AXIAL_RAY_H
+
+#include "shapes/eye_power.h"
+
+typedef struct {
+    PairVector m, q, moment;
+    Pair height, rise;                 // f . w, with the eye's power o . w for the ray's origin o; and d . w
+    Pair moment_on_axis, squared_axis; // E . w; w . w
+} AxialRay;
+
+static inline AxialRay axial_ray(uint4 id, Vector foot, Vector axis, const Ray *ray)
+{
+    const PairVector f = pair_vector_difference(ray->origin, foot), d = pair_vector_of(ray->direction),
+                     w = pair_vector_of(axis), moment = pair_vector_cross(f, ray->direction);
+    const PairVector from = has_eye_power(id) ? pair_vector_of(ray->origin) : f;
+    return (AxialRay){pair_vector_cross(f, axis),
+                      pair_vector_cross(d, axis),
+                      moment,
+                      pair_vector_dot_vector(from, axis),
+                      pair_vector_dot_vector(d, axis),
+                      pair_vector_dot_vector(moment, axis),
+                      pair_vector_dot(w, w)};
+}
+
+// Returns (o x w) . ((o - 2 F) x w), by which m . m exceeds its value at the eye. Roundings of F count in
+// it only by the origin's distance from the eye.
+static inline Pair axial_power_change(Vector foot, Vector axis, const Ray *ray)
+{
+    const PairVector beyond = pair_vector_difference(ray->origin, vector_scale(foot, (real)(2)));
+    return pair_vector_dot(pair_vector_cross(pair_vector_of(ray->origin), axis),
+                           pair_vector_cross(beyond, axis));
+}
+
+#endif
