@@ -71,10 +71,12 @@ typedef int scalar_integer;
 #define LANES_TYPE(base)    base
 #define LANES_CONVERT(base) JOIN(convert_, base)
 #define LANES_AS(base)      JOIN(as_, base)
+#define real_load(from)     (*(from))
 #else
 #define LANES_TYPE(base)    JOIN(base, LANES)
 #define LANES_CONVERT(base) JOIN(JOIN(convert_, base), LANES)
 #define LANES_AS(base)      JOIN(JOIN(as_, base), LANES)
+#define real_load(from)     JOIN(vload, LANES)(0, from)
 #endif
 
 typedef LANES_TYPE(REAL_BASE) real;
@@ -368,15 +370,6 @@ static inline void memory_prefetch(global const char *from, uint size)
 #pragma unroll
     for (uint at = 0; at < size; at += 64)
         __builtin_prefetch((global const void *)(from + at));
-#endif
-}
-
-static inline real real_load(global const scalar *from)
-{
-#if LANES == 1
-    return *from;
-#else
-    return JOIN(vload, LANES)(0, from);
 #endif
 }
 

@@ -12,8 +12,9 @@ typedef struct {
     Vector moment; // E = f x d
 } SphereQuadratic;
 
-// Computes b and c, each rounded about once. c is the origin's power.
-static inline SphereQuadratic sphere_coefficients(const Sphere *sphere, const Ray *ray)
+// Returns the quadratic for rays that start near the closest approach. b and c, the origin's power, are each
+// rounded about once, and the discriminant, b^2 - a c, is off by 2 u (b^2 + |a c|).
+static inline SphereQuadratic sphere_quadratic_near(const Sphere *sphere, const Ray *ray)
 {
     const Vector center = vector_of(sphere->center_radius);
     const PairVector to_center = pair_vector_difference(center, ray->origin); // -f
@@ -21,37 +22,29 @@ static inline SphereQuadratic sphere_coefficients(const Sphere *sphere, const Ra
     quadratic.b = -pair_vector_dot_once(to_center, ray->direction);
     if (has_eye_power(sphere->id)) {
         quadratic.c = eye_power_at(sphere->id, center, ray->origin);
-        return quadratic;
+    } else {
+        const Pair rr = two_product((real)(sphere->center_radius.w), (real)(sphere->center_radius.w));
+        PairVector twice_low = to_center;
+        twice_low.x.low *= (real)(2);
+        twice_low.y.low *= (real)(2);
+        twice_low.z.low *= (real)(2);
+        quadratic.c = power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
     }
-    const Pair rr = two_product((real)(sphere->center_radius.w), (real)(sphere->center_radius.w));
-    PairVector twice_low = to_center;
-    twice_low.x.low *= (real)(2);
-    twice_low.y.low *= (real)(2);
-    twice_low.z.low *= (real)(2);
-    quadratic.c = power_sum((Pair){-rr.high, -rr.low}, pair_vector_high(to_center), twice_low);
+    quadratic.discriminant = difference_of_products(quadratic.b, quadratic.b, ray->squared, quadratic.c);
     return quadratic;
 }
 
-// Computes the discriminant from rounded b and c, off by 2 u (b^2 + |a c|), for rays that start near the
-// closest approach.
-static inline real sphere_discriminant_near(const SphereQuadratic *quadratic, const Ray *ray)
-{
-    return difference_of_products(quadratic->b, quadratic->b, ray->squared, quadratic->c);
-}
-
-// Returns the compensated quadratic. Far from the closest approach its discriminant is a r^2 - |E|^2
+// Returns the quadratic for all rays. Far from the closest approach the discriminant is a r^2 - |E|^2
 // (Lagrange's identity), off by about 10 u a r^2 at any distance.
 static inline SphereQuadratic sphere_quadratic(const Sphere *sphere, const Ray *ray)
 {
     const real radius = (real)(sphere->center_radius.w);
-    SphereQuadratic quadratic = sphere_coefficients(sphere, ray);
-    quadratic.moment = pair_vector_cross_once(
-        pair_vector_difference(vector_of(sphere->center_radius), ray->origin), ray->direction);
-    quadratic.discriminant =
-        real_fma(ray->squared * radius, radius, -vector_dot(quadratic.moment, quadratic.moment));
-    mask near_surface = quadratic.b * quadratic.b < ray->squared * radius * radius;
-    if (lanes_any(near_surface))
-        real_replace(&quadratic.discriminant, near_surface, sphere_discriminant_near(&quadratic, ray));
+    const PairVector to_center = pair_vector_difference(vector_of(sphere->center_radius), ray->origin);
+    SphereQuadratic quadratic = sphere_quadratic_near(sphere, ray);
+    const Vector moment = quadratic.moment = pair_vector_cross_once(to_center, ray->direction);
+    const mask is_far = !(quadratic.b * quadratic.b < ray->squared * radius * radius);
+    real_replace(&quadratic.discriminant, is_far,
+                 real_fma(ray->squared * radius, radius, -vector_dot(moment, moment)));
     return quadratic;
 }
 
@@ -109,10 +102,10 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
         mask hits = half_chord_squared >= (real)(0),
              near_surface = hit & (fabs(c) < (real)(0.5f) * squared_distance);
         if (RARELY(lanes_any(near_surface))) {
-            const SphereQuadratic compensated = sphere_coefficients(sphere, ray);
+            const SphereQuadratic compensated = sphere_quadratic_near(sphere, ray);
             real_replace(&b, near_surface, compensated.b);
             real_replace(&c, near_surface, compensated.c);
-            real_replace(&discriminant, near_surface, sphere_discriminant_near(&compensated, ray));
+            real_replace(&discriminant, near_surface, compensated.discriminant);
             hits = lanes_select(near_surface, discriminant >= (real)(0), hits);
         }
         hit = hit & hits;
