@@ -65,8 +65,8 @@ static inline RoundPoint round_point(const Round *round, const Ray *ray, real t)
     point.across = round_across(round, round->has_power ? vector_subtract(x, round->foot) : x);
     point.rho = vector_norm(point.across);
     point.radius = real_fma(round->slope, z, round->radius);
-    // the contribution of z, since the axis' length is off by 14 u, to the squared distance from the axis
-    const real left_of_z = (real)(20 * UNIT_ROUNDOFF) * z;
+    // the axis' length is off by 14.5 u, so that 29 u of z remain in the vector across it
+    const real left_of_z = (real)(32 * UNIT_ROUNDOFF) * z;
     real band = left_of_z * left_of_z;
     Bounded from_eye = {(real)(0), (real)(0)};
     if (round->has_power) {

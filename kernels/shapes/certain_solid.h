@@ -68,10 +68,11 @@ static inline Interval interval_above(real slope, real least)
 // Returns the interval between the heights low and high.
 static inline CertainInterval round_slab(const Round *round, const Ray *ray, real low, real high)
 {
-    const real few = (real)(4 * UNIT_ROUNDOFF); // the error of the ends' subtractions
+    // an end is off by 2 u, its difference from z by u, that from the error by u, and their quotient by 5 u
+    const real few = (real)(9 * UNIT_ROUNDOFF);
     real z = vector_dot(round->axis, round->start), rise = vector_dot(round->axis, ray->direction);
-    real low_error = real_fma(few, fabs(low), round->start_error),
-         high_error = real_fma(few, fabs(high), round->start_error);
+    real low_error = real_fma(few, fabs(low) + fabs(z), round->start_error),
+         high_error = real_fma(few, fabs(high) + fabs(z), round->start_error);
     real error_per_t = round->error_per_t;
     CertainInterval slab;
     slab.outer = intervals_common(interval_above(rise + error_per_t, low - z - low_error),
