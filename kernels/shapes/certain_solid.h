@@ -115,19 +115,31 @@ static inline CertainHit nappes_first_hit(Round round, uint flags, const Ray *ra
     return first;
 }
 
-// Returns the lanes where the exact ray stays clearly off the axis of a finite solid. Most rays that miss the
-// solid do, and the other tests take many times as long.
-static inline mask solid_is_off_line(const RoundSolid *solid, const Ray *ray)
+// Returns the lanes where the exact ray stays clearly off the axis of a finite solid or an unbounded
+// cylinder, or off an unbounded double cone. Most rays that miss the solid do, and the other tests take many
+// times as long.
+static inline mask solid_is_off_line(const RoundSolid *solid, bool two_nappes, const Ray *ray)
 {
     const Round *round = &solid->round;
-    if (round->has_power) return mask_none();
-    // The exact ray reaches the solid within `farthest` and its error there, which therefore exceeds `error`
-    // by less than g / (1 - g) of it for the direction's error g, or a 60th. The 2% of line_is_off_axis cover
-    // it.
-    const real farthest =
-        vector_norm1(round->start) + solid->widest + real_max(fabs(solid->low), fabs(solid->high));
-    const real error = real_fma(round->error_per_t, farthest * ray_inverse_length(ray), round->start_error);
-    return line_is_off_axis(round->start, solid->widest + error, round->axis, (real)(1), ray);
+    const real zero = (real)(0);
+    if (round->has_power || (round->curves && !solid->is_finite)) return mask_none();
+    const real size = vector_norm1(round->start);
+    if (solid->is_finite) {
+        // The exact ray reaches the solid within `farthest` and its error there, which therefore exceeds
+        // `error` by less than g / (1 - g) of it for the direction's error g, or a 60th. The 2% of
+        // line_is_off_axis cover it.
+        const real farthest = size + solid->widest + real_max(fabs(solid->low), fabs(solid->high));
+        const real error =
+            real_fma(round->error_per_t, farthest * ray_inverse_length(ray), round->start_error);
+        return line_is_off_axis(round->start, solid->widest + error, round->axis, (real)(1), zero, ray);
+    }
+    if (two_nappes) {
+        const real from_apex = divide_or(round->radius, round->slope, NEVER);
+        return line_is_off_cone(vector_fma(round->axis, from_apex, round->start), size + fabs(from_apex),
+                                round->slope, round->axis, round->start_error, round->error_per_t, ray);
+    }
+    return line_is_off_axis(round->start, round->radius + round->start_error, round->axis, (real)(1),
+                            round->error_per_t, ray);
 }
 
 static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool two_nappes, const Ray *ray)
@@ -135,9 +147,9 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
     const Round *round = &solid->round;
     mask leaves = ray_starts_on(ray, id.x), lanes = RAY_ACTIVE(ray);
     Interval part;
+    lanes = lanes & !solid_is_off_line(solid, two_nappes, ray);
+    if (!lanes_any(lanes)) return certain_miss();
     if (solid->is_finite) {
-        lanes = lanes & !solid_is_off_line(solid, ray);
-        if (!lanes_any(lanes)) return certain_miss();
         const BoundedLine bounded =
             line_within_bounds(solid->middle, solid->widest + solid->half_height + round->start_error, ray);
         lanes = lanes & bounded.lanes;

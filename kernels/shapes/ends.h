@@ -5,17 +5,39 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// Returns the lanes whose line from + t d stays at least 2% farther than `reach` from the axis w through 0.
-// With q = d x w it is |from . q| > reach |q|. Roundings change the two sides by less than 15 u (|from| +
-// reach) |d| |w|, and (a + b)^2 <= (1 + 2^-6) a^2 + (1 + 2^6) b^2.
-static inline mask line_is_off_axis(Vector from, real reach, Vector axis, real squared_axis, const Ray *ray)
+// Returns the lanes whose line from + t d stays at least 2% farther than `reach` from the axis w through 0,
+// even if its points are off by error_per_t |t|. With q = d x w its distance at the closest point is |from .
+// q| / |q|, and |t| there at most |from| |w| / |q|. If error_per_t is below an eighth of |q| / |w|, points
+// farther along the line lose less by it than 1% of that distance and their own gain. Roundings change the
+// sides by less than 15 u (|from| + reach) |d| |w|, and (a + b)^2 <= (1 + 2^-6) a^2 + (1 + 2^6) b^2.
+static inline mask line_is_off_axis(Vector from, real reach, Vector axis, real squared_axis, real error_per_t,
+                                    const Ray *ray)
 {
     const Vector q = vector_cross(ray->direction, axis);
-    const real moment = vector_dot(from, q), squared_reach = reach * reach;
-    const real slack = (real)(0x1p15f * UNIT_ROUNDOFF * UNIT_ROUNDOFF) *
-                       ((vector_dot(from, from) + squared_reach) * ray->squared * squared_axis);
-    return moment * moment >
-           real_fma((real)(1 + 0x1p-4f) * squared_reach, vector_dot(q, q), slack + (real)(SMALLEST_RATIO));
+    const real moment = vector_dot(from, q), squared_q = vector_dot(q, q), squared_reach = reach * reach,
+               squared_error = error_per_t * error_per_t;
+    const real slack = (vector_dot(from, from) + squared_reach) * squared_axis *
+                       real_fma((real)(0x1p7f), squared_error,
+                                (real)(0x1p15f * UNIT_ROUNDOFF * UNIT_ROUNDOFF) * ray->squared);
+    return (moment * moment >
+            real_fma((real)(1 + 0x1p-4f) * squared_reach, squared_q, slack + (real)(SMALLEST_RATIO))) &
+           ((real)(0x1p6f) * squared_error * squared_axis <= squared_q);
+}
+
+// Returns the lanes whose line from + t d stays clearly off the double cone of a slope k around the unit axis
+// w through its apex 0. The plane through line and apex, with the normal n = from x d, then does, since |n .
+// w| / |n|, the sine of its angle to the axis, exceeds the cone's, k / sqrt(1 + k^2), by more than the errors
+// of points over their distances from the apex, |n| / |d| or more. A point at t is off by start_error +
+// error_per_t |t|. `size` bounds |from| and its rounding; error_per_t counts roundings of at least 16 u |d|.
+static inline mask line_is_off_cone(Vector from, real size, real slope, Vector axis, real start_error,
+                                    real error_per_t, const Ray *ray)
+{
+    const Vector n = vector_cross(from, ray->direction);
+    const real along = vector_dot(n, axis), squared_slope = slope * slope,
+               squared_secant = (real)(1) + squared_slope, spread = (real)(3) * error_per_t * size,
+               squared_error = real_fma(spread, spread, start_error * start_error * ray->squared);
+    return squared_secant * (along * along - (real)(34) * squared_error) >
+           real_fma((real)(1 + 0x1p-4f) * squared_slope, vector_dot(n, n), (real)(SMALLEST_RATIO));
 }
 
 // The intervals of t that decide where a ray hits the side and the caps.

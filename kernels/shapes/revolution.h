@@ -80,13 +80,24 @@ static inline scalar revolution_widest(const Revolution *shape)
     return fmax(fma(slope, shape->range.w, base), fma(slope, shape->range.x, base));
 }
 
-// Returns the lanes whose line stays clearly off the axis of a finite shape, without pairs.
-static inline mask revolution_is_off_line(const Revolution *shape, const Ray *ray)
+// Returns the lanes whose line stays clearly off the axis of a finite shape or an unbounded cylinder, or off
+// an unbounded double cone, without pairs.
+static inline mask revolution_is_off_line(const Revolution *shape, bool sloped, const Ray *ray)
 {
-    if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return mask_none();
-    const Vector from = vector_subtract(ray->origin, vector_of(shape->base_radius));
-    const real reach = (real)(uniform_divide(revolution_widest(shape), shape->range.y));
-    return line_is_off_axis(from, reach, vector_of(shape->axis_slope), (real)(shape->range.z), ray);
+    if (has_eye_power(shape->id)) return mask_none();
+    const Vector from = vector_subtract(ray->origin, vector_of(shape->base_radius)),
+                 axis = vector_of(shape->axis_slope);
+    const scalar inverse = uniform_divide(1, shape->range.y);
+    if (sloped && !(shape->id.y & REVOLUTION_FINITE)) {
+        const scalar from_apex = uniform_divide(shape->base_radius.w * inverse, shape->axis_slope.w);
+        const Vector unit = vector_scale(axis, (real)(inverse));
+        return line_is_off_cone(vector_fma(unit, (real)(from_apex), from),
+                                vector_norm1(from) + (real)(fabs(from_apex)), (real)(shape->axis_slope.w),
+                                unit, (real)(0), (real)(32 * UNIT_ROUNDOFF) * vector_norm1(ray->direction),
+                                ray);
+    }
+    return line_is_off_axis(from, (real)(revolution_widest(shape) * inverse), axis, (real)(shape->range.z),
+                            (real)(0), ray);
 }
 
 // Returns the lanes whose point at t is not farther from the axis than the shape's largest radius, within 8 u
@@ -106,7 +117,7 @@ static inline mask revolution_hit(const Revolution *shape, bool sloped, const Ra
 {
     mask hit = RAY_ACTIVE(ray);
     if (IS_COMPENSATED) {
-        hit = hit & !revolution_is_off_line(shape, ray);
+        hit = hit & !revolution_is_off_line(shape, sloped, ray);
         if (!lanes_any(hit)) return hit;
     }
     RevolutionQuadric quadric = revolution_quadric(shape, sloped, ray);
