@@ -17,6 +17,12 @@ typedef struct {
     real value, error;
 } Bounded;
 
+static inline Bounded bounded_select(mask condition, Bounded yes, Bounded no)
+{
+    return (Bounded){lanes_select(condition, yes.value, no.value),
+                     lanes_select(condition, yes.error, no.error)};
+}
+
 // A divisor must exceed its error by this factor. The exact divisor is then at least 7/8 of the computed one,
 // and 8/7 is below DIVISOR_SLACK.
 #define DIVISOR_MIN   ((real)(8))

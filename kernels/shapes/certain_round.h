@@ -1,9 +1,7 @@
-// Finds bounded hits on surfaces of revolution, and on spheres with the eye's power. The side bounds a
-// convex set, so the exact ray is within it along one interval of t. Roots are computed approximately.
-// Points next to them are then evaluated, and only the conclusions that their values prove beyond all errors
-// count. The constants of steps and widths only choose the points.
-//
-// A sphere with the eye's power is a cylinder whose axis is 0.
+// Finds bounded hits on surfaces of revolution. The side bounds a convex set, so the exact ray is within it
+// along one interval of t. Roots are computed approximately. Points next to them are then evaluated, and only
+// the conclusions that their values prove beyond all errors count. The constants of steps and widths only
+// choose the points.
 #ifndef CERTAIN_ROUND_H
 #define CERTAIN_ROUND_H
 
@@ -17,7 +15,7 @@
 typedef struct {
     Vector start; // the ray's origin, seen from the base or, with a power, from the eye
     Vector foot;  // a point of the axis, seen from the same point
-    Vector axis;  // unit, or 0
+    Vector axis;  // unit
     real radius, slope, k;
     real power;                                    // with HAS_POWER, that for the unit axis
     real foot_norm1, start_norm1, direction_norm1; // 1-norms, the last of the ray's direction

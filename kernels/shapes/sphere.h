@@ -138,17 +138,73 @@ static inline SurfacePoint sphere_surface_point(const Sphere *sphere, const Ray 
     return point;
 }
 
+// The power along the exact ray, over the direction's square, is t^2 + 2 middle t + start for a sphere with
+// the eye's power. The bounds count the errors of the ray and of the center, which for `start` counts only by
+// the origin's distance from the eye.
+typedef struct {
+    Bounded middle, start;
+} BoundedPower;
+
+static inline BoundedPower sphere_power_along(const Sphere *sphere, const Ray *ray)
+{
+    const Vector center = vector_of(sphere->center_radius), from = vector_subtract(ray->origin, center);
+    const real u = (real)(UNIT_ROUNDOFF), power = eye_power_of(sphere->id), moved = ray->origin_error;
+    const real size = vector_norm1(ray->origin), center_size = vector_norm1(center),
+               sizes = size + center_size, distance = real_fma((real)(16) * u, sizes, vector_norm1(from));
+    const real turned = real_fma(ray->length, ray->direction_error, ray->ends_at_light ? moved : (real)(0));
+    const Vector beyond = vector_fma(center, (real)(-2), ray->origin);
+    const Bounded a = {ray->squared,
+                       real_fma(turned, ray->length + ray->length + turned, (real)(8) * u * ray->squared)};
+    const Bounded b = {
+        vector_dot(from, ray->direction),
+        real_fma(turned, distance + moved, ray->length * real_fma((real)(8) * u, sizes, moved))};
+    const Bounded c = {power + vector_dot(ray->origin, beyond),
+                       real_fma((real)(16) * u, real_fma(size, sizes + center_size, fabs(power)),
+                                moved * (distance + distance + moved))};
+    BoundedPower along = {bounded_quotient(b, a), bounded_quotient(c, a)};
+    along.start.error = along.start.error + (real)(SMALLEST_RATIO); // its terms may underflow
+    return along;
+}
+
+// A discriminant must exceed its error by this factor to be certain. The error of its root is at most the
+// discriminant's over the root.
+#define DISCRIMINANT_MIN ((real)(8))
+
+// Returns the first hit of a sphere with the eye's power. The roots are start / q and q or -q for q =
+// |middle| + sqrt(middle^2 - start), in which nothing cancels.
 static inline CertainHit sphere_power_certain_hit(const Sphere *sphere, const Ray *ray, mask lanes,
                                                   mask leaves)
 {
-    const real zero = (real)(0);
-    const Vector no_axis = {zero, zero, zero};
-    Round round = round_around(sphere->id, vector_of(sphere->center_radius), no_axis, (real)(1), ray);
-    round.radius = (real)(sphere->center_radius.w);
-    round_set_place_errors(&round, ray, zero, ROUND_ERROR);
-    const Interval range = round_range(ray, round.foot_norm1 + round.radius + vector_norm1(ray->origin));
-    CertainInterval side = round_interval(&round, ray, lanes, range, false), slab = round_unbounded();
-    return round_first_hit(sphere->id.y & IGNORES_FRONT_FACES, ray, &side, &slab, leaves);
+    const real u = (real)(UNIT_ROUNDOFF);
+    const BoundedPower along = sphere_power_along(sphere, ray);
+    const Bounded middle = along.middle, start = along.start;
+    const real far_middle = fabs(middle.value);
+    const Bounded discriminant = {
+        real_fma(middle.value, middle.value, -start.value),
+        real_fma(middle.error, far_middle + far_middle + middle.error,
+                 real_fma((real)(8) * u, middle.value * middle.value, start.error))};
+    // Whether the ray starts outside or inside, wherever between tmin and -tmin.
+    const real change = (real)(2.0625f) * (far_middle + middle.error);
+    const mask outside = start.value - start.error > change * -ray->tmin,
+               inside = start.value + start.error < (change - ray->tmin) * ray->tmin;
+    const mask misses =
+                   (outside & (middle.value > middle.error)) | (discriminant.value < -discriminant.error),
+               perhaps = lanes & !misses;
+    if (!lanes_any(perhaps)) return certain_miss();
+
+    const mask is_far = sphere->id.y & IGNORES_FRONT_FACES ? mask_all() : leaves | inside;
+    const mask certain = perhaps & (discriminant.value > DISCRIMINANT_MIN * discriminant.error) &
+                         (inside | ((outside | leaves) & (middle.value < -middle.error)));
+    const real root = real_sqrt(lanes_select(certain, discriminant.value, (real)(1)));
+    const Bounded q = {far_middle + root,
+                       middle.error + real_fma((real)(8) * u, root, real_divide(discriminant.error, root))};
+    const Bounded size = {fabs(start.value), start.error};
+    const Bounded t = bounded_select(is_far & (middle.value < (real)(0)), q, bounded_quotient(size, q));
+    const real earliest =
+        lanes_select(outside, real_divide(start.value - start.error, change), (real)(-LARGEST));
+    const real low = lanes_select(certain, t.value - t.error, earliest),
+               high = lanes_select(certain, t.value + t.error, NEVER);
+    return certain_at(certain_crossing(ray, certain, perhaps, low, high), t.value);
 }
 
 // A ray that starts on the sphere crosses it again twice as far as the closest point, whose error counts
@@ -159,8 +215,8 @@ static inline CertainHit sphere_certain_hit(const Sphere *sphere, const Ray *ray
 {
     mask leaves = ray_starts_on(ray, sphere->id.x);
     mask lanes = RAY_ACTIVE(ray) & !(leaves & ray->leaves_outward);
-    if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray, lanes, leaves);
     if (!lanes_any(lanes)) return certain_miss();
+    if (has_eye_power(sphere->id)) return sphere_power_certain_hit(sphere, ray, lanes, leaves);
     CertainSphere crossed =
         certain_sphere(vector_of(sphere->center_radius), (real)(sphere->center_radius.w), ray, lanes);
     if (!lanes_any(crossed.perhaps)) return certain_miss();
