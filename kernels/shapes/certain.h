@@ -1,6 +1,6 @@
 // Finds hits with proven bounds, for images at `certified`. Each shape is intersected with the exact ray,
 // which the packet's ray only approximates, and as the exact shape, whose numbers were rounded.
-// docs/numerics.md derives every bound. Constants leave slack beyond what it needs.
+// docs/numerics.md states every bound. Constants leave slack beyond what it needs.
 //
 // The exact ray's point at t, or its line's point before it starts, lies within origin_error +
 // direction_error |d| t of the packet's. So a shape is certainly hit if the packet's ray hits it shrunk by

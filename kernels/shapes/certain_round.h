@@ -44,7 +44,7 @@ static inline Bounded round_value_from_eye(const Round *round, Vector x, real z)
     const real rise = round->slope * z, twice = round->radius + round->radius, size = vector_norm1(x),
                lift = round->curves ? round->k * z : rise * (twice + rise),
                terms = real_fma(size, size + round->foot_norm1 + round->foot_norm1,
-                                fabs(lift) + fabs(rise) * fabs(twice) + fabs(round->power));
+                                fabs(lift) + fabs(rise) * fabs(twice) + (real)(2) * fabs(round->power));
     const Vector beyond = vector_fma(round->foot, (real)(-2), x);
     return (Bounded){round->power + (vector_dot(round_across(round, x), round_across(round, beyond)) - lift),
                      (real)(16 * UNIT_ROUNDOFF) * terms};

@@ -5,16 +5,18 @@
 #include "shapes/interval.h"
 #include "traversal/ray.h"
 
-// Returns the lanes whose line from + t d stays at least 2% farther than `reach` from the axis w through 0,
-// even if its points are off by error_per_t |t|. With q = d x w its distance at the closest point is |from .
-// q| / |q|, and |t| there at most |from| |w| / |q|. If error_per_t is below an eighth of |q| / |w|, points
-// farther along the line lose less by it than 1% of that distance and their own gain. Roundings change the
-// sides by less than 15 u (|from| + reach) |d| |w|, and (a + b)^2 <= (1 + 2^-6) a^2 + (1 + 2^6) b^2.
-static inline mask line_is_off_axis(Vector from, real reach, Vector axis, real squared_axis, real error_per_t,
-                                    const Ray *ray)
+// Returns the lanes whose line from + t d stays farther than the reach from the axis w through 0, by 2% if
+// error_per_t is 0, although its points may be off by error_per_t |t|. With q = d x w the line's distance is
+// |from . q| / |q| at the closest point, where |t| is at most |from| |w| / |q|. If error_per_t is at most an
+// eighth of |q| / |w|, points farther along the line lose less than they gain, up to a factor of 1.016 for
+// the squares. Roundings change the sides by less than 15 u (|from| + reach) |d| |w|. By (a + b)^2 <= (1 + m)
+// a^2 + (1 + 1 / m) b^2 with m = 1/64 or, with an error_per_t, m = 0.045, 29,300 of the 2^15 and 47 of the
+// 2^7 are needed.
+static inline mask line_is_off_axis(Vector from, real squared_reach, Vector axis, real squared_axis,
+                                    real error_per_t, const Ray *ray)
 {
     const Vector q = vector_cross(ray->direction, axis);
-    const real moment = vector_dot(from, q), squared_q = vector_dot(q, q), squared_reach = reach * reach,
+    const real moment = vector_dot(from, q), squared_q = vector_dot(q, q),
                squared_error = error_per_t * error_per_t;
     const real slack = (vector_dot(from, from) + squared_reach) * squared_axis *
                        real_fma((real)(0x1p7f), squared_error,
@@ -24,17 +26,21 @@ static inline mask line_is_off_axis(Vector from, real reach, Vector axis, real s
            ((real)(0x1p6f) * squared_error * squared_axis <= squared_q);
 }
 
-// Returns the lanes whose line from + t d stays clearly off the double cone of a slope k around the unit axis
-// w through its apex 0. The plane through line and apex, with the normal n = from x d, then does, since |n .
-// w| / |n|, the sine of its angle to the axis, exceeds the cone's, k / sqrt(1 + k^2), by more than the errors
-// of points over their distances from the apex, |n| / |d| or more. A point at t is off by start_error +
-// error_per_t |t|. `size` bounds |from| and its rounding; error_per_t counts roundings of at least 16 u |d|.
-static inline mask line_is_off_cone(Vector from, real size, real slope, Vector axis, real start_error,
-                                    real error_per_t, const Ray *ray)
+// Returns the lanes whose line from + t d certainly stays off the double cone of a slope k around the unit
+// axis w through its apex 0. The plane through the line and the apex, with the normal n = from x d, decides:
+// it stays off the cone if |n . w| / |n|, the sine of its angle to the axis, exceeds k / sqrt(1 + k^2), the
+// sine of the cone's angle. The line's points are at least |n| / |d| from the apex and off by start_error +
+// error_per_t |t|, where error_per_t |d| is at least 16 u |d|^2 for roundings. Over that distance this is at
+// most (start_error |d| + 2 error_per_t |from|) / |n|, to which the sine of the difference of both angles, at
+// least the difference of their sines, is compared. By (a + b)^2 <= (1 + 1/16) a^2 + 17 b^2 and twice the
+// squares of b's terms, 34 of each square are needed.
+static inline mask line_is_off_cone(Vector from, real slope, Vector axis, real start_error, real error_per_t,
+                                    const Ray *ray)
 {
     const Vector n = vector_cross(from, ray->direction);
     const real along = vector_dot(n, axis), squared_slope = slope * slope,
-               squared_secant = (real)(1) + squared_slope, spread = (real)(3) * error_per_t * size,
+               squared_secant = (real)(1) + squared_slope,
+               spread = (real)(3) * error_per_t * vector_norm1(from),
                squared_error = real_fma(spread, spread, start_error * start_error * ray->squared);
     return squared_secant * (along * along - (real)(34) * squared_error) >
            real_fma((real)(1 + 0x1p-4f) * squared_slope, vector_dot(n, n), (real)(SMALLEST_RATIO));

@@ -70,16 +70,16 @@ static inline EndedCrossings paraboloid_crossings(const Paraboloid *shape, const
     return crossings;
 }
 
-// Returns the lanes whose line stays clearly off the axis of a finite shape, without pairs. The radius at the
-// end e is the root of k e / |w|^2.
+// Returns the lanes whose line stays clearly off the axis of a finite shape, without pairs. The squared
+// radius at the end e is k e / |w|^2.
 static inline mask paraboloid_is_off_line(const Paraboloid *shape, const Ray *ray)
 {
     if (!(shape->id.y & REVOLUTION_FINITE) || has_eye_power(shape->id)) return mask_none();
     const Vector axis = vector_of(shape->axis_end);
     const real squared_axis = vector_dot(axis, axis),
-               reach = real_sqrt(real_divide((real)(shape->apex_k.w * shape->axis_end.w), squared_axis));
-    return line_is_off_axis(vector_subtract(ray->origin, vector_of(shape->apex_k)), reach, axis, squared_axis,
-                            (real)(0), ray);
+               squared_reach = real_divide((real)(shape->apex_k.w * shape->axis_end.w), squared_axis);
+    return line_is_off_axis(vector_subtract(ray->origin, vector_of(shape->apex_k)), squared_reach, axis,
+                            squared_axis, (real)(0), ray);
 }
 
 static inline mask paraboloid_hit(const Paraboloid *shape, const Ray *ray, real *t)

@@ -81,23 +81,18 @@ static inline scalar revolution_widest(const Revolution *shape)
 }
 
 // Returns the lanes whose line stays clearly off the axis of a finite shape or an unbounded cylinder, or off
-// an unbounded double cone, without pairs.
+// an unbounded double cone, whose base is its apex. Needs no pairs.
 static inline mask revolution_is_off_line(const Revolution *shape, bool sloped, const Ray *ray)
 {
     if (has_eye_power(shape->id)) return mask_none();
+    const real zero = (real)(0);
     const Vector from = vector_subtract(ray->origin, vector_of(shape->base_radius)),
                  axis = vector_of(shape->axis_slope);
-    const scalar inverse = uniform_divide(1, shape->range.y);
-    if (sloped && !(shape->id.y & REVOLUTION_FINITE)) {
-        const scalar from_apex = uniform_divide(shape->base_radius.w * inverse, shape->axis_slope.w);
-        const Vector unit = vector_scale(axis, (real)(inverse));
-        return line_is_off_cone(vector_fma(unit, (real)(from_apex), from),
-                                vector_norm1(from) + (real)(fabs(from_apex)), (real)(shape->axis_slope.w),
-                                unit, (real)(0), (real)(32 * UNIT_ROUNDOFF) * vector_norm1(ray->direction),
-                                ray);
-    }
-    return line_is_off_axis(from, (real)(revolution_widest(shape) * inverse), axis, (real)(shape->range.z),
-                            (real)(0), ray);
+    const scalar inverse = uniform_divide(1, shape->range.y), reach = revolution_widest(shape) * inverse;
+    if (sloped && !(shape->id.y & REVOLUTION_FINITE))
+        return line_is_off_cone(from, (real)(shape->axis_slope.w), vector_scale(axis, (real)(inverse)), zero,
+                                (real)(32 * UNIT_ROUNDOFF) * vector_norm1(ray->direction), ray);
+    return line_is_off_axis(from, (real)(reach * reach), axis, (real)(shape->range.z), zero, ray);
 }
 
 // Returns the lanes whose point at t is not farther from the axis than the shape's largest radius, within 8 u
