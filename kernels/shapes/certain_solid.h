@@ -3,7 +3,7 @@
 #ifndef CERTAIN_SOLID_H
 #define CERTAIN_SOLID_H
 
-#include "shapes/certain_round.h"
+#include "shapes/certain_cylinder.h"
 #include "shapes/certain_sphere.h"
 #include "shapes/ends.h"
 
@@ -47,7 +47,7 @@ static inline CertainInterval round_unbounded(void)
 // A round body with its ends' heights.
 typedef struct {
     Round round;
-    bool is_finite;
+    bool is_finite, is_straight; // is_straight: the side is a cylinder
     real low, high;              // the ends' heights
     real half_height;            // half the distance between them
     real widest;                 // the largest radius
@@ -147,7 +147,10 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
     Interval part;
     lanes = lanes & !solid_is_off_line(solid, two_nappes, ray);
     if (!lanes_any(lanes)) return certain_miss();
-    if (solid->is_finite) {
+    const bool is_cylinder = solid->is_straight && !round->has_power;
+    if (is_cylinder) {
+        part = (Interval){(real)(-LARGEST), (real)(LARGEST)};
+    } else if (solid->is_finite) {
         const BoundedLine bounded =
             line_within_bounds(solid->middle, solid->widest + solid->half_height + round->start_error, ray);
         lanes = lanes & bounded.lanes;
@@ -167,7 +170,9 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
         lanes = lanes & slab.perhaps;
         if (!lanes_any(lanes)) return certain_miss();
     }
-    CertainInterval side = round_interval(round, ray, lanes, part, solid->is_finite);
+    const CertainInterval side =
+        is_cylinder ? cylinder_interval(round, ray, lanes, intervals_common(slab.outer, part))
+                    : round_interval(round, ray, lanes, part, solid->is_finite);
     return round_first_hit(id.y, ray, &side, &slab, leaves);
 }
 

@@ -137,6 +137,7 @@ static inline RoundSolid paraboloid_round(const Paraboloid *shape, const Ray *ra
     const Vector axis = vector_of(shape->axis_end), foot = paraboloid_foot(shape);
     real inverse = real_divide((real)(1), vector_norm(axis));
     solid.is_finite = shape->id.y & REVOLUTION_FINITE;
+    solid.is_straight = false;
     *round = round_around(shape->id, foot, axis, inverse, ray);
     round->curves = true;
     round->k = (real)(shape->apex_k.w) * inverse;

@@ -224,6 +224,7 @@ static inline RoundSolid round_of_revolution(const Revolution *shape, bool slope
     Vector base = vector_of(shape->base_radius);
     real inverse = real_divide((real)(1), (real)(shape->range.y));
     solid.is_finite = shape->id.y & REVOLUTION_FINITE;
+    solid.is_straight = !sloped;
     *round = round_around(shape->id, base, vector_of(shape->axis_slope), inverse, ray);
     round->radius = (real)(shape->base_radius.w) * inverse;
     if (sloped) round->slope = (real)(shape->axis_slope.w);
