@@ -61,7 +61,8 @@ typedef int scalar_integer;
 #define OUT_OF_LINE __attribute__((noinline))
 #endif
 
-// Forces inlining where constant arguments remove part of the function.
+// Forces inlining where constant arguments, or results that the caller does not use, remove part of the
+// function.
 #define ALWAYS_INLINE __attribute__((always_inline))
 
 #define JOIN_TOKENS(a, b) a##b

@@ -11,7 +11,7 @@ typedef struct {
     Pair moment_on_axis, squared_axis; // E . w; w . w
 } AxialRay;
 
-static inline AxialRay axial_ray(uint4 id, Vector foot, Vector axis, const Ray *ray)
+static inline ALWAYS_INLINE AxialRay axial_ray(uint4 id, Vector foot, Vector axis, const Ray *ray)
 {
     const PairVector f = pair_vector_difference(ray->origin, foot), d = pair_vector_of(ray->direction),
                      w = pair_vector_of(axis), moment = pair_vector_cross(f, ray->direction);

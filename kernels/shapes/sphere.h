@@ -36,7 +36,7 @@ static inline SphereQuadratic sphere_quadratic_near(const Sphere *sphere, const 
 
 // Returns the quadratic for all rays. Far from the closest approach the discriminant is a r^2 - |E|^2
 // (Lagrange's identity), off by about 10 u a r^2 at any distance.
-static inline SphereQuadratic sphere_quadratic(const Sphere *sphere, const Ray *ray)
+static inline ALWAYS_INLINE SphereQuadratic sphere_quadratic(const Sphere *sphere, const Ray *ray)
 {
     const real radius = (real)(sphere->center_radius.w);
     const PairVector to_center = pair_vector_difference(vector_of(sphere->center_radius), ray->origin);
