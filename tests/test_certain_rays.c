@@ -51,6 +51,14 @@ static Counts rays_check(const Scene *scene, const TraceRay *rays, size_t count)
     return counts;
 }
 
+static void counts_add(Counts *sum, Counts counts)
+{
+    sum->certain += counts.certain;
+    sum->in_double += counts.in_double;
+    sum->uncertain += counts.uncertain;
+    sum->hits += counts.hits;
+}
+
 // Rays start within the scene and far away, in all directions and of any length.
 TEST(every_shape_is_certain)
 {
@@ -67,11 +75,7 @@ TEST(every_shape_is_certain)
             const double length = exp2(random_between(&random, -20, 20));
             ray_set(&rays[i], origin, vector_scale(vector_subtract(target, origin), length));
         }
-        const Counts counts = rays_check(&scene, rays, RAYS);
-        sum.certain += counts.certain;
-        sum.in_double += counts.in_double;
-        sum.uncertain += counts.uncertain;
-        sum.hits += counts.hits;
+        counts_add(&sum, rays_check(&scene, rays, RAYS));
         scene_free(&scene);
     }
     free(rays);
@@ -79,6 +83,87 @@ TEST(every_shape_is_certain)
            sum.hits);
     assert_true(sum.certain > 20 * (sum.in_double + sum.uncertain));
     assert_true(sum.hits > sum.certain / 4);
+}
+
+// Returns a length of 2^-20 to 2^-2 of either sign.
+static double random_offset(Random *random)
+{
+    return exp2(random_between(random, -20, -2)) * (random_coin(random) ? 1 : -1);
+}
+
+// Returns a ray along a line in either direction, which starts before or after a point of the line.
+static TraceRay ray_through(Vector3 point, Vector3 direction, Random *random)
+{
+    const double t = exp2(random_between(random, -2, 12));
+    if (random_coin(random)) direction = vector_scale(direction, -1);
+    TraceRay ray;
+    ray_set(&ray, vector_subtract(point, vector_scale(direction, random_coin(random) ? t : -t)), direction);
+    return ray;
+}
+
+// Returns a ray nearly along the axis of a cylinder, and next to its side or to its axis.
+static TraceRay ray_along_cylinder(const Object *object, Random *random)
+{
+    const Vector3 w = vector_normalize(object->as.cylinder.axis),
+                  u = vector_normalize(vector_cross(w, random_unit_vector(random))),
+                  aside = vector_cross(w, random_unit_vector(random));
+    const double offset = random_offset(random),
+                 off_axis = object->as.cylinder.radius * (random_coin(random) ? offset : 1 + offset);
+    const Vector3 target =
+        vector_add(object->as.cylinder.from,
+                   vector_add(vector_scale(u, off_axis), vector_scale(w, random_between(random, -1, 3))));
+    return ray_through(target, vector_add(w, vector_scale(aside, random_offset(random))), random);
+}
+
+// Returns a ray next to the apex of a double cone, or nearly along its side and next to it.
+static TraceRay ray_along_cone(const Object *object, Random *random)
+{
+    const Vector3 w = vector_normalize(object->as.cone.axis),
+                  u = vector_normalize(vector_cross(w, random_unit_vector(random)));
+    const Vector3 side = vector_normalize(vector_add(w, vector_scale(u, object->as.cone.slope))),
+                  normal = vector_cross(side, vector_cross(w, u));
+    Vector3 off = vector_scale(random_unit_vector(random), random_offset(random)), direction = side;
+    if (random_coin(random)) {
+        const double along = exp2(random_between(random, -8, 8));
+        off = vector_scale(vector_add(side, vector_scale(normal, random_offset(random))), along);
+    } else if (random_coin(random)) {
+        direction = random_unit_vector(random);
+    }
+    direction = vector_add(direction, vector_scale(random_unit_vector(random), random_offset(random)));
+    return ray_through(vector_add(object->as.cone.from, off), direction, random);
+}
+
+// Rays aim at unbounded and finite cylinders, and at double cones with slopes of 10^-6 to 10^6.
+TEST(rays_along_axes_and_sides_are_certain)
+{
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    enum { RAYS = 500 };
+    TraceRay *rays = memory_allocate(RAYS, sizeof *rays);
+    Random random = {5};
+    Counts sum = {0};
+    const unsigned scene_count = tests_are_long() ? 600 : 12;
+    for (unsigned i = 0; i < scene_count; i++) {
+        const Vector3 from = random_in_sphere(&random),
+                      axis = vector_scale(random_unit_vector(&random), exp2(random_between(&random, -4, 4)));
+        Object object = {.type = SHAPE_CYLINDER,
+                         .as.cylinder = {.from = from,
+                                         .axis = axis,
+                                         .radius = exp2(random_between(&random, -6, 6)),
+                                         .finite = i % 3 == 1,
+                                         .caps = i % 6 == 1}};
+        if (i % 3 == 2)
+            object = (Object){.type = SHAPE_CONE,
+                              .as.cone = {.from = from, .axis = axis, .slope = random_power(&random, -6, 6)}};
+        for (size_t k = 0; k < RAYS; k++)
+            rays[k] = i % 3 == 2 ? ray_along_cone(&object, &random) : ray_along_cylinder(&object, &random);
+        Material material;
+        Scene scene = scene_of_shapes(&object, 1, &material);
+        counts_add(&sum, rays_check(&scene, rays, RAYS));
+    }
+    free(rays);
+    printf("%zu certain, %zu in double, %zu uncertain, %zu hits\n", sum.certain, sum.in_double, sum.uncertain,
+           sum.hits);
+    assert_true(sum.certain > sum.in_double + sum.uncertain && sum.hits > sum.certain / 4);
 }
 
 // A bumpy sheet of triangles. Rays aim at its vertices, at its edges and, along the sheet, at its

@@ -374,14 +374,14 @@ TEST(planets_are_decided)
     check_family(PLANETS);
 }
 
-// Planets and infinite cylinders in views so narrow that every ray skims their horizon, on devices whose
-// quotients and roots err as much as OpenCL permits.
+// Planets and infinite cylinders in views so narrow that every ray skims their horizon, as does every shadow
+// ray to a light near the eye, on devices whose quotients and roots err as much as OpenCL permits.
 TEST(horizons_are_decided)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     const int count = tests_are_long() ? 1000 : 100;
     RenderSettings settings = small_settings(0);
-    settings.extra_features = family_features[PLANETS];
+    settings.extra_features = family_features[PLANETS] | FEATURE_POINT_LIGHTS;
     settings.perturb_seed = 3;
     settings.lanes = 1; // built sooner
     size_t uncertified = 0;
@@ -399,6 +399,7 @@ TEST(horizons_are_decided)
             object = (Object){.type = SHAPE_CYLINDER,
                               .as.cylinder = {.from = center, .axis = {1, 0, 0}, .radius = radius}};
         array_push(scene.objects, object);
+        point_light_add(&scene, random_in_sphere(&random_state), 1);
         if (tests_are_long()) settings.perturb_seed = 1 + (uint32_t)i * PERTURB_SEEDS / (uint32_t)count;
         uncertified +=
             check_image(&scene, &settings, is_planet ? "a planet's horizon" : "a cylinder's horizon", radius);

@@ -332,4 +332,32 @@ TEST(mixed_sizes_are_decided)
     assert_true(uncertified * 16 < count * SMALL_SIDE * SMALL_SIDE);
 }
 
+// A planet with a hill and a tower, a light and an eye close above the ground, at a scale of 2^-34 to 2^40.
+TEST(planets_of_every_scale_are_decided)
+{
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    const int exponents[] = {-34, -30, 0, 30, 40};
+    size_t uncertified = 0;
+    for (size_t i = 0; i < COUNT_OF(exponents); i++)
+        for (int digits = 4; digits < 7; digits++) {
+            const double unit = exp2(exponents[i]), radius = pow(10, digits) * unit,
+                         away = sqrt(2 * radius * unit);
+            Scene scene = scene_seen_from((Vector3){0, 0, 0}, 0.3);
+            const Vector3 center = {0, -radius - 1.1 * unit, -0.3 * unit},
+                          foot = {0.1 * away, -2.1 * unit, -0.9 * away};
+            array_push(scene.objects, ((Object){.type = SHAPE_SPHERE, .as.sphere = {center, radius}}));
+            array_push(scene.objects,
+                       ((Object){.type = SHAPE_SPHERE,
+                                 .as.sphere = {{-0.7 * unit, -1.2 * unit, -5 * unit}, 0.6 * unit}}));
+            array_push(scene.objects, ((Object){.type = SHAPE_CYLINDER,
+                                                .as.cylinder = {.from = foot,
+                                                                .axis = {0, 0.1 * away, 0},
+                                                                .radius = 0.02 * away,
+                                                                .finite = true}}));
+            point_light_add(&scene, (Vector3){0.6 * unit, 0.4 * unit, -unit}, 1);
+            uncertified += check_small(&scene, 0, "a planet", exponents[i]);
+        }
+    assert_int_equal(uncertified, 0);
+}
+
 TEST_MAIN(probe_open, painters_close)
