@@ -96,7 +96,7 @@ static inline integer tile_index(const Tile *tile)
     return integer_of(tile->first) + LANE_Y * integer_of(tile->width) + LANE_X;
 }
 
-// Stores one of `stride` values per pixel.
+// Defines a function that stores one of `stride` values per pixel.
 #define FILM_STORE(name, Stored, Value, ValueLanes)                                                          \
     static inline void name(global Stored *film, const Tile *tile, uint stride, uint channel, Value value)   \
     {                                                                                                        \

@@ -1,5 +1,5 @@
-// Traces explicit rays by the kernel TRACE_KERNEL. Finds the closest hit and, if TRACES_BOUNCES, the bounces
-// there and the transmittance along each ray.
+// Defines the kernel TRACE_KERNEL, which traces explicit rays. It finds the closest hit and, if
+// TRACES_BOUNCES, the bounces there and the transmittance along each ray.
 #ifndef TRACE_H
 #define TRACE_H
 

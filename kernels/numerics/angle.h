@@ -4,7 +4,7 @@
 
 #include "numerics/vector.h"
 
-// 2 pi, and 4 / (2 pi).
+// 2 pi, and 2 / pi.
 #if IS_DOUBLE
 #define TURN                 0x1.921fb54442d18p+2
 #define INVERSE_QUARTER_TURN 0x1.45f306dc9c883p-1

@@ -93,7 +93,8 @@ typedef LANES_TYPE(JOIN(u, INTEGER_BASE)) unsigned_integer; // wraps
 #define unsigned_from_integer LANES_AS(JOIN(u, INTEGER_BASE))
 #define integer_from_unsigned LANES_AS(INTEGER_BASE)
 
-// The tile of a packet (types.h), the position of each lane in it, and its bit in a mask as bits.
+// The tile of a packet (types.h), the position of each lane in it, and its bit in a mask that is stored as
+// bits.
 #define TILE_WIDTH              TILE_WIDTH_OF(LANES)
 #define TILE_HEIGHT             TILE_HEIGHT_OF(LANES)
 #define MACRO_TILE_COLUMNS      MACRO_TILE_COLUMNS_OF(LANES)
@@ -161,7 +162,7 @@ typedef union {
 #define __has_builtin(name) 0
 #endif
 
-// clang for a CPU has reductions that take few instructions. clang for SPIR may lack them.
+// clang's reductions for CPUs compile to few instructions. clang for SPIR may lack them.
 #if (defined(__x86_64__) || defined(__aarch64__)) && __has_builtin(__builtin_reduce_or) &&                   \
     __has_builtin(__builtin_reduce_min)
 #define IS_CPU_CLANG 1

@@ -25,7 +25,7 @@ static inline real real_power_of_two(integer exponent)
     return real_from_bits((integer)(BITS_OF_ONE) + (exponent << EXPONENT_SHIFT));
 }
 
-// Returns the number `steps` numbers above a > 0.
+// Returns the number that is `steps` representable numbers above a > 0.
 static inline real real_neighbor(real a, scalar_integer steps)
 {
     return real_from_bits(bits_from_real(a) + (integer)(steps));
@@ -58,7 +58,7 @@ static inline real repaired_quotient(real a, real b)
 // the IBM System/370, IBM Journal of Research and Development 30(2), 1986).
 static inline real repaired_root(real a)
 {
-    // rounded down, so that a becomes 1 .. 4
+    // rounded down, so that a lies in [1, 4)
     integer half_exponent = (bits_from_real(a) - (integer)(BITS_OF_ONE)) >> (EXPONENT_SHIFT + 1);
     a = real_from_bits(bits_from_real(a) - (half_exponent << (EXPONENT_SHIFT + 1)));
     real root = device_sqrt(a);
@@ -196,8 +196,7 @@ static inline Pair pair_difference_of_products(Pair a, Pair b, Pair c, Pair d)
     return pair_subtract(pair_multiply(a, b), pair_multiply(c, d));
 }
 
-// LN_2 + LN_2_REST is ln(2), LOG2_E its reciprocal, and ROOT_HALF_BITS are the bits of the root of 1/2. Below
-// EXP_LOWEST, real_exp_negative returns 0.
+// LN_2 + LN_2_REST is ln(2), and LOG2_E is its reciprocal. ROOT_HALF_BITS is the bit pattern of sqrt(1/2).
 #if IS_DOUBLE
 #define LN_2           0x1.62e42fefa39efp-1
 #define LN_2_REST      0x1.abc9e3b39803fp-56
@@ -212,9 +211,9 @@ static inline Pair pair_difference_of_products(Pair a, Pair b, Pair c, Pair d)
 #define EXP_LOWEST     (-87.0f)
 #endif
 
-// Returns 1/3 + x/5 + x^2/7 + ..., the series of the logarithm and of the arctangent after their first terms
-// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27 and 4.4.42), up to 1/9 or, in double, to
-// one over `last`. In float the quotients are literals, since a device's may be inexact.
+// Returns 1/3 + x/5 + x^2/7 + ..., the common tail of the series of the logarithm and the arctangent
+// (Abramowitz, Stegun, Handbook of Mathematical Functions, 4.1.27 and 4.4.42). Ends at 1/9 or, in double, at
+// 1/`last`. In float the quotients are literals, because a device's division may be inexact.
 static inline real series_of_odd_reciprocals(real x, scalar last)
 {
 #if IS_DOUBLE
@@ -246,7 +245,7 @@ static inline real real_log_complement(real s)
 }
 
 // Returns e^x for x <= 0: 2^k times the Taylor series of the remainder, at most ln(2)/2 (Abramowitz, Stegun,
-// 4.2.1). Returns 0 if the result would be subnormal.
+// 4.2.1). Returns 0 below EXP_LOWEST, where the result would be subnormal.
 static inline real real_exp_negative(real x)
 {
     const real lowest = (real)(EXP_LOWEST);

@@ -78,8 +78,7 @@ static inline real light_color_error(const Surface *surface, const LightRay *to_
     return real_fma(real_fma(brightest, largest, shiny), errors->strength + COLOR_ROUNDING, error);
 }
 
-// Extends the bounds of a directional light to those of a light at a distance, a point or spot light, at
-// which its shadow ray ends.
+// Extends the bounds of a directional light to those of a point or spot light, where the shadow ray ends.
 static inline void light_add_distance_errors(const Light *light, const Surface *surface, LightRay *to_light,
                                              LightErrors *errors)
 {

@@ -28,7 +28,7 @@ static inline Color3 phong_reflect(const Surface *surface, const LightRay *to_li
     Color3 color = vector_scale(surface->diffuse, to_light->facing);
     mask glossy = lit & (surface->specular > (real)(0));
     if (!lanes_any(glossy)) return color;
-    // 1 - s is the cosine between the mirrored light and the eye's direction
+    // s is 1 minus the cosine between the mirrored light and the eye's direction
     const real s = cosine_complement(light_mirrored(surface, to_light), surface->to_eye);
     real highlight = surface->specular * highlight_power(glossy, s, surface->shininess);
     if (HAS_TINTS) return vector_fma(surface->specular_tint, highlight, color);

@@ -18,8 +18,8 @@ typedef struct {
     real u, v; // in texture repeats or checker squares
 } GridCoordinates;
 
-// Returns the coordinates of a direction in an image of all directions. The poles lie along y and the image's
-// center along z.
+// Returns a direction's coordinates in an image that covers all directions. The poles lie on the y axis, and
+// the image's center on the z axis.
 static inline GridCoordinates globe_coordinates(Vector direction)
 {
     const real one_half = (real)(0.5f), x = direction.x, y = direction.y, z = direction.z,
@@ -28,14 +28,14 @@ static inline GridCoordinates globe_coordinates(Vector direction)
                              real_fma((real)(2), real_turns(across, y), one_half)};
 }
 
-// Returns the texels of such an image, of this level, per radian: at the equator or of their height,
-// whichever are denser, as images of globes vary little along rows near the poles.
+// Returns the texels per radian of this level of such an image, along the equator or a meridian, whichever
+// are denser, because images of globes vary little along rows near the poles.
 static inline scalar globe_density(uint4 level)
 {
     return max((scalar)level.y * (scalar)0.5f, (scalar)level.z) * (scalar)0x1.45f306p-2f;
 }
 
-// Returns a sphere's texture coordinates. Seen from outside u grows eastward.
+// Returns a sphere's texture coordinates. Seen from outside, u grows eastward.
 static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere, Vector outward, uint4 level)
 {
     const GridCoordinates place = globe_coordinates(outward);
@@ -43,8 +43,8 @@ static inline TextureCoordinates sphere_texture_coordinates(const Sphere *sphere
     return (TextureCoordinates){place.u, place.v, real_divide((real)(globe_density(level)), radius)};
 }
 
-// Returns whether shapes of this type have a grid in the surface, as planes and discs do. One expression
-// would make clang warn of constant operands.
+// Returns whether shapes of this type have a grid in the surface, as planes and discs do. This is not one
+// expression, because clang would warn about its constant operands.
 static inline bool type_has_grid(uint type)
 {
     if (HAS_PLANES && type == TYPE_PLANES) return true;

@@ -1,5 +1,5 @@
-// A ray seen from the axis w of a shape, in pairs, from a point F of the axis. With f from F to the ray's
-// start, m = f x w and q = d x w lead away from the axis, turned by a quarter, and E = f x d is the moment.
+// A ray relative to a shape's axis w, in pairs. F is a point of the axis, and f leads from F to the ray's
+// origin. m = f x w and q = d x w are perpendicular to the axis, and E = f x d is the moment.
 #ifndef AXIAL_RAY_H
 #define AXIAL_RAY_H
 
@@ -7,7 +7,7 @@
 
 typedef struct {
     PairVector m, q, moment;
-    Pair height, rise;                 // f . w, with the eye's power o . w for the ray's origin o; and d . w
+    Pair height, rise;                 // f . w, or o . w with the eye's power and the ray's origin o; d . w
     Pair moment_on_axis, squared_axis; // E . w; w . w
 } AxialRay;
 
@@ -25,8 +25,8 @@ static inline ALWAYS_INLINE AxialRay axial_ray(uint4 id, Vector foot, Vector axi
                       pair_vector_dot(w, w)};
 }
 
-// Returns (o x w) . ((o - 2 F) x w), by which m . m exceeds its value at the eye. Roundings of F count in
-// it only by the origin's distance from the eye.
+// Returns (o x w) . ((o - 2 F) x w), the difference of m . m from its value at the eye. A rounding of
+// F counts only in proportion to the origin's distance from the eye.
 static inline Pair axial_power_change(Vector foot, Vector axis, const Ray *ray)
 {
     const PairVector beyond = pair_vector_difference(ray->origin, vector_scale(foot, (real)(2)));

@@ -42,7 +42,8 @@ static inline real slab_distance(Interval slab, real direction, real t, mask *lo
     return interval_end_distance(slab, t);
 }
 
-// Returns a coordinate of a point on a box, which is that of a face in the lanes `on_face`.
+// Returns one coordinate of a point on a box. It is the face's in the lanes `on_face`, else one clamped to
+// the box.
 static inline real box_coordinate(real low, real high, mask on_face, mask low_face, real coordinate)
 {
     return lanes_select(on_face, lanes_select(low_face, low, high), real_clamp(coordinate, low, high));

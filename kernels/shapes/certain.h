@@ -52,8 +52,8 @@ static inline real ray_place_error(const Ray *ray, real distance)
     return real_fma(ray->direction_error, distance, ray->origin_error);
 }
 
-// Returns the lanes whose ray starts on the object with this id. It does not hit the object again if that is
-// flat, or convex and left outward.
+// Returns the lanes whose ray starts on the object with this id. Such a ray does not hit it again if the
+// object is flat, or if it is convex and the ray leaves outward.
 static inline mask ray_starts_on(const Ray *ray, uint id)
 {
     return ray->origin_object == integer_of(id);

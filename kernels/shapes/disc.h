@@ -42,7 +42,7 @@ static inline DiscCrossing disc_crossing_compensated(const Disc *disc, const Ray
 // Decides whether the crossing is inside the rim. With v the crossing from the center, (n . d) v = n x E for
 // the moment E = f x d, so that |n x E|^2 <= r^2 (n . d)^2 decides without t and without cancellation at a
 // distance. At less than 4 degrees to the plane all three cancel, so pairs are used there at any precision.
-// Next to the eye the crossing's power with respect to the sphere around the disc decides.
+// Next to the eye, the power of the crossing with respect to the sphere around the disc decides.
 static inline mask disc_hit(const Disc *disc, const Ray *ray, real *t)
 {
     Vector center = vector_of(disc->center_radius), normal = vector_of(disc->normal);

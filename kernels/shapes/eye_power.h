@@ -31,8 +31,8 @@ static inline real power_sum(Pair start, Vector a, PairVector b)
     return three.high + (of_low + low);
 }
 
-// Returns the power of a point with respect to a sphere, the eye's plus p . (p - 2 center). In it the
-// center's rounding counts only by the point's distance from the eye.
+// Returns the power of a point with respect to a sphere, the eye's plus p . (p - 2 center). In it a
+// rounding of the center counts only in proportion to the point's distance from the eye.
 static inline real eye_power_at(uint4 id, Vector center, Vector point)
 {
     return power_sum(pair_of(eye_power_of(id)), point,

@@ -10,7 +10,7 @@
 #include "shapes/sphere.h"
 #include "shapes/torus.h"
 
-// Executes STATEMENT(name), with the unit shape as `shape`, for the shape that the oval maps.
+// Runs STATEMENT(name) for the unit shape that the oval maps, declared as `shape`.
 #define OVAL_SWITCH(STATEMENT)                                                                               \
     OVAL_CASE(SPHERES, Sphere, sphere, STATEMENT)                                                            \
     OVAL_CASE(DISCS, Disc, disc, STATEMENT)                                                                  \

@@ -116,7 +116,7 @@ static inline real certain_plane_height(Vector point, Vector normal, scalar norm
     return (fabs(height.value) + height.error) * BOUND_SLACK;
 }
 
-// Sets the height of a point over a plane, whose normal's w is one over its length. No lane is uncertain.
+// Sets a point's height over a plane. The w of `normal` is one over its length. No lane is uncertain.
 static inline mask plane_point_set_height(Vector on_plane, scalar4 normal, SurfacePoint *point)
 {
     point->height = (real)(normal.w) * certain_plane_height(on_plane, vector_of(normal), 0, point->position);

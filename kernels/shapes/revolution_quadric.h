@@ -27,7 +27,7 @@ static inline mask revolution_near_side(real c, Vector m)
     return fabs(c) < (real)(0.5f) * vector_dot(m, m);
 }
 
-// Returns c by the eye's power.
+// Returns c, computed from the eye's power.
 static inline Pair revolution_power(const Revolution *shape, bool sloped, const AxialRay *axial,
                                     const Ray *ray)
 {

@@ -21,7 +21,7 @@ static inline Corners corners_of(scalar4 a, scalar4 b, scalar4 c)
     return (Corners){vector_of(a), vector_of(b), vector_of(c)};
 }
 
-// A number for each corner.
+// One number per corner.
 typedef struct {
     real a, b, c;
 } CornerReals;
@@ -31,7 +31,7 @@ static inline CornerReals corners_dot(Corners corners, Vector v)
     return (CornerReals){vector_dot(corners.a, v), vector_dot(corners.b, v), vector_dot(corners.c, v)};
 }
 
-// Returns the corners seen from a point.
+// Returns the corners relative to a point.
 static inline Corners corners_from(Corners corners, Vector point)
 {
     return (Corners){vector_subtract(corners.a, point), vector_subtract(corners.b, point),
