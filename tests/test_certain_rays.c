@@ -247,7 +247,7 @@ TEST(least_and_largest_numbers)
 
 // A sphere's tangent, a start on a sphere, and two coincident spheres are uncertain. Rays whose targets lie
 // behind them, and tiny directions, are certain.
-TEST(open_questions_are_uncertain)
+TEST(ambiguous_hits_are_uncertain)
 {
     if (!probe_has(PRECISION_CERTIFIED)) skip();
     Object objects[] = {

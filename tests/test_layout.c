@@ -394,7 +394,7 @@ static void threads_write_what_one_does(void **state)
     }
 }
 
-TEST_CASE(threads_narrow_as_one_does, threads_write_what_one_does, &(bool){false})
-TEST_CASE(threads_copy_as_one_does, threads_write_what_one_does, &(bool){true})
+TEST_CASE(narrowing_is_independent_of_threads, threads_write_what_one_does, &(bool){false})
+TEST_CASE(copying_is_independent_of_threads, threads_write_what_one_does, &(bool){true})
 
 TEST_MAIN(probe_open, probe_close)

@@ -101,10 +101,10 @@ static void test_forgotten(void **state)
     assert_int_equal(end.status, expected);
 }
 
-TEST_CASE(nothing, test_forgotten, &(Forgotten){NOTHING})
-TEST_CASE(memory, test_forgotten, &(Forgotten){MEMORY})
-TEST_CASE(a_buffer, test_forgotten, &(Forgotten){BUFFER})
-TEST_CASE(a_kernel, test_forgotten, &(Forgotten){KERNEL})
-TEST_CASE(a_program, test_forgotten, &(Forgotten){PROGRAM})
+TEST_CASE(no_leak, test_forgotten, &(Forgotten){NOTHING})
+TEST_CASE(leaked_memory, test_forgotten, &(Forgotten){MEMORY})
+TEST_CASE(leaked_buffer, test_forgotten, &(Forgotten){BUFFER})
+TEST_CASE(leaked_kernel, test_forgotten, &(Forgotten){KERNEL})
+TEST_CASE(leaked_program, test_forgotten, &(Forgotten){PROGRAM})
 
 TEST_MAIN(NULL, NULL)

@@ -45,7 +45,7 @@ static bool loads(const char *entry_key)
     return loads_with(entry_key, NULL);
 }
 
-TEST_WITH(test_store_and_load, scratch_set_up, scratch_tear_down)
+TEST_WITH(stored_entries_are_loaded, scratch_set_up, scratch_tear_down)
 {
     assert_false(loads(key));
     store(key);
@@ -67,7 +67,7 @@ static void entry_set_used(const char *entry_key, time_t when)
 }
 
 // Whatever the umask permits, entries are private.
-TEST_WITH(test_modes, scratch_set_up, scratch_tear_down)
+TEST_WITH(files_are_private, scratch_set_up, scratch_tear_down)
 {
     mode_t before = umask(0);
     store(key);
@@ -107,7 +107,7 @@ static void load_without_rights(void *result)
     if (geteuid() != 0 || setuid(65534) == 0) load_twice(result);
 }
 
-// Expects that nothing is loaded, with one warning. Runs in a separate process, which may give up its rights.
+// Expects a miss and one warning. Runs in a separate process, which may drop its privileges.
 static void assert_load_refused(void (*load)(void *result), const char *reason)
 {
     bool loaded = true;
@@ -125,7 +125,7 @@ static void assert_refused(const char *reason)
 }
 
 // An entry that others may have written is not loaded, and replaced.
-TEST_WITH(test_entry_others_may_access, scratch_set_up, scratch_tear_down)
+TEST_WITH(entry_that_others_can_access_is_replaced, scratch_set_up, scratch_tear_down)
 {
     static const mode_t modes[] = {0620, 0602, 0644};
     char *path = cache_entry_path(key);
@@ -141,7 +141,7 @@ TEST_WITH(test_entry_others_may_access, scratch_set_up, scratch_tear_down)
 }
 
 // Nothing is loaded from a folder that belongs to another user, or stored in it.
-TEST_WITH(test_folder_of_others, scratch_set_up, scratch_tear_down)
+TEST_WITH(folder_of_others_is_not_used, scratch_set_up, scratch_tear_down)
 {
     char *path = cache_entry_path(key), *cache = cache_folder_path(), *moved = NULL;
     assert_true(asprintf(&moved, "%s/moved", scratch) > 0);
@@ -179,7 +179,7 @@ TEST_WITH(test_folder_of_others, scratch_set_up, scratch_tear_down)
 }
 
 // Entries are useless without the key of their hash. A key that others may know is replaced.
-TEST_WITH(test_key_of_the_hash, scratch_set_up, scratch_tear_down)
+TEST_WITH(hash_key_that_others_can_know_is_replaced, scratch_set_up, scratch_tear_down)
 {
     char *cache = cache_folder_path();
     store(key);
@@ -197,7 +197,7 @@ TEST_WITH(test_key_of_the_hash, scratch_set_up, scratch_tear_down)
 }
 
 // A file of 20 GB without contents is not read, and goes first.
-TEST_WITH(test_too_large, scratch_set_up, scratch_tear_down)
+TEST_WITH(entry_that_is_too_large_is_not_read, scratch_set_up, scratch_tear_down)
 {
     store(key);
     store("another key");
@@ -220,7 +220,7 @@ TEST_WITH(test_too_large, scratch_set_up, scratch_tear_down)
 }
 
 // Four processes on an empty cache make one key of the hash, so that all load what each stores.
-TEST_WITH(test_race_on_an_empty_cache, scratch_set_up, scratch_tear_down)
+TEST_WITH(processes_on_an_empty_cache_share_a_hash_key, scratch_set_up, scratch_tear_down)
 {
     enum { PROCESSES = 4, ROUNDS = 20 };
     for (int round = 0; round < ROUNDS; round++) {
@@ -246,7 +246,7 @@ TEST_WITH(test_race_on_an_empty_cache, scratch_set_up, scratch_tear_down)
     }
 }
 
-TEST_WITH(test_list, scratch_set_up, scratch_tear_down)
+TEST_WITH(entries_are_listed, scratch_set_up, scratch_tear_down)
 {
     static const char described[] = "options x\nlaunch render 8x1\ndevice y, z\n";
     MessageList messages = {0};
@@ -288,7 +288,7 @@ TEST_WITH(test_list, scratch_set_up, scratch_tear_down)
     free(path);
 }
 
-TEST_WITH(test_clear_that_fails, scratch_set_up, scratch_tear_down)
+TEST_WITH(failure_to_clear_is_reported, scratch_set_up, scratch_tear_down)
 {
     MessageList messages = {0};
     char *path = cache_folder_path(), *secret;
@@ -306,7 +306,7 @@ TEST_WITH(test_clear_that_fails, scratch_set_up, scratch_tear_down)
     free(path);
 }
 
-TEST_WITH(test_folder_without_rights, scratch_set_up, scratch_tear_down)
+TEST_WITH(folder_without_rights_is_not_used, scratch_set_up, scratch_tear_down)
 {
     char *cache = cache_folder_path();
     store(key);
@@ -317,7 +317,7 @@ TEST_WITH(test_folder_without_rights, scratch_set_up, scratch_tear_down)
 }
 
 // However few files may be open, no entry is left out in silence, and none is called removed that is not.
-TEST_WITH(test_few_descriptors, scratch_set_up, scratch_tear_down)
+TEST_WITH(too_few_descriptors_are_reported, scratch_set_up, scratch_tear_down)
 {
     enum { ROOM_END = 4 };
     struct rlimit usual;
@@ -347,7 +347,7 @@ TEST_WITH(test_few_descriptors, scratch_set_up, scratch_tear_down)
 }
 
 // Each changed byte, each shorter length and one more byte are noticed. Storing repairs the entry.
-TEST_WITH(test_damage, scratch_set_up, scratch_tear_down)
+TEST_WITH(damaged_entry_is_not_loaded, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
@@ -376,7 +376,7 @@ TEST_WITH(test_damage, scratch_set_up, scratch_tear_down)
 }
 
 // The entry of one key lies where another is looked for, as if both had the same hash.
-TEST_WITH(test_entry_of_another_key, scratch_set_up, scratch_tear_down)
+TEST_WITH(entry_of_another_key_is_not_loaded, scratch_set_up, scratch_tear_down)
 {
     store("another key");
     store(key);
@@ -387,7 +387,7 @@ TEST_WITH(test_entry_of_another_key, scratch_set_up, scratch_tear_down)
     free(to);
 }
 
-TEST_WITH(test_entry_without_rights, scratch_set_up, scratch_tear_down)
+TEST_WITH(entry_without_rights_is_replaced, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
@@ -399,7 +399,7 @@ TEST_WITH(test_entry_without_rights, scratch_set_up, scratch_tear_down)
 }
 
 // What is not an entry is replaced when the key is stored. A pipe that nobody writes into is not waited for.
-TEST_WITH(test_entry_that_is_none_of_ours, scratch_set_up, scratch_tear_down)
+TEST_WITH(foreign_entry_is_replaced, scratch_set_up, scratch_tear_down)
 {
     char *path = cache_entry_path(key), *other = cache_entry_path("another key");
     alarm(60);
@@ -428,7 +428,7 @@ TEST_WITH(test_entry_that_is_none_of_ours, scratch_set_up, scratch_tear_down)
     free(other);
 }
 
-TEST_WITH(test_no_place, scratch_set_up, scratch_tear_down)
+TEST_WITH(missing_folder_disables_cache, scratch_set_up, scratch_tear_down)
 {
     const char *before = getenv("HOME");
     char *home = before ? strdup(before) : NULL;
@@ -458,7 +458,7 @@ TEST_WITH(test_no_place, scratch_set_up, scratch_tear_down)
 }
 
 // A file in place of the folder stops even root.
-TEST_WITH(test_unwritable, scratch_set_up, scratch_tear_down)
+TEST_WITH(unwritable_folder_disables_cache, scratch_set_up, scratch_tear_down)
 {
     char *path = NULL;
     assert_true(asprintf(&path, "%s/glint", scratch) > 0);
@@ -474,7 +474,7 @@ TEST_WITH(test_unwritable, scratch_set_up, scratch_tear_down)
     free(path);
 }
 
-TEST_WITH(test_folder_in_place_of_entry, scratch_set_up, scratch_tear_down)
+TEST_WITH(folder_in_place_of_an_entry_is_kept, scratch_set_up, scratch_tear_down)
 {
     store(key);
     char *path = cache_entry_path(key);
@@ -487,7 +487,7 @@ TEST_WITH(test_folder_in_place_of_entry, scratch_set_up, scratch_tear_down)
 }
 
 // While two processes replace the entry, a reader always finds it whole.
-TEST_WITH(test_many_processes, scratch_set_up, scratch_tear_down)
+TEST_WITH(readers_find_whole_entries, scratch_set_up, scratch_tear_down)
 {
     store(key);
     pid_t writers[2];
@@ -510,7 +510,7 @@ TEST_WITH(test_many_processes, scratch_set_up, scratch_tear_down)
 }
 
 // The entries that were used last stay, whenever they were stored.
-TEST_WITH(test_trim, scratch_set_up, scratch_tear_down)
+TEST_WITH(least_recently_used_entries_are_trimmed, scratch_set_up, scratch_tear_down)
 {
     static const char *const keys[] = {"key a", "key b", "key c", "key d"};
     enum { KEY_COUNT = COUNT_OF(keys) };

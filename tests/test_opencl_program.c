@@ -127,7 +127,7 @@ static void drivers_own_cache_empty(void)
     free(empty);
 }
 
-TEST_WITH(test_cold_and_warm, scratch_set_up, scratch_tear_down)
+TEST_WITH(second_build_is_loaded_from_the_cache, scratch_set_up, scratch_tear_down)
 {
     Run cold = run_in_child(triple_request());
     assert_false(cold.from_cache);
@@ -140,7 +140,7 @@ TEST_WITH(test_cold_and_warm, scratch_set_up, scratch_tear_down)
     if (warm.is_pocl) assert_true(warm.compiled_before_launch > 0);
 }
 
-TEST_WITH(test_what_the_key_holds, scratch_set_up, scratch_tear_down)
+TEST_WITH(key_depends_on_every_input, scratch_set_up, scratch_tear_down)
 {
     ProgramRequest request = triple_request();
     run_in_child(request);
@@ -158,7 +158,7 @@ TEST_WITH(test_what_the_key_holds, scratch_set_up, scratch_tear_down)
     free(other);
 }
 
-TEST_WITH(test_no_cache, scratch_set_up, scratch_tear_down)
+TEST_WITH(no_cache_builds_each_time, scratch_set_up, scratch_tear_down)
 {
     ProgramRequest request = triple_request();
     run_in_child(request);
@@ -195,7 +195,7 @@ static Text the_entry(char **key)
     return entry;
 }
 
-TEST_WITH(test_damaged_entry_is_replaced, scratch_set_up, scratch_tear_down)
+TEST_WITH(damaged_entry_is_replaced, scratch_set_up, scratch_tear_down)
 {
     run_in_child(triple_request());
     char *key;
@@ -214,7 +214,7 @@ TEST_WITH(test_damaged_entry_is_replaced, scratch_set_up, scratch_tear_down)
 }
 
 // A whole entry whose binary the driver cannot use.
-TEST_WITH(test_refused_binary_is_replaced, scratch_set_up, scratch_tear_down)
+TEST_WITH(refused_binary_is_replaced, scratch_set_up, scratch_tear_down)
 {
     run_in_child(triple_request());
     char *key;
@@ -251,7 +251,7 @@ static void build_without_kernel_folder(void *result)
 }
 
 // A warning reaches the receiver and not standard error.
-TEST_WITH(test_kernel_folder_is_missing, scratch_set_up, scratch_tear_down)
+TEST_WITH(missing_kernel_folder_causes_a_warning, scratch_set_up, scratch_tear_down)
 {
     char warning[256] = "";
     const ChildEnd end = child_run(build_without_kernel_folder, warning, sizeof warning);
@@ -262,7 +262,7 @@ TEST_WITH(test_kernel_folder_is_missing, scratch_set_up, scratch_tear_down)
     assert_string_equal(warning + strlen(warning) - strlen(ending), ending);
 }
 
-TEST_WITH(test_two_processes_at_once, scratch_set_up, scratch_tear_down)
+TEST_WITH(two_processes_build_the_same_program, scratch_set_up, scratch_tear_down)
 {
     pid_t children[2];
     for (int i = 0; i < 2; i++) {
@@ -281,7 +281,7 @@ TEST_WITH(test_two_processes_at_once, scratch_set_up, scratch_tear_down)
     assert_true(run_in_child(triple_request()).from_cache);
 }
 
-TEST_WITH(test_unwritable_cache, scratch_set_up, scratch_tear_down)
+TEST_WITH(programs_build_without_a_cache, scratch_set_up, scratch_tear_down)
 {
     setenv("XDG_CACHE_HOME", "/dev/null", 1);
     assert_false(run_in_child(triple_request()).from_cache);
@@ -295,7 +295,7 @@ static bool names_place(const char *log, const char *place)
     return strstr(log, place) || strstr(log, "<kernel>:");
 }
 
-TEST_WITH(test_text_that_does_not_compile, scratch_set_up, scratch_tear_down)
+TEST_WITH(compile_error_names_its_place_and_the_saved_text, scratch_set_up, scratch_tear_down)
 {
     Run run = {.request = {.root = "features.h",
                            .prelude = "// one\nkernel void triple(global uint *v) { v[0] = x; }"}};
@@ -311,7 +311,7 @@ TEST_WITH(test_text_that_does_not_compile, scratch_set_up, scratch_tear_down)
     text_free(&text);
 }
 
-TEST_WITH(test_missing_root, scratch_set_up, scratch_tear_down)
+TEST_WITH(missing_root_is_named, scratch_set_up, scratch_tear_down)
 {
     Run run = {.request = {.root = "absent.cl", .prelude = ""}};
     ChildEnd end = child_run(run_triple, &run, sizeof run);
@@ -350,7 +350,7 @@ static void build_broken(void *result)
     opened_close(&opened);
 }
 
-TEST_WITH(test_place_of_a_compile_error, scratch_set_up, scratch_tear_down)
+TEST_WITH(compile_error_in_an_included_file_names_its_place, scratch_set_up, scratch_tear_down)
 {
     BuildLog log = {0};
     assert_int_equal(child_run(build_broken, &log, sizeof log).status, 0);
@@ -391,7 +391,7 @@ static void make_empty_buffers(void *result)
     opened_close(&opened);
 }
 
-TEST_WITH(test_failures, scratch_set_up, scratch_tear_down)
+TEST_WITH(failed_calls_are_named, scratch_set_up, scratch_tear_down)
 {
     Run run = {.request = triple_request()};
     ChildEnd end = child_run(ask_for_too_much, &run, sizeof run);

@@ -51,12 +51,12 @@ static void check_examples(void **state)
     text_free(&fence);
 }
 
-TEST_CASE(test_yaml_examples, check_examples, &(Examples){"yaml", 2})
-TEST_CASE(test_rt_examples, check_examples, &(Examples){"rt", 1})
-TEST_CASE(test_cfg_examples, check_examples, &(Examples){"cfg", 1})
-TEST_CASE(test_nff_examples, check_examples, &(Examples){"nff", 1})
+TEST_CASE(yaml_examples_are_read, check_examples, &(Examples){"yaml", 2})
+TEST_CASE(rt_examples_are_read, check_examples, &(Examples){"rt", 1})
+TEST_CASE(cfg_examples_are_read, check_examples, &(Examples){"cfg", 1})
+TEST_CASE(nff_examples_are_read, check_examples, &(Examples){"nff", 1})
 
-TEST(test_every_shape_is_named)
+TEST(every_shape_is_named)
 {
     for (size_t i = 0; i < SHAPE_COUNT; i++) {
         if (i == SHAPE_OVAL) continue; // not in files
@@ -65,7 +65,7 @@ TEST(test_every_shape_is_named)
 }
 
 // The names of colors in the page are those of CSS Color Module Level 3, section 4, with their values.
-TEST(test_names_of_colors)
+TEST(names_of_colors_are_those_of_css)
 {
     static const struct {
         const char *name, *hex;

@@ -80,7 +80,7 @@ static void write_forest(const char *scene)
     "  - instance: {of: pair, material: blue}\n"                                                             \
     "  - mesh: {file: triangle.obj}\n"
 
-TEST(test_files_are_joined)
+TEST(included_files_are_joined)
 {
     write_forest(FOREST);
     Scene scene = scene_set("forest.yaml", NULL, 0);
@@ -118,7 +118,7 @@ TEST(test_files_are_joined)
     scene_free(&scene);
 }
 
-TEST(test_scene_has_precedence)
+TEST(scene_overrides_included_files)
 {
     write_forest("include: ground.yaml\nmaterials: {green: {}}\nbackground: 0\n" CAMERA LIGHTS);
     Scene scene = scene_set("forest.yaml", NULL, 0);
@@ -128,8 +128,8 @@ TEST(test_scene_has_precedence)
     scene_free(&scene);
 }
 
-// The values of an animation are the scene's, else those of the first file.
-TEST(test_animations_of_files)
+// A scene's animation values take precedence, then those of the first included file.
+TEST(scene_overrides_included_animation)
 {
     file_write("timing.yaml", "frames: 8\nfps: 30\nshutter: 0.5\n");
     file_write("other.yaml", "frames: 9\nfps: 31\nshutter: 0.25\n");
@@ -141,7 +141,7 @@ TEST(test_animations_of_files)
     scene_free(&scene);
 }
 
-TEST(test_hash_covers_the_files)
+TEST(hash_covers_included_files)
 {
     write_forest(FOREST);
     Scene scene = scene_set("forest.yaml", NULL, 0), same = scene_set("forest.yaml", NULL, 0);
@@ -155,7 +155,7 @@ TEST(test_hash_covers_the_files)
 }
 
 // Values that an alias repeats in an included file are joined under only one of its names.
-TEST(test_aliases_of_files)
+TEST(aliases_in_included_files_are_joined_once)
 {
     file_write("alias.yaml", "define: {two: {objects: &s [{sphere: {center: [0, 0, 0], radius: 1}},\n"
                              "                             {sphere: {center: [0, 0, 0], radius: 2}}]}}\n"
@@ -172,7 +172,7 @@ TEST(test_aliases_of_files)
     scene_free(&scene);
 }
 
-TEST(test_values_are_set)
+TEST(set_changes_included_values)
 {
     write_forest(FOREST);
     static const char *const overrides[] = {"objects[2].plane.point=[0, 4, 0]", "materials.green.color=blue",
@@ -194,7 +194,7 @@ static void name_append(void *context, const char *path)
     text_appendf(context, "%s\n", path);
 }
 
-TEST(test_files_are_named)
+TEST(every_included_file_is_named)
 {
     write_forest(FOREST);
     file_write("ground.yaml", "objects: [\n");
@@ -209,7 +209,7 @@ TEST(test_files_are_named)
     text_free(&names);
 }
 
-TEST(test_names_of_two_files)
+TEST(names_given_twice_are_refused)
 {
     write_forest("include: [ground.yaml, parts/trees.yaml]\n"
                  "materials:\n  bark: {}\n  green: {}\n"
@@ -221,7 +221,7 @@ TEST(test_names_of_two_files)
 }
 
 // Messages are in the order of the files, then of the lines.
-TEST(test_mistakes_in_files)
+TEST(messages_name_the_included_file)
 {
     file_write("parts/a.yaml", "objects:\n  - sphere: {center: [0, 0, 0], radius: -1}\n"
                                "  - mesh: {file: lost.obj}\npurple: 1\n");
@@ -252,7 +252,7 @@ TEST(test_mistakes_in_files)
                    "b.yaml:1:1: error: the scene is empty\n");
 }
 
-TEST(test_cycles)
+TEST(recursive_includes_are_refused)
 {
     file_write("scene.yaml", "include: [parts/a.yaml]\n");
     file_write("parts/a.yaml", "lights: []\ninclude: ../b.yaml\n");
@@ -263,7 +263,7 @@ TEST(test_cycles)
                    "parts/../b.yaml:4:5: error: recursive include of 'parts/../b.yaml'\n");
 }
 
-TEST(test_number_of_files)
+TEST(number_of_included_files_is_limited)
 {
     Text list = {0};
     for (int i = 0; i < 100; i++) {
