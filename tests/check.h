@@ -11,20 +11,20 @@
 
 #include <cmocka.h>
 
-// Returns a formatted text, which stays until the fourth later call.
+// Returns formatted text, valid until the fourth call after this one.
 const char *formatted(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
-// Fails the test unless the text of the only message is the expected one. Frees the list.
+// Fails the test unless there is exactly one message, with this text. Frees the list.
 void check_only_message(MessageList *messages, const char *expected);
 
-// Adds a test to those that tests_run runs, in this order.
+// Registers a test. tests_run runs tests in the order of registration.
 void test_register(const struct CMUnitTest *test);
 
 // Runs the tests of the program, or those whose names match the pattern of its first argument, between the
 // group's setup and teardown, which may be NULL. Returns the program's exit status.
 int tests_run(int argument_count, char **arguments, CMFixtureFunction setup, CMFixtureFunction teardown);
 
-// A constructor registers each test, so that none is forgotten. Its priority keeps the order of the lines.
+// A constructor registers each test, so none can be left out. Its priority preserves source order.
 #define TEST_REGISTER(name, ...)                                                                             \
     static const struct CMUnitTest name##_test = {#name, __VA_ARGS__};                                       \
     __attribute__((constructor(101 + __LINE__))) static void name##_register(void)                           \

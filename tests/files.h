@@ -24,6 +24,6 @@ int scratch_tear_down(void **state);
 
 void file_write(const char *path, const char *text);
 void file_write_bytes(const char *path, const void *bytes, size_t size);
-Text file_text(const char *path); // of a file that can be read
+Text file_text(const char *path); // of a readable file
 void check_content(const char *path, const char *expected);
 mode_t mode_of(const char *path); // the permissions alone

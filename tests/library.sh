@@ -13,11 +13,11 @@ check "the header declares what symbols lists" diff <(sed -n 's/^    \(glint_[a-
 exported() { nm "$@" | sed -n 's/.* T \(.*\)/\1/p' | sed 's/@.*//' | sort; }
 check "the shared library exports these alone" diff <(exported -D --defined-only "$stage/lib/libglint.so") \
     <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort)
-check "so does the static one" diff <(nm -g --defined-only "$stage/lib/libglint.a" | sed -n 's/.* [A-Z] //p' | sort) \
+check "the static library exports the same" diff <(nm -g --defined-only "$stage/lib/libglint.a" | sed -n 's/.* [A-Z] //p' | sort) \
     <(sed -n 's/^    \(glint_[a-z_]*\);$/\1/p' host/api/symbols | sort)
 
-# Crashes, exit() and constants that are computed once need variables of the process. Only faults print.
-check "no other state is the process's" diff <(nm "$stage/lib/libglint.a" | sed -n 's/.* [bB] \([a-z_0-9]*\).*/\1/p' | sort -u) \
+# Only crash handling, exit() and constants that are computed once need process-wide variables. Only faults print.
+check "libglint has no other process-wide variables" diff <(nm "$stage/lib/libglint.a" | sed -n 's/.* [bB] \([a-z_0-9]*\).*/\1/p' | sort -u) \
     <(printf '%s\n' c_locale calling_threads complete_status crash_record curve_16 curve_8 is_complete last_call \
         limits noted_call noted_kernel once once_16 once_8 pending pending_mutex stack | sort)
 check "only faults print to stderr" test "$(cd host && grep -rlwE --include='*.c' 'stderr|perror' base image opencl scene import compile render api)" = base/fault.c

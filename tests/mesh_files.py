@@ -1,4 +1,4 @@
-"""Writes a square in formats of meshes: glTF, which a test makes member by member, COLLADA and FBX."""
+"""Writes a square in mesh formats: glTF, built member by member, COLLADA and FBX."""
 import base64
 import json
 import struct
@@ -14,7 +14,7 @@ WHOLE = [(0, 1), (1, 1), (1, 0), (0, 0)]  # texture coordinates of SQUARE that s
 
 
 class Gltf:
-    """A file that is being made, with the members of the JSON text."""
+    """A glTF file under construction. `json` holds its members."""
 
     def __init__(self, **members):
         self.bytes = b""
@@ -55,7 +55,7 @@ class Gltf:
         return index
 
     def write(self, path, uri=None):
-        """Writes the file as .glb, or with the bytes in the text or in a file."""
+        """Writes the file as .glb, or as JSON with the buffer embedded or in a separate file."""
         self.bytes += bytes(-len(self.bytes) % 4)
         buffer = {"byteLength": len(self.bytes)}
         if path.endswith(".glb"):

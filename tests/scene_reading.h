@@ -30,7 +30,7 @@ Scene scene_of_text(const char *name, const char *text);
 // Returns the flat arrays of a scene, which must be compiled with no messages.
 CompiledScene scene_compiled(const Scene *scene, const CompileSettings *settings);
 
-// The scene of a file that has all of its format, for the tests of a group.
+// A scene that uses every feature of its format, shared by the tests of a group.
 extern Scene complete;
 int complete_open(const char *path);
 int complete_close(void **state);

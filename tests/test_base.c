@@ -417,8 +417,8 @@ TEST(test_output_of_killed_processes)
     unlink("kept");
 }
 
-// A process that faults with a file half written, which has a name, exits with status 2, leaves the old file
-// whole, and leaves nothing next to it.
+// A process that faults while a named temporary is half written exits with status 2 and leaves the old file
+// whole and nothing next to it.
 TEST(test_fault_removes_the_temporary)
 {
     file_write("kept", "old");

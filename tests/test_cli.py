@@ -145,7 +145,7 @@ class Commands(CliTestCase):
 
 
     def test_untrusted_cache(self):
-        """A folder that others may access costs one warning, however many programs are built."""
+        """An untrusted cache folder causes one warning, however many programs are built."""
         os.mkdir("shared")
         os.mkdir("shared/glint")
         os.chmod("shared/glint", 0o770)

@@ -1,5 +1,5 @@
-// Tests that shapes next to the eye, which rounding would move, are defined relative to it, and others are
-// not, so that kernels of other scenes pay nothing.
+// Tests that shapes next to the eye that rounding would move are stored relative to it, and that other
+// scenes' kernels pay nothing for this.
 #include "host/compile/compile.h"
 #include "host/compile/shapes.h"
 #include "tests/check.h"

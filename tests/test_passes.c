@@ -130,7 +130,7 @@ static void check_moved_renderer(bool moves)
     scene_free(&scene);
 }
 
-// At `certified`, a scene that does not fit the device in double leaves the scene in float as it was.
+// At `certified`, a scene that does not fit the device in double must not replace the scene in float.
 TEST(scene_that_does_not_fit_one_pass_is_not_rendered)
 {
     if (!probe_compute.device->fp64) skip();

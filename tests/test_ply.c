@@ -40,7 +40,7 @@ static void assert_square(const Text *text)
     scene_free(&scene);
 }
 
-// Checks the only message about a.ply.
+// Expects one message about a.ply.
 static void assert_refused(const char *message)
 {
     assert_messages("scene.yaml", SCENE, formatted("%s\n", message));

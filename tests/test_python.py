@@ -497,7 +497,7 @@ class Errors(unittest.TestCase):
         self.assertEqual(str(caught[1].message).splitlines()[0], "lens.yaml:2:9: warning: 'focus' has no effect without an 'aperture'")
 
     def test_warnings_of_devices(self):
-        """A device warns once of a kernel cache that others may access, and nothing is printed."""
+        """A device warns once about a kernel cache that others can access, and prints nothing."""
         program = f"""if True:
             import warnings, glint
             with warnings.catch_warnings(record=True) as caught:
@@ -516,7 +516,7 @@ class Errors(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("localedef") and os.path.exists("/usr/share/i18n/locales/de_DE"), "localedef makes no de_DE")
     def test_locale(self):
-        """A process whose numbers have a comma gets the same scene, with the number between two keys."""
+        """In a locale with decimal commas a scene, interpolated between two keys, is the same."""
         program = f"""if True:
             import glint, locale
             locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
@@ -529,7 +529,7 @@ class Errors(unittest.TestCase):
         self.assertEqual((process.stdout, process.stderr), ("[2.75] 0,5\n", ""))
 
     def test_max_pixels(self):
-        """An image of the scene may have as many pixels as the call permits."""
+        """max_pixels limits the pixels of an image in the scene."""
         with tempfile.TemporaryDirectory() as folder:
             image, path = Path(folder, "image.ppm"), Path(folder, "scene.yaml")
             image.write_bytes(b"P6 3 2 255 " + bytes(18))
@@ -559,7 +559,7 @@ class Errors(unittest.TestCase):
             library.glint_tracer_close(tracer)
 
     def test_failed_device(self):
-        """A device that fails is closed after its tracers, and its next use re-opens it."""
+        """A failed device is closed after its tracers and re-opened by its next use."""
         library, closed = glint._c.library, []
         index = next(device.index for device in glint.devices() if device.is_usable)
         with contextlib.ExitStack() as stack:

@@ -211,7 +211,7 @@ class View(TestCase):
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
     def test_changes_during_a_write(self):
-        """What others write into the scene's files shortly before the camera is written, or at the same time, is read."""
+        """Changes that others write just before or while the camera is written are read."""
         window = Window(self, options="--write-camera", LD_PRELOAD=self.failing_calls())
         window.saved()
         for path, old, new in ("mesh.obj", "1 1 0", "1.5 1 0"), ("scene.yaml", "0.9, 0.8, 0.7", "1, 0, 0"):

@@ -22,7 +22,7 @@ objects:
 """
 WIDTH, HEIGHT = 160, 120
 SAMPLES = 3
-DEADLINE = 300  # seconds until a test gives up what it waits for, also on a machine that hardly lets it run
+DEADLINE = 300  # seconds to wait before a test fails, even on an overloaded machine
 
 
 @contextlib.contextmanager
@@ -67,7 +67,7 @@ def windows_shown(process):
 
 
 def wait_until(condition, otherwise):
-    """Waits until the condition holds, and leaves the machine to glint between checks."""
+    """Polls until the condition holds, sleeping between checks."""
     end = time.monotonic() + DEADLINE
     while not condition():
         if time.monotonic() > end:
@@ -173,7 +173,7 @@ class Window:
         return path
 
     def check(self, size=None):
-        """Checks that the saved image and the display are what glint render makes of the printed camera, which is returned."""
+        """Checks that the saved image and the display equal glint render's image for the printed camera. Returns the camera."""
         camera = self.camera()
         path = self.rendered(camera, size=size)
         self.test.assertSameBytes(self.saved(), path)

@@ -1,4 +1,4 @@
-"""Runs commands of glint in which something fails, for tools/chaos, and checks what every run must keep."""
+"""Runs glint commands with injected failures, for tools/chaos, and checks the guarantees that hold after each."""
 import os
 import resource
 import shlex
@@ -32,13 +32,13 @@ class Test:
 
 
 def process_seconds(process):
-    """Returns the processor seconds of a process that has not been waited for, and of the children that it has waited for."""
+    """Returns the processor seconds of a running process and its reaped children."""
     fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
     return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
 
 
 def memory_share(processes):
-    """Waits for processes. While memory is short, all but 16 are paused. Gives up when none has ended for 5 * HANG_SECONDS."""
+    """Waits for processes. When memory is short, pauses all but 16. Gives up if none ends for 5 * HANG_SECONDS."""
     few, is_short, turned = 16, False, time.monotonic()
     ended = turned
     while processes and time.monotonic() < ended + 5 * HANG_SECONDS:
@@ -56,7 +56,7 @@ def memory_share(processes):
 
 
 class Runner:
-    """Runs commands in a folder, and notes every promise that a run breaks."""
+    """Runs commands in a folder and records each broken guarantee."""
 
     def __init__(self, options, folder, shim, commands):
         self.options, self.folder, self.shim = options, folder, shim

@@ -1,5 +1,5 @@
-// Launches fail while a file `fails` exists, and changes of files are reported late while `late` does. Files cannot be watched if
-// there is one `unwatched`, folders if `folders`.
+// While a file `fails` exists, launches fail. While `late` exists, file changes are reported late. `unwatched` and `folders` make
+// watches of files and of folders fail.
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
