@@ -246,7 +246,7 @@ class Accuracy(TestCase):
         self.assertLess(double["rmse"], 1e-14)
 
     def test_samples(self):
-        """Fewer samples are an error like any other."""
+        """An image with fewer samples than the reference has an error."""
         scene = self.json(f"accuracy {self.spheres} {SMALL} --precision double --samples 1,8 --json")["scenes"][0]
         self.assertEqual(scene["reference"]["samples"], 8)
         for variant in scene["variants"]:
@@ -259,7 +259,7 @@ class Accuracy(TestCase):
         self.assertRegex(table, "(?m)^    for an error of at most 1e-06: double, .* ms, the reference itself; no other is within it$")
 
     def test_ties(self):
-        """Each pick lists the other rows within its budget. A sentence states that two runs tell nothing of their times."""
+        """Each pick lists the other rows within its budget. A sentence states that two runs are too few to compare times."""
         for scene in self.report["scenes"]:
             for pick in scene["picks"]:
                 within = [i for i, v in enumerate(scene["variants"]) if i != pick["variant"] and
@@ -277,14 +277,14 @@ class Accuracy(TestCase):
         self.assertEqual(double["frame_ms"]["runs"], single["frame_ms"]["runs"])
 
     def test_progress(self):
-        """Rows and the time left are shown only on a terminal, on standard error, even if a report is written to a file."""
+        """Progress is printed only to a terminal, on standard error, with the rows and the time left."""
         errors = terminal_run(f"accuracy {self.spheres} --size 1280x800 --bounces 16 --seconds 2.6 --precision single,double --json")
         # the time left is known after two seconds, which may be at any step
         for step in "measuring rows 1 to 2 of 2", r"[a-z]+ (the reference for )?rows? [^\r]*, \d+ seconds? left", "comparing row 2 of 2":
             self.assertRegex(errors, rf"\r *\d+% \x1b\[K {step}")
 
     def test_budgets(self):
-        """Budgets are reported in the list's order. All that err exceed the smallest, and the fastest keeps the largest."""
+        """Budgets are reported in the list's order. No variant is within the smallest, and the fastest is within the largest."""
         scene = self.json(f"accuracy {self.spheres} {SMALL} --precision single,strict --budget 1e-30,1e30,0.5 --json")["scenes"][0]
         self.assertEqual([pick["budget"] for pick in scene["picks"]], [1e-30, 1e30, 0.5])
         self.assertIsNone(scene["picks"][0]["variant"])
@@ -293,7 +293,7 @@ class Accuracy(TestCase):
             self.refuses(f"accuracy {self.spheres} {SMALL} --budget={wrong}", "--budget")
 
     def test_max_error(self):
-        """The reported choice keeps the budget, which image and report name."""
+        """The chosen precision stays within the budget, which the image and the report name."""
         for budget, only in ("0.5", None), ("0.2:flip", None), ("1e-3:max", None), ("1e-9", "double"), ("1e-5:flip", "double"):
             limit, _, metric = budget.partition(":")
             with self.subTest(budget):
@@ -331,7 +331,7 @@ class Accuracy(TestCase):
         self.assertEqual([pick["variant"] for pick in scene["picks"]], [None, None, None])
 
     def test_perturbation(self):
-        """Variants err, and the reference keeps its bits."""
+        """Injected errors change the variants' kernels but no bit of the reference."""
         self.glint(f"accuracy {BALLS} {SMALL} --precision double --perturb 1:1000 --save perturbed --output perturbed/report.json")
         report = json.loads(read("perturbed/report.json"))
         (scene,) = report["scenes"]

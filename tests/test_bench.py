@@ -199,7 +199,7 @@ for line in worker.stdout:
         self.refuses(f"{command} ./other", "no OpenCL device matches|none-such")
 
     def test_scene_hash(self):
-        """The hash of a scene from a pipe is that of its bytes, which are gone once they are read."""
+        """The hash of a scene from a pipe is that of its bytes, which can be read only once."""
         os.symlink("/dev/stdin", "pipe.yaml")
         write("other.yaml", SPHERE + "# other\n")
         tiny = "--size 8x8 --seconds 0.01 --no-build-times --json"
@@ -321,7 +321,7 @@ for line in worker.stdout:
             self.assertEqual(process.stdout, "")
 
     def test_variants_against_an_earlier_report(self):
-        """Rows of variants that have other options for the driver are other rows."""
+        """Variants with different driver options have separate rows."""
         command = f"bench sphere.yaml {TINY} --seconds 0.1 --tolerance 1e6 --json"
         write("report", self.glint(f"{command} --variant '--work-group 4x2'").stdout)
         process = self.glint(f"{command} --compare report --variant '--work-group 2x2'", status=1)

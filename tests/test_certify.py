@@ -164,7 +164,7 @@ class Certify(TestCase):
                 self.assertLess(row["color"]["max_right"], 1e-9 if name == "double" else 1e-3)
 
     def test_min_contribution(self):
-        """Rays below it end the same paths in the reference. Above all weights only camera rays are left."""
+        """The limit ends the same paths in the reference. If it exceeds all weights, only camera rays remain."""
         self.write_unbounded(FILTERS)
         images = []
         for options in "", "--min-contribution 0", "--bounces 0", "--min-contribution 0.95", "--min-contribution 0.4":

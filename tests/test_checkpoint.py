@@ -92,7 +92,7 @@ class Checkpoints(TestCase):
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers are loaded first")
     def test_failing_devices(self):
-        """With none left the checkpoint stays, and only what it lacks is rendered."""
+        """If no device is left, the checkpoint is kept, and the next run renders only what it lacks."""
         failing = shim_build("failing.so", FAILING)
         for devices, env in ("", POCL), ("--device all", TWO):
             preloaded = env | {"LD_PRELOAD": failing}

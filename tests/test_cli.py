@@ -350,7 +350,7 @@ class Images(CliTestCase):
             self.assertEqual(Path("alone.ppm").read_bytes(), Path("command.ppm").read_bytes(), scene)
 
     def test_values_are_set(self):
-        """The image is that of a scene with these values, and the file names them."""
+        """The image equals that of a scene with these values, and its notes list them."""
         write("small.yaml", SPHERE.replace("fov: 60", "fov: 40").replace("radius: 1", "radius: 0.5").replace("{reflection", "{color: [1, 0, 0], reflection"))
         self.glint(f"render small.yaml {SMALL} -o small.png")
         values = "camera.fov=40", "objects[0].sphere.radius=0.5", "objects[0].sphere.material={color: red, reflection: 0.1}"
@@ -365,7 +365,7 @@ class Images(CliTestCase):
         self.assertRegex(self.glint(f"check sphere.yaml {options}").stdout, bounds)
 
     def test_camera_of_another_scene(self):
-        """The file's keys count, but not its objects and their warnings. The scene needs no camera, and --set changes the scene."""
+        """The camera's keys are used, but not its file's objects or their warnings. The scene needs no camera, and --set changes it."""
         camera, *others = SPHERE.splitlines(keepends=True)
         moved = camera.replace("fov: 60", "fov: {keys: {0: 60, 2: 20}}")
         self.assertNotEqual(moved, camera)
@@ -459,7 +459,7 @@ class Images(CliTestCase):
             self.assertEqual((data[: len(head)], len(data)), (head, size or len(data)))
 
     def test_exr_of_a_region_with_aovs(self):
-        """One file, whose windows place the region in the image, with the values of the NPY files as layers."""
+        """One file has the values of the NPY files as layers, and its windows place the region in the image."""
         whole = "render sphere.yaml --size 40x30 --alpha --aov t,object,normal,shadow -o"
         region = whole.replace("-o", "--region 8,4,24,16 -o")
         self.assertRegex(self.glint(f"{region} a.exr").stderr, r"glint: wrote a\.exr\n$")
@@ -615,7 +615,7 @@ class Aovs(CliTestCase):
             self.refuses(f"render disc.yaml --alpha -o {name}", "--alpha is for PNG and EXR")
 
     def test_interpolated_normal_is_turned_with_its_triangle(self):
-        """Near silhouettes it may point away from the eye, whichever way the file turns it."""
+        """Near silhouettes the normal may point away from the eye, whichever way the file turns it."""
         corners = (-0.05, -1, -1), (0.05, -1, 1), (0, 1, 0)
         for x, z in (1, 0.3), (-1, -0.3), (1, -0.3):
             lines = [f"v {' '.join(map(str, corner))}" for corner in corners]
@@ -660,7 +660,7 @@ class Trace(CliTestCase):
             self.refuses(command, f"'{refused}', which has no error bound") if refused else self.glint(command)
 
     def test_certified(self):
-        """A hit, a miss, a hit beyond the end and one at it, and a tangent, which nothing decides."""
+        """A hit, a miss and a hit beyond the end are certain. A hit at the end and a tangent are uncertain."""
         write("rays", "0 0 -4 0 0 2\n0 5 -4 0 0 1\n0 0 -4 0 0 1 0 2\n0 0 -4 0 0 1 0 3\n0 1 -4 0 0 1\n")
         header, *lines = self.glint("trace sphere.yaml --rays rays --precision certified").stdout.splitlines()
         self.assertEqual(header, "object,t,nx,ny,nz,low,high,certainty")
@@ -714,7 +714,7 @@ class Reports(CliTestCase):
         self.assertGreaterEqual(len(report["features"]), 14)
 
     def test_sizes_that_float_cannot_hold(self):
-        """A width below a trillionth of an object's distance, named with its line, at each precision in float alone."""
+        """A width below a trillionth of an object's distance causes a warning with the object's line, except at double."""
         write("long.yaml", SPHERE + "  - cylinder: {from: [50, 0, -1e17], to: [50, 0, 1e17], radius: 7}\n")
         line = len(read("long.yaml").splitlines())
         pattern = rf"warning: the cylinder on line {line} reaches 1e\+17 from the eye, and the width of the sphere on line \d+ is 2: precision"

@@ -61,7 +61,7 @@ class Frames(TestCase):
         self.assertNotEqual(npy_read("f00.npy"), npy_read("f01.npy"))
 
     def test_all(self):
-        """The scene, or else that of --camera, has the number of frames."""
+        """The scene, or else the file of --camera, defines the number of frames."""
         moving = SCENE.format(**KEYS)
         write("moving.yaml", f"frames: 3\n{moving}")
         write("still.yaml", SPHERE)
@@ -77,7 +77,7 @@ class Frames(TestCase):
                     name.unlink()
 
     def test_rate(self):
-        """`glint check` states the frames' number and rate, which --camera brings unless the scene has one."""
+        """`glint check` prints the number of frames and their rate, from the file of --camera unless the scene has them."""
         write("shot.yaml", SPHERE + "frames: 48\nfps: 12.5\n")
         write("slow.yaml", SPHERE + "fps: 2\n")
         self.assertIn("\n  frames     48\n  fps        12.5\n", self.glint("check shot.yaml").stdout)
@@ -108,7 +108,7 @@ class Frames(TestCase):
         return "still.png"
 
     def test_skip_existing(self):
-        """Images of frames and of scenes that exist are left as they are."""
+        """Existing images of frames and of scenes are kept."""
         write("moving.yaml", SCENE.format(**KEYS))
         write("s1.png", "kept")
         process = self.glint("render moving.yaml --frames 0-2 --size 32x18 --skip-existing -o s%d.png")
@@ -124,7 +124,7 @@ class Frames(TestCase):
         self.refuses("render moving.yaml --skip-existing --timing=json", "nothing to report")
 
     def test_reports(self):
-        """Each frame has one line, as does each scene."""
+        """Each frame and each scene has one line."""
         write("moving.yaml", SCENE.format(**KEYS))
         write("still.yaml", SPHERE)
         for options, expected in ("moving.yaml --frames 3-4", [("moving.yaml", 3), ("moving.yaml", 4)]), \

@@ -58,7 +58,7 @@ class Golden(TestCase):
         self.assertEqual(self.glint(f"golden check 'other scene.yaml' --lanes {'4 --bvh on' if IS_LONG else '1'}").stdout, "other scene.yaml: same\n")
 
     def test_differences(self):
-        """A changed scene has the layer that differs first, and the pixels, whose crop shows the scene as it is now."""
+        """For a changed scene, the first layer that differs and its pixels are printed, and a crop shows the current scene."""
         self.written()
         for change, layer, part in (
                 (("radius: 1", "radius: 1.0000001"), "object|t", None), (("fov: 60", "fov: 61"), "object|t", None),
@@ -77,14 +77,14 @@ class Golden(TestCase):
                     self.assertIn(f"within pixels {part}", out)
 
     def test_every_part_of_a_line_counts(self):
-        """A digit of any hash that changes is a difference of that layer, although the scene is the same."""
+        """A changed digit of any layer's hash is reported as a difference of that layer, although the scene is the same."""
         line = self.written()
         for layer in "object", "t", "normal", "shadow", "path", "color":
             write("golden.txt", re.sub(rf"( {layer}=)(.)", lambda found: found[1] + "0123456789abcdef"[(int(found[2], 16) + 1) % 16], line))
             self.assertEqual(self.glint("golden check", status=3).stdout, f"s.yaml: different, first in {layer}\n")
 
     def test_one_changed_bit_is_found(self):
-        """The lowest bit of one number, at a random place of each layer."""
+        """The lowest bit of one number is changed, at a random place of each layer."""
         shim = shim_build("flip", SHIM)
         self.written()
         layers = {}

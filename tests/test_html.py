@@ -202,7 +202,7 @@ class Html(TestCase):
         self.check_drawn(page, report)
 
     def test_reference_from_a_file(self):
-        """A reference from a file has only colors, and no errors of distances and normals."""
+        """A reference from a file has only colors, so the page shows no errors of distances and normals."""
         self.glint("render spheres16.yaml --size 120x80 --precision double -o reference.npy")
         page, report = self.page("spheres16.yaml --precision single,double --reference reference.npy")
         self.check_drawn(page, report)

@@ -230,7 +230,7 @@ class Mpi(TestCase):
         self.mpirun(f"-n 2 {RANKS} {RENDER} --checkpoint saved", status=1)
 
     def test_frames_of_failing_devices(self):
-        """Others render the frame of a rank whose device fails. With none left the job ends with 2."""
+        """Other ranks render the frame of a rank whose device fails. If no rank is left, the job exits with status 2."""
         self.faults_build()
         command = self.write_frames()
         os.mkdir("frames")
@@ -278,7 +278,7 @@ class Mpi(TestCase):
         return process.stderr
 
     def test_failing_devices(self):
-        """The others render the rows of a rank whose device fails. With none left the job ends with 2."""
+        """The other ranks render the rows of a rank whose device fails. If no rank is left, the job exits with status 2."""
         self.faults_build()
         self.assertRegex(self.mpirun_faulty(SLOW, {}), "warning: rank 1 on .*: clEnqueueNDRangeKernel: CL_OUT_OF_RESOURCES")
         self.assertRegex(self.mpirun_faulty({}, SLOW), "warning: the other devices continue without it: clEnqueueNDRangeKernel")

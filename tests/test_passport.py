@@ -248,7 +248,7 @@ class PassportTest(TestCase):
                 for found in passport["properties"] if found["finding"] != "sound"}
 
     def test_each_violation_is_named(self):
-        """Each violation is named, and none without one, since PoCL on x86-64 is as IEEE 754 demands."""
+        """Each violation is named. Without one none is, because PoCL on x86-64 conforms to IEEE 754."""
         device = self.device(**self.violated(FMA_COST="1", SWEEP_COST="0"))
         self.assertEqual([passport["precision"] for passport in device["passports"]], MODES if HAS_DOUBLE else MODES[:2])
         usual = self.abnormal(device)
@@ -301,7 +301,7 @@ class PassportTest(TestCase):
                       passport["properties"])
 
     def test_bits_at_strict(self):
-        """What glint allows for changes no bit. An inexact division is repaired, and fma emulated."""
+        """Deviations that glint corrects change no bit. Inexact divisions are repaired, and fma is emulated."""
         command = f"render sphere.yaml --size 32x24 --lanes {4 if IS_LONG else 1} --quiet --precision strict -o"
         self.glint(f"{command} right.npy", **self.violated())
         inexact = "division, by three ulp", "square root, by four ulp", "fma that rounds twice"
@@ -343,7 +343,7 @@ class PassportTest(TestCase):
                     self.assertRegex(launch["doubt"], pattern.split(" but")[0])
 
     def test_the_cache(self):
-        """Each device and driver is measured once, unless asked for."""
+        """Each device and driver is measured once, unless a new measurement is requested."""
         def probes(command, **variables):
             write("launches", "")
             variables |= {"LAUNCHES": os.path.abspath("launches"), "XDG_CACHE_HOME": os.path.abspath("cache")}

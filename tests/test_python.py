@@ -86,7 +86,7 @@ class Images(unittest.TestCase):
             np.testing.assert_array_equal(image, np.load(f"{folder}/image.npy"))
 
     def test_overrides_and_frames(self):
-        """A replaced value and a frame's value are as if the scene had them."""
+        """Replaced values and a frame's values have the same effect as if the scene contained them."""
         def image(scene):
             return scene.render(32, 18, precision="strict")
         moving = {**SPHERE, "objects": [sphere({"keys": {0: 1, 4: 2}})]}
@@ -198,7 +198,7 @@ class Rays(unittest.TestCase):
 
 class Occlusion(unittest.TestCase):
     def test_shadows_of_a_sphere(self):
-        """A sphere hides some points of a plane from a light, with more rays than a batch has."""
+        """A sphere hides some points of a plane from a light. The rays do not fit in one batch."""
         scene = glint.Scene(SPHERE)
         points = np.random.default_rng(6).uniform(-4, 4, (70000, 3))
         points[:, 2] = 2
@@ -339,7 +339,7 @@ class AllHits(unittest.TestCase):
         self.scene = glint.Scene({**SPHERE, "objects": [sphere(radius) for radius in range(1, 6)]})
 
     def test_order(self):
-        """Through concentric spheres, next to them, and from inside, in more rays than a batch has."""
+        """Rays pass through concentric spheres and next to them, and start inside them. They do not fit in one batch."""
         count = 70000
         origins = np.zeros((count, 3))
         origins[:, 0] = np.random.default_rng(3).uniform(0, 6, count)
@@ -417,7 +417,7 @@ class Trimesh(unittest.TestCase):
 @unittest.skipUnless(IS_LONG, "takes matplotlib")
 class Notebook(unittest.TestCase):
     def test_results(self):
-        """The notebook's code runs, and has the errors that it shows."""
+        """The notebook's code runs and reproduces the errors that it shows."""
         import matplotlib
         matplotlib.use("Agg")
         cells = json.loads((ROOT / "docs/notebook.ipynb").read_text(encoding="utf-8"))["cells"]
@@ -464,7 +464,7 @@ class Errors(unittest.TestCase):
                 make()
 
     def test_callbacks_and_lifetimes(self):
-        """An exception of progress arrives, even if it frees or uses a scene of the same device. Handles are not shared."""
+        """An exception from progress reaches the caller, even if progress frees or uses a scene of the device. Handles are not shared."""
         scene, other = glint.Scene(SPHERE), glint.load_mesh(CUBE_VERTICES, CUBE_FACES)
         other.trace([[3, 3, 3]], [[1, 0, 0]])
 

@@ -122,7 +122,7 @@ class SideBySide(TestCase):
         self.assertNotIn("lower_quartile", self.compared(older, summarized)[1]["rows"][0]["cells"][1]["frame_ms"])
 
     def test_missing_rows(self):
-        """Rows may be in only some reports, may have failed, and two reports may have no row in common."""
+        """Rows may be missing from some reports or may have failed, and two reports may have no row in common."""
         failed = KEY | {"precision": "double", "status": "unavailable", "reason": "no doubles here"}
         out, data = self.compared(report(run(10), run(30, samples=4)), report(run(10), failed), report(run(7, samples=4)))
         self.assertEqual([[cell and cell.get("frame_ms", {}).get("median") and True for cell in row["cells"]] for row in data["rows"]],

@@ -94,7 +94,7 @@ class Soft(TestCase):
                     self.assertEqual(after, lights[lamps[number]][1] if number in lamps else before)
 
     def test_no_shadow(self):
-        """A material may cast none, next to others that do."""
+        """A material may cast no shadows, next to others that do."""
         text = ("camera: {{position: [0, 5, 9], look_at: [0, 0, 0]}}\nlights: [{{point: {{position: [0, 9, 0]}}}}]\nobjects:\n"
                 "  - plane: {{point: [0, 0, 0], normal: [0, 1, 0]}}\n  - sphere: {{center: [-2, 2, 0], radius: 1}}\n"
                 "  - sphere: {{center: [2, 2, 0], radius: 1, material: {{shadow: {}}}}}\n"
@@ -144,7 +144,7 @@ class Soft(TestCase):
         self.assertEqual(self.row(text.format(", focus: 3, aperture: 0"), (32, 32)), plain)
 
     def test_parallel_rays(self):
-        """Pixels lie evenly on the scene, at every distance. The window's height is that of the image."""
+        """Pixels are evenly spaced on the scene at every distance. The window's height is that of the image."""
         # with the features of penumbra's scenes
         write("soft.yaml", "camera: {position: [1, 2, 6], look_at: [1, 2, 0], height: 3}\n" + self.lights(f"{DARK[0]}}}") +
               "objects:\n  - plane: {point: [0, 0, 1], normal: [0.3, 0.2, 1]}\n  - box: {min: [0, 0, 900], max: [1, 1, 901]}\n")

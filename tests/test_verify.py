@@ -118,7 +118,7 @@ class Verify(VerifyTestCase):
 
     @unittest.skipIf(IS_SANITIZED, "sanitizers handle crashes themselves")
     def test_a_crash_fails_its_case_alone(self):
-        """The driver crashes in building or running one kernel, and the other cases keep their bits."""
+        """If the driver crashes while it builds or runs one kernel, the other cases keep their bits."""
         cases = ["S2", "S5", "P4"]
         whole = self.verify(cases, "--precision single --quick")["cases"]
         env = {"LD_PRELOAD": shim_build("crashing.so", CRASHING, "-ldl")}
@@ -140,7 +140,7 @@ class Verify(VerifyTestCase):
                                          r"  S5 .* ok\n  P4 .* ok\n  tier B: 2 of 3 cases passed")
 
     def test_progress(self):
-        """A terminal shows the case and how many there are."""
+        """Progress on a terminal names the case and the number of cases."""
         errors = terminal_run("verify S5 S6 P4 P5 C7 T2 M3 --precision single --quick --json")
         self.assertRegex(errors, r"\r *\d+% \x1b\[K [A-Z]\d at single, case \d of 7")
 
@@ -182,7 +182,7 @@ class PerturbedDevice(VerifyTestCase):
         self.assertTrue(all(one != other for one, other in pairs))
 
     def test_images(self):
-        """Each seed has a different image, the same every time and at every number of lanes."""
+        """Each seed gives a different image, which is the same in every run and at every number of lanes."""
         scene = self.scene()
 
         def pixels(arguments):

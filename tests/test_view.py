@@ -109,7 +109,7 @@ class View(TestCase):
         window.close()
 
     def test_reload_of_a_mesh(self):
-        """The view's camera stays where the file's does."""
+        """When a mesh changes, the view keeps its moved camera."""
         window = Window(self)
         window.saved()
         window.key("Left")
@@ -128,7 +128,7 @@ class View(TestCase):
         window.close()
 
     def test_reload_of_an_image(self):
-        """An image that breaks leaves the last scene, which can be moved and saved."""
+        """If an image becomes unreadable, the last scene stays and can be moved and saved."""
         text = SCENE + "  - plane: {point: [0, -1, 0], normal: [0, 1, 0], material: {image: image.png}}\n"
         shutil.copy(ROOT / "scenes/images/globe.png", "image.png")
         write("scene.yaml", text)
@@ -226,7 +226,7 @@ class View(TestCase):
         window.close()
 
     def test_camera_of_another_file(self):
-        """Another file is watched, and the camera is written into it."""
+        """The camera's file is watched, and the camera is written into it."""
         camera, *others = SCENE.splitlines(keepends=True)
         write("scene.yaml", "".join(others))
         write("shot.yaml", camera)
@@ -247,7 +247,7 @@ class View(TestCase):
         return shim_build("calls.so", read(ROOT / "tests/shims/calls.c"), "-ldl")
 
     def test_unwatched_files(self):
-        """Whoever uses up what the system has for watching files learns that changes are not seen."""
+        """If the system can watch no more files, a warning states that changes are not seen."""
         write("unwatched", "")
         window = Window(self, LD_PRELOAD=self.failing_calls())
         window.line("^glint: warning: changes of files are not seen: Too many open files")
