@@ -31,8 +31,8 @@ static bool budgets_read(const Option *option, const char *value, void *options)
 
 static const Option options_own[] = {
     {"reference", "FILE",
-     "compare with these linear colors, .exr or .npy, of the images' size or a multiple, which is averaged "
-     "(default: the image at double)",
+     "compare with the linear colors in FILE (.exr or .npy), which has the images' size or a multiple that "
+     "is averaged (default: the image at double)",
      option_text, offsetof(AccuracyOptions, reference_path)},
     {"budget", "LIST",
      "report the fastest configuration within each of these errors (default: 1e-2,1e-4,1e-6)", budgets_read,
