@@ -239,6 +239,10 @@ class Parts(TestCase):
             self.assertEqual(locate.main(["strict-1", "--reference", DEVICE]), 0)
             self.assertEqual(locate.main(["strict-1", "--reference", "no such device"]), 1)
             self.assertEqual(locate.main(["none"]), 1)
+            for wrong in [], ["strict-1", "--unknown"]:
+                with self.assertRaises(SystemExit) as exit_of_parser:
+                    locate.main(wrong)
+                self.assertEqual(exit_of_parser.exception.code, 1)
             with unittest.mock.patch.object(locate, "TRACE_WORDS", 200):  # in several parts
                 self.assertEqual(locate.main(["strict-1", "--reference", DEVICE, "-o", "found.cl"], Compiler(Mutant("sqrt"))), 3)
             self.assertEqual(locate.main(["--run", "found.cl"]), 0)

@@ -463,10 +463,18 @@ def command_run(options, compiler):
     return 0
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser that exits with 1 for a wrong command line, because 2 means that a device failed."""
+
+    def error(self, message):
+        self.print_usage(sys.stderr)
+        self.exit(1, f"{self.prog}: {message}\n")
+
+
 def main(arguments=None, compiler=lambda text: text):
     """Runs the command and returns its exit status: 0 if no pixel differs, 1 for a user's mistake, 2 if a device failed, 3 if a pixel or a
     result differs. compiler: the suspect's, which tests replace."""
-    parser = argparse.ArgumentParser(prog="glint locate", description="Finds the operation that an OpenCL device computes differently from another.")
+    parser = Parser(prog="glint locate", description="Finds the operation that an OpenCL device computes differently from another.")
     parser.add_argument("folder", nargs="?", type=Path, help="of glint render --capture")
     parser.add_argument("--device", help="index or part of the name of the suspect (default: the device of the capture)")
     parser.add_argument("--reference", default="portable computing language", help="index or part of the name of the reference (default: PoCL)")
