@@ -195,6 +195,32 @@ class Rays(unittest.TestCase):
             np.testing.assert_array_equal(found[i], expected)
         np.testing.assert_array_equal(found[0], found[2])
 
+    def test_thread_that_waits_for_a_render(self):
+        """A progress function may trace a scene while another thread waits for the device, to open a tracer of that scene."""
+        scene, is_rendering, is_opening, open_tracer = glint.Scene(SPHERE), threading.Event(), threading.Event(), glint.Scene._tracer
+        ray = [[0, 0, -4]], [[0, 0, 1]]
+
+        def tracer(*arguments):
+            is_opening.set()
+            return open_tracer(*arguments)
+
+        def progress(_):
+            is_rendering.set()
+            self.assertTrue(is_opening.wait(60))
+            scene.trace(*ray)
+
+        def trace():
+            self.assertTrue(is_rendering.wait(60))
+            scene.trace(*ray)
+        with mock.patch.object(glint.Scene, "_tracer", tracer):
+            threads = [threading.Thread(target=target, daemon=True) for target in (lambda: scene.render(64, 48, progress=progress), trace)]
+            for thread in threads:
+                thread.start()
+            for thread in threads:
+                thread.join(60)
+                self.assertFalse(thread.is_alive(), "the threads wait for each other")
+        self.assertEqual(len(scene._tracers), 1)
+
 
 class Occlusion(unittest.TestCase):
     def test_shadows_of_a_sphere(self):
@@ -475,6 +501,13 @@ class Errors(unittest.TestCase):
             raise KeyError("mine")
         with self.assertRaisesRegex(KeyError, "mine"):
             scene.render(640, 360, progress=progress)
+
+        def fail(_function, _device, _scene, settings, _image):
+            settings._obj.progress(None, 0.5)
+            raise glint.DeviceError("lost")
+        with mock.patch.object(glint._h, "call", fail):
+            with self.assertRaisesRegex(KeyError, "mine"):
+                scene.render(640, 360, progress=mock.Mock(side_effect=KeyError("mine")))
         for wrong in copy.copy, pickle.dumps:
             with self.assertRaisesRegex(TypeError, "copied or pickled"):
                 wrong(scene)
@@ -495,6 +528,20 @@ class Errors(unittest.TestCase):
         self.assertEqual([(w.category, w.filename) for w in caught], [(glint.GlintWarning, __file__)] * 2)
         self.assertIn("no lights", str(caught[0].message))
         self.assertEqual(str(caught[1].message).splitlines()[0], "lens.yaml:2:9: warning: 'focus' has no effect without an 'aperture'")
+
+    def test_warnings_of_opening(self):
+        """A warning of a device that is opened points to the user's line, not into contextlib."""
+        def device_open(_selector, _device, messages):
+            messages._obj.value = copy_text(b"slow")
+            return 0
+        copy_text = ctypes.CDLL(None).strdup
+        copy_text.restype = ctypes.c_void_p
+        with mock.patch.object(glint._c.library, "glint_device_open", device_open), mock.patch.dict(glint._h._opened), \
+                warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            with glint._h.device_opened("warns"):
+                pass
+        self.assertEqual([(str(w.message), w.filename) for w in caught], [("slow", __file__)])
 
     def test_warnings_of_devices(self):
         """A device warns once about a kernel cache that others can access, and prints nothing."""

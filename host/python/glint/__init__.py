@@ -153,7 +153,7 @@ class Scene:
         """Sets the handle by a function that sets it and the messages, and returns a status."""
         self._handle = _h.Handle(make, _c.library.glint_scene_free)
         self._tracers: dict[tuple[_h.Handle, int, int], _h.Handle] = {}  # by device, precision and lanes
-        self._lock = threading.RLock()  # of the tracers; a function that shows warnings may trace
+        self._lock = threading.Lock()  # of the tracers; never held during a call of the library, which may wait for a device
 
     def __reduce__(self) -> Any:
         raise TypeError("a Scene cannot be copied or pickled")
@@ -221,7 +221,7 @@ class Scene:
         try:
             with _h.device_opened(device) as opened:
                 _h.call(_c.library.glint_render, opened, self._handle, ctypes.byref(settings), ctypes.byref(image))
-        except Stopped:
+        except (Stopped, DeviceError):
             if not raised:
                 raise
         if raised:
@@ -290,13 +290,16 @@ class Scene:
             key = opened, _precision(precision), _h.uint32("lanes", lanes)
             try:
                 with self._lock:
-                    if key not in self._tracers:
-                        self._tracers[key] = self._tracer(*key)
-                    tracer = self._tracers[key]
+                    tracer = self._tracers.get(key)
+                if not tracer:
+                    made = self._tracer(*key)
+                    with self._lock:
+                        tracer = self._tracers.setdefault(key, made)
                 _h.call(function, tracer, *arguments)
             except DeviceError:
                 with self._lock:
-                    self._tracers = {other: tracer for other, tracer in self._tracers.items() if other[0] is not opened}
+                    dropped = self._tracers  # which are closed after the lock is released
+                    self._tracers = {other: tracer for other, tracer in dropped.items() if other[0] is not opened}
                 raise
 
     def _tracer(self, device: _h.Handle, precision: int, lanes: int) -> _h.Handle:

@@ -44,7 +44,7 @@ def call(function: Any, *arguments: Any) -> None:
         raise _EXCEPTIONS[status](text)
     if text:
         frame, level = sys._getframe(), 1
-        while frame.f_back and frame.f_globals.get("__package__") == __package__:
+        while frame.f_back and str(frame.f_globals.get("__name__")).partition(".")[0] in (__package__, contextlib.__name__):
             frame, level = frame.f_back, level + 1
         warnings.warn(text, GlintWarning, stacklevel=level)
 
