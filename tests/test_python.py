@@ -563,17 +563,23 @@ class Errors(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("localedef") and os.path.exists("/usr/share/i18n/locales/de_DE"), "localedef makes no de_DE")
     def test_locale(self):
-        """In a locale with decimal commas a scene, interpolated between two keys, is the same."""
+        """In a locale with decimal commas a scene, interpolated between two keys, and messages are the same."""
         program = f"""if True:
-            import glint, locale
+            import glint, locale, pathlib, sys, warnings
             locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
             scene = glint.Scene({{**{SPHERE!r}, "frames": 3, "objects": [{{"sphere": {{"center": [0, 0, 0], "radius": {{"keys": {{"0": 1, "2": 2}}}}}}}}]}}, frame=0.5)
-            print(scene.trace([[0, 0, -4]], [[0, 0, 1]], precision="double").t.tolist(), locale.str(0.5))"""
+            print(scene.trace([[0, 0, -4]], [[0, 0, 1]], precision="double").t.tolist(), locale.str(0.5))
+            folder = pathlib.Path(sys.argv[1])
+            (folder / "mesh.obj").write_text("mtllib mesh.mtl\\nv 0 0 0\\nv 1 0 0\\nv 0 1 0\\nusemtl a\\nf 1 2 3\\n")
+            (folder / "mesh.mtl").write_text("newmtl a\\nd 0.25\\nTr 0.5\\n")
+            with warnings.catch_warnings(record=True) as caught:
+                glint.load(folder / "mesh.obj")
+            print(*("Tr 0.5 does not fit d 0.25" in str(warning.message) for warning in caught))"""
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run(["localedef", "-f", "UTF-8", "-i", "de_DE", f"{folder}/de_DE.UTF-8"], check=True, stdout=subprocess.DEVNULL)
-            process = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False,
+            process = subprocess.run([sys.executable, "-c", program, folder], capture_output=True, text=True, check=False,
                                      env={**os.environ, "LOCPATH": folder, "PYTHONPATH": str(ROOT / "host/python")})
-        self.assertEqual((process.stdout, process.stderr), ("[2.75] 0,5\n", ""))
+        self.assertEqual((process.stdout, process.stderr), ("[2.75] 0,5\nTrue\n", ""))
 
     def test_max_pixels(self):
         """max_pixels limits the pixels of an image in the scene."""

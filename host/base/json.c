@@ -109,23 +109,9 @@ void json_text(Json *json, const char *key, const char *value)
     json_quote(json, value);
 }
 
-void json_number_print(char word[JSON_NUMBER_SIZE], double value)
-{
-    snprintf(word, JSON_NUMBER_SIZE, "null");
-    if (!isfinite(value)) return;
-    // 17 digits always suffice (Goldberg, What every computer scientist should know about floating-point
-    // arithmetic, 1991, theorem 15).
-    int digits = 1;
-    do
-        snprintf(word, JSON_NUMBER_SIZE, "%.*g", digits, value);
-    while (digits++ < 17 && strtod(word, NULL) != value);
-}
-
 void json_number(Json *json, const char *key, double value)
 {
-    char word[JSON_NUMBER_SIZE];
-    json_number_print(word, value);
-    json_word(json, key, word);
+    json_word(json, key, isfinite(value) ? text_number(value, 1).text : "null");
 }
 
 void json_int64(Json *json, const char *key, int64_t value)

@@ -19,9 +19,6 @@ void json_int64(Json *json, const char *key, int64_t value);
 void json_count(Json *json, const char *key, uint64_t value);
 void json_bool(Json *json, const char *key, bool value);
 void json_none(Json *json, const char *key);
-// Formats a number as JSON, as the shortest text that reads back, or null if it is not finite.
-enum { JSON_NUMBER_SIZE = 32 };
-void json_number_print(char word[JSON_NUMBER_SIZE], double value);
 // Returns the document with one newline at its end, and frees the writer.
 Text json_close(Json *json);
 // Prints the document and one newline, and frees it.

@@ -22,20 +22,16 @@ void text_append(Text *text, const char *bytes, size_t length)
 
 void text_appendf(Text *text, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    char *formatted = text_format_list(format, arguments);
-    va_end(arguments);
+    char *formatted;
+    ARGUMENTS_FORMAT(formatted, format);
     text_append(text, formatted, strlen(formatted));
     free(formatted);
 }
 
 char *text_format(const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    char *formatted = text_format_list(format, arguments);
-    va_end(arguments);
+    char *formatted;
+    ARGUMENTS_FORMAT(formatted, format);
     return formatted;
 }
 
@@ -75,20 +71,28 @@ void text_free(Text *text)
     *text = (Text){0};
 }
 
+static ShortText short_format(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+// Formats a text, of which it keeps what fits.
+static ShortText short_format(const char *format, ...)
+{
+    char *formatted;
+    ARGUMENTS_FORMAT(formatted, format);
+    ShortText text;
+    snprintf(text.text, sizeof text.text, "%s", formatted);
+    free(formatted);
+    return text;
+}
+
 ShortText text_size(double bytes)
 {
     static const char *const units[] = {"KiB", "MiB", "GiB", "TiB"};
     enum { UNIT_COUNT = COUNT_OF(units) };
-    ShortText size;
-    if (bytes < 1024) {
-        snprintf(size.text, sizeof size.text, "%.0f byte%s", bytes, text_plural((uint64_t)bytes));
-        return size;
-    }
+    if (bytes < 1024) return short_format("%.0f byte%s", bytes, text_plural((uint64_t)bytes));
     int unit = 0;
     for (bytes /= 1024; bytes >= 1023.95 && unit + 1 < UNIT_COUNT; unit++)
         bytes /= 1024;
-    snprintf(size.text, sizeof size.text, "%.1f %s", fmin(bytes, 1e15), units[unit]);
-    return size;
+    return short_format("%.1f %s", fmin(bytes, 1e15), units[unit]);
 }
 
 ShortText text_duration(double seconds)
@@ -102,10 +106,19 @@ ShortText text_duration(double seconds)
     while (units[unit].seconds > 1 && seconds < 2 * units[unit].seconds)
         unit++;
     const double count = fmin(round(seconds / units[unit].seconds), 1e9);
-    ShortText duration;
-    snprintf(duration.text, sizeof duration.text, "%.0f %s%s", count, units[unit].name,
-             text_plural((uint64_t)count));
-    return duration;
+    return short_format("%.0f %s%s", count, units[unit].name, text_plural((uint64_t)count));
+}
+
+// 17 digits always suffice (Goldberg, What every computer scientist should know about floating-point
+// arithmetic, 1991, theorem 15).
+ShortText text_number(double value, int digits_min)
+{
+    ShortText number;
+    int digits = digits_min;
+    do
+        number = short_format("%.*g", digits, value);
+    while (digits++ < 17 && strtod_l(number.text, NULL, text_locale()) != value);
+    return number;
 }
 
 const char *text_plural(uint64_t count)

@@ -20,6 +20,15 @@ void text_appendf(Text *text, const char *format, ...) __attribute__((format(pri
 // text_appendf.
 char *text_format(const char *format, ...) __attribute__((format(printf, 1, 2)));
 char *text_format_list(const char *format, va_list arguments) __attribute__((format(printf, 1, 0)));
+// Sets `formatted`, a char *, to the formatted arguments after `format` of the function that uses it. The
+// caller frees it.
+#define ARGUMENTS_FORMAT(formatted, format)                                                                  \
+    do {                                                                                                     \
+        va_list arguments;                                                                                   \
+        va_start(arguments, format);                                                                         \
+        formatted = text_format_list(format, arguments);                                                     \
+        va_end(arguments);                                                                                   \
+    } while (0)
 // Returns the locale C, whatever locale the process has set.
 locale_t text_locale(void);
 const char *text_c(const Text *text); // never NULL
@@ -34,6 +43,8 @@ typedef struct {
 ShortText text_size(double bytes);
 // Returns a duration in the unit that suits it, such as "90 seconds" or "3 hours".
 ShortText text_duration(double seconds);
+// Returns a finite number with the fewest digits, but at least `digits_min`, that read back as the same.
+ShortText text_number(double value, int digits_min);
 // Returns the plural ending of a noun for the count, "" for 1 and otherwise "s".
 const char *text_plural(uint64_t count);
 

@@ -89,7 +89,6 @@ static const json_t *value_at(const ReportRow *row, const char *path)
 
 static void value_append(Text *text, const json_t *value)
 {
-    char word[JSON_NUMBER_SIZE];
     json_type type = value ? json_typeof(value) : JSON_NULL;
     switch (type) {
     case JSON_STRING:
@@ -99,8 +98,7 @@ static void value_append(Text *text, const json_t *value)
         text_appendf(text, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
         break;
     case JSON_REAL:
-        json_number_print(word, json_real_value(value));
-        text_appendf(text, "%s", word);
+        text_appendf(text, "%s", text_number(json_real_value(value), 1).text);
         break;
     case JSON_TRUE:
     case JSON_FALSE:

@@ -151,10 +151,8 @@ bool image_write(const char *path, const ImageHeader *header, const void *pixels
 
 bool image_refuse(const ImageFile *file, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    char *reason = text_format_list(format, arguments);
-    va_end(arguments);
+    char *reason;
+    ARGUMENTS_FORMAT(reason, format);
     message_error(file->messages, "cannot read '%s': %s", file->path, reason);
     free(reason);
     return false;
@@ -162,10 +160,8 @@ bool image_refuse(const ImageFile *file, const char *format, ...)
 
 void image_warn(const ImageFile *file, const char *format, ...)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    char *loss = text_format_list(format, arguments);
-    va_end(arguments);
+    char *loss;
+    ARGUMENTS_FORMAT(loss, format);
     message_warning(file->messages, "'%s': %s", file->path, loss);
     free(loss);
 }

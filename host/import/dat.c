@@ -3,6 +3,7 @@
 // what is read and how it maps to glint.
 #include "host/import/dat.h"
 #include "host/base/array.h"
+#include "host/base/text.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -16,10 +17,11 @@ bool dat_skip(DatReader *reader, const char *keyword)
 
 void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 {
-    char text[256];
+    char *text;
     ARGUMENTS_FORMAT(text, format);
     if (!report_repeats(&reader->report, NULL, 0, 0, text))
         report_warning(&reader->report, offset, "%s", text);
+    free(text);
 }
 
 bool dat_expect(DatReader *reader, const char *keyword)

@@ -2,8 +2,6 @@
 #pragma once
 
 #include "host/base/message.h"
-#include <stdarg.h>
-#include <stdio.h>
 
 // Bounds the number of messages about other files that a report remembers.
 enum { REPORT_FILE_MESSAGES = 256 };
@@ -43,12 +41,3 @@ void report_include(Report *report, Report *included);
 // Sorts the messages into source order, drops repeats and adds a count of those beyond the limit. Returns
 // true if there was no error.
 bool report_close(Report *report);
-
-// Formats the arguments after `format` of the function that uses it into the array `text`.
-#define ARGUMENTS_FORMAT(text, format)                                                                       \
-    do {                                                                                                     \
-        va_list arguments;                                                                                   \
-        va_start(arguments, format);                                                                         \
-        vsnprintf(text, sizeof text, format, arguments);                                                     \
-        va_end(arguments);                                                                                   \
-    } while (0)

@@ -48,10 +48,8 @@ static void failure_keep(Compute *compute, const char *call, cl_int status, char
 
 void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
 {
-    va_list arguments;
-    va_start(arguments, detail);
-    char *text = text_format_list(detail, arguments);
-    va_end(arguments);
+    char *text;
+    ARGUMENTS_FORMAT(text, detail);
     failure_keep(compute, call, status, text);
 }
 

@@ -7,7 +7,6 @@
 #include "host/scene/portable.h"
 #include <float.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -255,10 +254,7 @@ static bool scene_read(Scene *scene, const char *text, MessageList *messages)
 Scene verify_scene(const char *format, ...)
 {
     char *members;
-    va_list arguments;
-    va_start(arguments, format);
-    if (vasprintf(&members, format, arguments) < 0) fault("out of memory: scene");
-    va_end(arguments);
+    ARGUMENTS_FORMAT(members, format);
     char *text = text_format("camera: {position: [0, 0, 0], look_at: [0, 0, 1], fov: 90}\n%s", members);
     MessageList messages = {0};
     Scene scene;

@@ -5,12 +5,7 @@
 
 void number_write_yaml(Text *text, double value)
 {
-    char word[32];
-    int digits = 6; // fewer would give 5e+01
-    do
-        snprintf(word, sizeof word, "%.*g", digits, value);
-    while (digits++ < 17 && strtod(word, NULL) != value);
-    text_appendf(text, "%s", word);
+    text_appendf(text, "%s", text_number(value, 6).text); // fewer digits would give 5e+01
 }
 
 static void list_write(Text *text, const double *values, size_t count)

@@ -1,5 +1,6 @@
 #include "host/import/mesh/draft.h"
 #include "host/base/file.h"
+#include "host/base/text.h"
 #include "host/image/image.h"
 
 #include <ctype.h>
@@ -8,8 +9,6 @@
 
 const char *const draft_part_names[DRAFT_PART_COUNT] = {
     [DRAFT_POSITION] = "vertex", [DRAFT_UV] = "texture coordinate", [DRAFT_NORMAL] = "normal"};
-
-enum { TEXT_BYTES = 512 };
 
 static void draft_report(const MeshDraft *draft, bool is_error, const char *text)
 {
@@ -26,26 +25,33 @@ static void draft_report(const MeshDraft *draft, bool is_error, const char *text
 
 bool draft_refuse(MeshDraft *draft, const char *format, ...)
 {
-    char text[TEXT_BYTES];
+    char *text;
     ARGUMENTS_FORMAT(text, format);
     draft_report(draft, true, text);
+    free(text);
     return false;
 }
 
 void draft_warn(MeshDraft *draft, const char *format, ...)
 {
-    char text[TEXT_BYTES];
+    char *text;
     ARGUMENTS_FORMAT(text, format);
     draft_report(draft, false, text);
+    free(text);
 }
 
 bool draft_fails(MeshDraft *draft, size_t offset, const char *format, ...)
 {
-    char text[TEXT_BYTES];
+    char *text;
     ARGUMENTS_FORMAT(text, format);
-    if (draft->places == DRAFT_NO_PLACES) return draft_refuse(draft, "%s", text);
-    if (draft->places == DRAFT_BYTES) return draft_refuse(draft, "byte %zu: %s", offset, text);
-    return report_error(&draft->report, offset, "%s", text);
+    if (draft->places == DRAFT_NO_PLACES)
+        draft_refuse(draft, "%s", text);
+    else if (draft->places == DRAFT_BYTES)
+        draft_refuse(draft, "byte %zu: %s", offset, text);
+    else
+        report_error(&draft->report, offset, "%s", text);
+    free(text);
+    return false;
 }
 
 size_t draft_part_count(const MeshDraft *draft, DraftPart part)

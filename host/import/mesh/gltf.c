@@ -2,6 +2,7 @@
 #include "host/import/mesh/gltf.h"
 #include "host/base/array.h"
 #include "host/base/memory.h"
+#include "host/base/text.h"
 #include "host/import/number.h"
 
 #include <stdlib.h>
@@ -41,18 +42,22 @@ static const char *const extensions_read[] = {
 
 bool gltf_fails(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
-    char text[256];
+    char *text;
     ARGUMENTS_FORMAT(text, format);
-    if (!gltf->is_optional) return draft_refuse(gltf->draft, "%s: %s", item->path, text);
-    draft_warn(gltf->draft, "%s: %s: not used", item->path, text);
+    if (gltf->is_optional)
+        draft_warn(gltf->draft, "%s: %s: not used", item->path, text);
+    else
+        draft_refuse(gltf->draft, "%s: %s", item->path, text);
+    free(text);
     return false;
 }
 
 void gltf_warn(Gltf *gltf, const GltfItem *item, const char *format, ...)
 {
-    char text[256];
+    char *text;
     ARGUMENTS_FORMAT(text, format);
     draft_warn(gltf->draft, "%s: %s", item->path, text);
+    free(text);
 }
 
 void gltf_lose(Gltf *gltf, GltfLoss loss, const GltfItem *item)
