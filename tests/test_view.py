@@ -210,6 +210,14 @@ class View(TestCase):
         write("scene.cfg", "")
         self.refuses("view scene.cfg --write-camera", "not in YAML")
 
+    def test_standard_input(self):
+        """A file that is named like standard input is not read instead of it."""
+        write("-", "not a scene")
+        with open("scene.yaml", encoding="utf-8") as scene:
+            window = Window(self, "-", stdin=scene)
+        window.shows_at_last(self.image_of(SCENE))
+        window.close()
+
     def test_changes_during_a_write(self):
         """Changes that others write just before or while the camera is written are read."""
         window = Window(self, options="--write-camera", LD_PRELOAD=self.failing_calls())

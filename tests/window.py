@@ -95,7 +95,7 @@ def png_rows(path):
 class Window:
     """A running glint view, whose lines of output are read as they come."""
 
-    def __init__(self, test, scene="scene.yaml", options="", waits=True, **environment):
+    def __init__(self, test, scene="scene.yaml", options="", waits=True, stdin=subprocess.DEVNULL, **environment):
         self.test, self.lines = test, queue.Queue()
         command = [PROGRAM, "view", scene, "--size", f"{WIDTH}x{HEIGHT}", "--samples", str(SAMPLES), *options.split()]
         # the libraries that SDL loads and unloads leak
@@ -103,7 +103,7 @@ class Window:
         variables = os.environ | {
             "SDL_RENDER_DRIVER": "software", "SDL_VIDEODRIVER": "x11", "ASAN_OPTIONS": sanitizer, **environment}
         self.process = subprocess.Popen(
-            command, env=variables, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            command, env=variables, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         self.reader = threading.Thread(target=self.read, daemon=True)
         self.reader.start()
         test.addCleanup(self.kill)

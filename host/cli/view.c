@@ -77,12 +77,12 @@ static int window_show(ViewOptions *options, const Device *device)
         .frames = {.device = device,
                    .scene_path = options->scene,
                    .scene_options = scene_options_of(&options->common),
+                   .writes_camera = options->writes_camera,
                    .settings =
                        settings_whole(&options->common, options->common.size[0], options->common.size[1]),
                    .save = image_save,
                    .save_context = options},
         .size = {options->common.size[0], options->common.size[1]},
-        .writes_camera = options->writes_camera,
         .stop = is_interrupted,
     };
     window.frames.settings.sample_count = options->sample_count;

@@ -219,7 +219,8 @@ void scene_publish(FrameLoop *loop)
     const Camera *camera = &loop->scene.camera;
     ImageSize size = {0};
     scene_choose_image_size(&loop->scene, &size.width, &size.height);
-    const bool can_reread = !file_obstacle(loop->options.scene_path);
+    const char *path = loop->options.scene_path;
+    const bool can_reread = strcmp(path, "-") != 0 && !file_obstacle(path);
     if (loop->current.follows_scene) loop->current.camera = *camera;
     SharedState *shared = shared_lock(loop);
     SceneUpdate *update = &shared->update;
@@ -334,17 +335,28 @@ bool frame_loop_acquire_scene(FrameLoop *loop, SceneUpdate *update)
     return is_new;
 }
 
-void written_exchange(FrameLoop *loop, const Text *old, Text *written, Camera *camera)
+static void camera_exchange(SharedState *shared, Text *text, Camera *camera)
 {
-    SharedState *shared = shared_lock(loop);
     const Text earlier_text = shared->camera_text;
     const Camera earlier_camera = shared->update.camera;
-    shared->is_written = true;
-    shared->is_stale |= !texts_equal(old, &earlier_text); // others wrote the file
-    shared->camera_text = *written;
+    shared->camera_text = *text;
     shared->update.camera = *camera;
-    *written = earlier_text;
+    *text = earlier_text;
     *camera = earlier_camera;
+}
+
+void written_store(FrameLoop *loop, const Text *old, Text *written, Camera *camera)
+{
+    SharedState *shared = shared_lock(loop);
+    shared->is_written = true;
+    shared->is_stale |= !texts_equal(old, &shared->camera_text); // others wrote the file
+    camera_exchange(shared, written, camera);
+    shared_unlock(loop);
+}
+
+void written_restore(FrameLoop *loop, Text *written, Camera *camera)
+{
+    camera_exchange(shared_lock(loop), written, camera);
     shared_unlock(loop);
 }
 

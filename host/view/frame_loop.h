@@ -21,6 +21,7 @@ typedef struct {
     const Device *device;
     const char *scene_path;
     SceneOptions scene_options;
+    bool writes_camera;      // whether frame_loop_write_camera may be called; the camera's file is YAML
     RenderSettings settings; // of everything but the size
     // Called on the loop's thread when there is something to acquire.
     void (*notify)(void *context);

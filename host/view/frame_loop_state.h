@@ -121,7 +121,9 @@ void refusal_publish(FrameLoop *loop);
 void reading_begin(FrameLoop *loop, Text camera_text);
 // Exchanges the text that is being written into the camera's file, and the camera that it has, for the shared
 // ones. `old` is the text that it is derived from.
-void written_exchange(FrameLoop *loop, const Text *old, Text *written, Camera *camera);
+void written_store(FrameLoop *loop, const Text *old, Text *written, Camera *camera);
+// Exchanges them back, because the write failed.
+void written_restore(FrameLoop *loop, Text *written, Camera *camera);
 // Returns whether the window's write of this text into the camera's file is all that changed in the scene's
 // files since they were read.
 bool written_matches(FrameLoop *loop, const Text *camera_text);

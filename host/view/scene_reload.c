@@ -41,14 +41,14 @@ static bool renderer_renew(FrameLoop *loop, const Scene *scene, MessageList *mes
     return true;
 }
 
-// Returns the text of the camera's file, empty if the window cannot write it or if it cannot be read. The
+// Returns the text of the camera's file, empty if the window does not write it or if it cannot be read. The
 // caller frees it.
 static Text camera_text_read(const FrameLoop *loop)
 {
     Text text = {0};
     MessageList ignored = {0};
     const char *path = camera_path(&loop->options);
-    if (scene_is_yaml(path) && !file_obstacle(path)) text_read_file(&text, path, &ignored);
+    if (loop->options.writes_camera && !file_obstacle(path)) text_read_file(&text, path, &ignored);
     message_list_free(&ignored);
     return text;
 }
@@ -108,9 +108,9 @@ bool frame_loop_write_camera(FrameLoop *loop, const Camera *camera, const uint32
     if (done) {
         // before the change is visible, so that the loop recognizes it as the window's
         Camera file_camera = *camera;
-        written_exchange(loop, &old, &text, &file_camera);
+        written_store(loop, &old, &text, &file_camera);
         done = output_commit(&output, messages);
-        if (!done) written_exchange(loop, &old, &text, &file_camera);
+        if (!done) written_restore(loop, &text, &file_camera);
     } else if (is_open) {
         output_abandon(&output);
     }

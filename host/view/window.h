@@ -6,7 +6,6 @@
 typedef struct {
     FrameLoopOptions frames; // all but notify
     ImageSize size;          // of the window, reduced to fit the display; 0: the scene's own
-    bool writes_camera;      // writes it to the scene's file, not only to standard output
     bool (*stop)(void);      // returns true to end it, at an interrupt
 } WindowOptions;
 

@@ -43,12 +43,12 @@ static void camera_print(Window *window)
     fputs(text_c(&yaml), stdout);
     fflush(stdout);
     message_show(window, yaml.items);
-    if (window->options->writes_camera) camera_write(window, NULL);
+    if (window->options->frames.writes_camera) camera_write(window, NULL);
 }
 
 static void key_ask(Window *window)
 {
-    if (!window->options->writes_camera)
+    if (!window->options->frames.writes_camera)
         message_show(window,
                      memory_copy_text("K writes to the scene's file; start glint view with --write-camera"));
     else if (!has_time_line(window))
