@@ -604,8 +604,7 @@ TEST(test_pixels_are_limited)
     image_free(&image);
     file_write_bytes("large.ppm", "P6 3 2 255 123456789abcdefghi", 29);
     assert_false(image_read(&image, "large.ppm", &options, &messages));
-    check_only_message(&messages,
-                       "cannot read 'large.ppm': 3 x 2 pixels are more than max-pixels, which is 5");
+    check_only_message(&messages, "cannot read 'large.ppm': the image has 3 x 2 pixels; max-pixels allows 5");
     image = image_read_file("large.ppm");
     image_free(&image);
     unlink("small.ppm");

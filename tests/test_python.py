@@ -589,7 +589,7 @@ class Errors(unittest.TestCase):
             path.write_text(json.dumps({**SPHERE, "objects": [{"sphere": {"center": [0, 0, 0], "radius": 1, "material": {"image": "image.ppm"}}}]}))
             for make in lambda most: glint.load(path, max_pixels=most), lambda most: glint.Scene(path.read_text(), name=str(path), max_pixels=most):
                 self.assertEqual([make(most).object_count for most in (0, 6)], [1, 1])
-                with self.assertRaisesRegex(glint.SceneError, rf"scene.yaml:1:\d+: error: cannot read '{image}': 3 x 2 pixels are more than max-pixels, which is 5"):
+                with self.assertRaisesRegex(glint.SceneError, rf"scene.yaml:1:\d+: error: cannot read '{image}': the image has 3 x 2 pixels; max-pixels allows 5"):
                     make(5)
 
     def test_later_structs(self):

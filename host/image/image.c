@@ -178,7 +178,7 @@ bool image_allocate(Image *image, const ImageFile *file, uint64_t width, uint64_
         return image_refuse(file, "the file is too short for its image");
     const uint32_t max_pixels = file->options.max_pixels ? file->options.max_pixels : IMAGE_PIXELS_MAX;
     if (width * height > max_pixels)
-        return image_refuse(file, "%ju x %ju pixels are more than max-pixels, which is %u", (uintmax_t)width,
+        return image_refuse(file, "the image has %ju x %ju pixels; max-pixels allows %u", (uintmax_t)width,
                             (uintmax_t)height, max_pixels);
     size_t count;
     if (__builtin_add_overflow(values, 0, &count) || !(image->values = calloc(count, sizeof *image->values)))
