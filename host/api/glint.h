@@ -9,10 +9,10 @@
 // can add members. Members beyond the caller's size are read as 0. Pointers must not be NULL unless a comment
 // permits it.
 //
-// Handles are independent of each other. A device serves one call at a time, and calls from other threads
-// wait. Calls only read a scene, so several threads may use it at once. Listing devices sets the environment
-// variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If memory runs out, the process prints a message
-// to stderr and exits.
+// A scene does not depend on a device; a tracer needs its device. A device serves one call at a time, and
+// calls from other threads wait. Calls only read a scene, so several threads may use it at once. Listing
+// devices sets the environment variable POCL_WORK_GROUP_SPECIALIZATION unless it is set. If memory runs out,
+// the process prints a message to stderr and exits.
 #ifndef GLINT_H
 #define GLINT_H
 

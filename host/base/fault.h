@@ -27,7 +27,6 @@ enum { CRASH_TEXT_SIZE = 160 };
 void fault_record_crashes(char text[CRASH_TEXT_SIZE]);
 // Declares all output complete. A later fault or crash prints a warning and the process exits with `status`.
 void fault_output_is_complete(int status);
-// Returns " (limited to …)" if the process had little address space or few threads at the first call,
-// otherwise
-// "".
+// Returns " (limited to …)" if the process had little address space or few threads at the first call, and
+// otherwise "".
 const char *fault_limits(void);

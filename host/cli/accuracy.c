@@ -268,7 +268,7 @@ static bool has_reference(Accuracy *accuracy)
         &accuracy->messages,
         "neither the device \"%s\" nor another one has 64-bit floating point for a reference: "
         "name a file with --reference%s",
-        // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): what open_run opened has a device
+        // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): device_open has set it
         accuracy->open.compute.device->name, device_fp64_hint(accuracy->open.compute.device));
 }
 

@@ -27,7 +27,7 @@ typedef struct {
     uint32_t work_group[2];               // 0 if not given
     const char *kernel_folder;            // NULL if not given
     const char *capture_folder;           // NULL if not given
-    uint32_t max_pixels;                  // see max_pixels_option
+    uint32_t max_pixels;                  // of each image that is read, 0 for the default
     OptionTexts overrides;                // --set, in order
     const char *camera;                   // the scene of --camera, NULL if not given
     double frame;                         // of an animated scene

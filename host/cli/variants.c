@@ -1,10 +1,10 @@
 #include "host/cli/variants.h"
-#include "host/cli/interrupts.h"
 
 #include "host/base/clock.h"
 #include "host/base/hash.h"
 #include "host/base/memory.h"
 #include "host/base/text.h"
+#include "host/cli/interrupts.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -33,7 +33,7 @@ static const ResultTable verify_table = {
 
 typedef struct {
     CommonOptions common;
-    bool quick, lean;      // see VerifySettings
+    bool quick, lean;      // the members of VerifySettings
     CommandOperands names; // of the cases, all if none is named
 } VerifyOptions;
 

@@ -13,7 +13,7 @@ typedef struct {
     size_t override_count;
     const char *override_name; // names their source in messages
     double frame;              // of an animated YAML scene
-    uint32_t max_pixels;       // of each image, see ImageReadOptions
+    uint32_t max_pixels;       // of each image; 0 for the default
     const char *camera;        // the path of another scene, whose camera replaces the scene's; NULL: none
     // Called with each mesh, image and scene that the file names, before it is read; NULL: not wanted.
     void (*file_named)(void *context, const char *path);

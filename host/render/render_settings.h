@@ -33,7 +33,7 @@ typedef struct {
 
     // The kernels.
     Precision precision;
-    uint32_t lanes; // rays per work-item: 1, 4, 8 or 16, or 0: see device_lanes
+    uint32_t lanes; // rays per work-item: 1, 4, 8 or 16, or 0 for the choice of device_lanes
     bool counting;  // counts the image's rays, not those of AOVs, by type in a slower build
     bool no_cache;
 

@@ -131,9 +131,8 @@ uint32_t draft_add_texture(MeshDraft *draft, const char *path, TextureContent co
 uint32_t draft_add_embedded_texture(MeshDraft *draft, const Source *bytes, TextureContent content,
                                     const char *owner);
 
-// Ends the face, which consists of the corners since the last face. Skips points and lines, and
-// warns of them once. Returns false if
-// there are too many corners.
+// Ends the face, which consists of the corners since the last face. Skips points and lines, and warns of them
+// once. Returns false if there are too many corners.
 bool draft_end_face(MeshDraft *draft, size_t offset);
 
 // Checks the draft. Returns false with an error if a face has corners that are missing or not numbers, or if

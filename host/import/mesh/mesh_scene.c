@@ -68,7 +68,8 @@ static bool light_is_sound(const Light *light)
            (light->type != LIGHT_SPOT || has_cone);
 }
 
-// Clears fading factors that are all zero, negative or out of range. Returns false in the latter two cases.
+// Clears fading factors that are invalid or of a directional light, and folds a constant divisor into the
+// color. Returns false if those of a light that has a position are invalid.
 static bool fading_check(Light *light)
 {
     const Vector3 fading = {light->fading[0], light->fading[1], light->fading[2]};
