@@ -50,14 +50,17 @@ static RatioInterval median_interval(const Series *values, double error)
     return interval;
 }
 
-static Comparison comparison_classify(double log_ratio, RatioInterval interval, double tolerance)
+// The verdict is slower or faster if the whole interval lies beyond `threshold`, a factor from 1, or its
+// inverse.
+static Comparison comparison_classify(double log_ratio, RatioInterval interval, double tolerance,
+                                      double threshold)
 {
     Comparison comparison = {.ratio = exp(log_ratio), .low = exp(interval.low), .high = exp(interval.high)};
     if (comparison.low >= 1 / tolerance && comparison.high <= tolerance)
         comparison.verdict = VERDICT_SAME;
-    else if (comparison.low > 1)
+    else if (comparison.low > threshold)
         comparison.verdict = VERDICT_SLOWER;
-    else if (comparison.high < 1)
+    else if (comparison.high < 1 / threshold)
         comparison.verdict = VERDICT_FASTER;
     return comparison;
 }
@@ -85,7 +88,7 @@ Comparison comparison_of_pairs(Comparison earlier, const Series *log_ratios, siz
 {
     if (earlier.verdict != VERDICT_UNDECIDED) return earlier;
     return comparison_classify(series_summarize(log_ratios).median,
-                               median_interval(log_ratios, look_error(look, row_count)), tolerance);
+                               median_interval(log_ratios, look_error(look, row_count)), tolerance, 1);
 }
 
 double comparison_log_ratio(const Series *new_seconds, const Series *old_seconds)
@@ -127,7 +130,7 @@ Comparison comparison_of_rounds(const Series *new_seconds, const Series *old_sec
     const RatioInterval interval = interval_widen(median_interval(&blocks, row_error(comparison_count)));
     const double log_ratio = series_summarize(&blocks).median;
     series_free(&blocks);
-    return comparison_classify(log_ratio, interval, tolerance);
+    return comparison_classify(log_ratio, interval, tolerance, 1);
 }
 
 Comparison comparison_of_ends(const Series *seconds, size_t row_count, double tolerance)
@@ -145,11 +148,7 @@ Comparison comparison_of_ends(const Series *seconds, size_t row_count, double to
         series_free(&blocks);
     }
     const double low = intervals[1].low - intervals[0].high, high = intervals[1].high - intervals[0].low;
-    Comparison comparison =
-        comparison_classify(medians[1] - medians[0], (RatioInterval){low, high}, tolerance);
-    const bool is_beyond = comparison.low > tolerance || comparison.high < 1 / tolerance;
-    if (!is_beyond && comparison.verdict != VERDICT_SAME) comparison.verdict = VERDICT_UNDECIDED;
-    return comparison;
+    return comparison_classify(medians[1] - medians[0], (RatioInterval){low, high}, tolerance, tolerance);
 }
 
 // Returns an interval of the median, unbounded for fewer blocks than REPORT_BLOCKS, since runs of one report
@@ -178,7 +177,7 @@ Comparison comparison_of_reports(ReportTimes new_times, ReportTimes old_times, s
         series_free(&new_blocks);
         series_free(&old_blocks);
     }
-    return comparison_classify(log_ratio, interval_widen(covering), tolerance);
+    return comparison_classify(log_ratio, interval_widen(covering), tolerance, 1);
 }
 
 Verdict verdict_of_row(Verdict frame, Verdict processor)
