@@ -174,19 +174,28 @@ static RowOutcome row_outcome(const ReportRow *row, const ResultTable *table)
     return outcome;
 }
 
-// The replacements of characters that a format reserves, each after its character. That of a newline holds
-// for all control characters.
-static const char *const xml_escapes[] = {"&&amp;", "<&lt;", ">&gt;", "\"&quot;", "\n ", NULL};
-static const char *const markdown_escapes[] = {"|\\|", "\\\\\\", "<&lt;", "\n ", NULL};
-static const char *const csv_escapes[] = {"\"\"\"", NULL};
+// A character that a format reserves, and its replacement. A newline stands for all control characters, and
+// '\0' ends a table.
+typedef struct {
+    char character;
+    const char *replacement;
+} Escape;
 
-static void escaped_append(Text *text, const char *from, const char *const *escapes)
+static const Escape xml_escapes[] = {{'&', "&amp;"},  {'<', "&lt;"}, {'>', "&gt;"},
+                                     {'"', "&quot;"}, {'\n', " "},   {'\0', NULL}};
+static const Escape markdown_escapes[] = {
+    {'|', "\\|"}, {'\\', "\\\\"}, {'<', "&lt;"}, {'\n', " "}, {'\0', NULL}};
+static const Escape csv_escapes[] = {{'"', "\"\""}, {'\0', NULL}};
+
+static void escaped_append(Text *text, const char *from, const Escape *escapes)
 {
     for (; *from; from++) {
-        const char *const *escape = escapes;
-        while (*escape && **escape != ((unsigned char)*from < ' ' ? '\n' : *from))
+        const char character = (unsigned char)*from < ' ' ? '\n' : *from;
+        const Escape *escape = escapes;
+        while (escape->character && escape->character != character)
             escape++;
-        text_append(text, *escape ? *escape + 1 : from, *escape ? strlen(*escape + 1) : 1);
+        const char *written = escape->character ? escape->replacement : from;
+        text_append(text, written, escape->character ? strlen(written) : 1);
     }
 }
 
