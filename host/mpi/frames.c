@@ -270,7 +270,7 @@ void frames_work(size_t local_rank, int argument_count, char **arguments)
     if (files_are_shared(command, (Call){argument_count, arguments}, false)) {
         bool has_ended = false;
         status = EXIT_DONE;
-        interrupts_set_source(end_received, &has_ended);
+        interrupts_set_source(end_poll, &has_ended);
         for (size_t frame;; status = frame_render(command, frame)) {
             send_bytes(&status, sizeof status, 0, TAG_FRAME_DONE);
             receive_bytes(&frame, sizeof frame, 0, TAG_FRAME);

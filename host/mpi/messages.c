@@ -71,18 +71,18 @@ void receive_bytes(void *bytes, size_t size, int rank, int tag)
     }
 }
 
-bool end_received(void *received)
+bool end_poll(void *has_ended)
 {
-    bool *is_received = received;
+    bool *ended = has_ended;
     MPI_Status status;
-    if (!*is_received && has_message(0, TAG_END, &status)) end_await(is_received);
-    return *is_received;
+    if (!*ended && has_message(0, TAG_END, &status)) end_await(ended);
+    return *ended;
 }
 
-void end_await(bool *received)
+void end_await(bool *has_ended)
 {
-    if (!*received) receive_bytes(NULL, 0, 0, TAG_END);
-    *received = true;
+    if (!*has_ended) receive_bytes(NULL, 0, 0, TAG_END);
+    *has_ended = true;
 }
 
 // The members of a CompiledScene that are read by renderers that do not move. The items of the arrays follow.

@@ -102,11 +102,11 @@ void broadcast(void *bytes, size_t size, MPI_Comm ranks);
 void send_bytes(const void *bytes, size_t size, int rank, int tag);
 void receive_bytes(void *bytes, size_t size, int rank, int tag);
 bool has_message(int rank, int tag, MPI_Status *status);
-// Returns whether TAG_END was received, which may be now. `received` is a bool that keeps this and is false
-// when a job begins.
-bool end_received(void *received);
+// Receives TAG_END if it has arrived, and returns whether it has been received in this job. `has_ended`
+// points to a bool that the caller sets to false when the job begins.
+bool end_poll(void *has_ended);
 // Waits for TAG_END unless it was received.
-void end_await(bool *received);
+void end_await(bool *has_ended);
 
 // Sends a compiled scene from the first rank to those with `takes`, which allocate its arrays. All ranks
 // call it. A rank that does not take the scene leaves `compiled` unchanged.

@@ -9,9 +9,9 @@
 #include <stdlib.h>
 #include <unistd.h>
 
-static BandRows rows_acquire(void *ended, uint32_t rows_max, uint32_t step)
+static BandRows rows_acquire(void *has_ended, uint32_t rows_max, uint32_t step)
 {
-    (void)ended;
+    (void)has_ended;
     const Request request = {rows_max, step};
     BandRows rows;
     send_bytes(&request, sizeof request, 0, TAG_REQUEST);
@@ -19,13 +19,13 @@ static BandRows rows_acquire(void *ended, uint32_t rows_max, uint32_t step)
     return rows;
 }
 
-static bool band_send(void *ended, const Film *band)
+static bool band_send(void *has_ended, const Film *band)
 {
     const FilmHeader header = film_header(band);
     send_bytes(&header, sizeof header, 0, TAG_BAND);
     for (Layer layer = 0; layer < LAYER_COUNT; layer++)
         if (band->layers[layer]) send_bytes(band->layers[layer], film_layer_size(band, layer), 0, TAG_LAYERS);
-    return !end_received(ended);
+    return !end_poll(has_ended);
 }
 
 // The state of this rank's renderer.
@@ -101,7 +101,7 @@ static void worker_render(RankRenderer *worker, unsigned aovs)
     char failure[sizeof worker->own.failure] = "";
     bool has_ended = false;
     const BandQueue queue = {
-        .acquire = rows_acquire, .deliver = band_send, .has_ended = end_received, .context = &has_ended};
+        .acquire = rows_acquire, .deliver = band_send, .has_ended = end_poll, .context = &has_ended};
     const Compute *compute = &worker->device.compute;
     if (worker->renderer) renderer_work(worker->renderer, aovs, &queue);
     if (worker->messages.count > 0) {
