@@ -121,6 +121,10 @@ TEST(test_text_quantities)
         assert_string_equal(text_size(cases[i].value).text, cases[i].size);
         assert_string_equal(text_duration(cases[i].value).text, cases[i].duration);
     }
+    assert_string_equal(text_number(50, 1).text, "5e+01");
+    assert_string_equal(text_number(50, 6).text, "50");
+    assert_string_equal(text_number(1. / 3, 1).text, "0.3333333333333333");
+    assert_string_equal(text_number(-0x1p-1074, 1).text, "-5e-324");
     assert_string_equal(text_plural(0), "s");
     assert_string_equal(text_plural(1), "");
 }

@@ -81,7 +81,7 @@ typedef struct {
     const char *out_of_line_prelude;
     const char *kernel;  // the build fails if it cannot be created; NULL: none is created
     const char *options; // compiler flags only
-    const char *launch;  // kernel and work-group size, such as "render 8x1"; may be NULL; see program_store
+    const char *launch;  // kernel and work-group size for the cache's key, such as "render 8x1"; or NULL
     bool no_cache;
 } ProgramRequest;
 
