@@ -374,8 +374,8 @@ class Test(TestCase):
             gltf.place(scale=[0, 0, 0], translation=[0, 0, 1], extensions={"KHR_lights_punctual": {"light": light}})
         report = self.checked(
             gltf.write("a.gltf"),
-            "the camera lacks a direction or has a number out of range: one frames the mesh",
-            "lights without a direction or with a number out of range, not used: 1",
+            "the camera has no direction or a value out of range; a camera that frames the mesh is used instead",
+            "1 light has no direction or a value out of range and is ignored",
         )
         self.assertEqual(report["lights"], 1)
 

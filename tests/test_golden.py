@@ -133,7 +133,7 @@ class Golden(TestCase):
         self.refuses("golden check", r'golden\.txt:4:1: error: a second line for "s\.yaml"')
         write("golden.txt", "# nothing\n")
         self.refuses("golden check", "'golden.txt' has no lines")
-        self.refuses("golden check --size 8x6", "are for write")
+        self.refuses("golden check --size 8x6", "apply to write")
         self.refuses("golden check --file missing.txt", "missing.txt")
         self.refuses("golden", "expected write or check")
         self.refuses("golden write", "no scene given")

@@ -283,8 +283,7 @@ TEST(polygons_that_cannot_be_filled_are_reported)
     assert_string_equal(
         text_c(&got),
         "4:18: warning: a.obj: triangles without area, which are never hit: 2\n"
-        "4:18: warning: a.obj: polygons that cross themselves or are far from flat, filled as far "
-        "as they can be: 1\n");
+        "4:18: warning: a.obj: 1 polygon intersects itself or is far from planar; only parts are filled\n");
     text_free(&got);
 }
 

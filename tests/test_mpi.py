@@ -289,7 +289,7 @@ class Mpi(TestCase):
         self.faults_build()
         for fault in FAULTY:
             with self.subTest(fault=fault):
-                self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: it sent data that is not a band")
+                self.assertRegex(self.mpirun_faulty(SLOW, fault | {"FAULT_USEC": 0}), "warning: rank 1 on .*: sent an unexpected message")
 
     def start(self, command, patience=1):
         """Starts a job with a checkpoint, whose ranks write their errors to `errors`, since an interrupted mpirun of Open MPI 5

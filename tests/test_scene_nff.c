@@ -138,9 +138,9 @@ TEST(test_tolerated)
     assert_messages("s.nff", LIT SPHERE SPHERE,
                     "7:1: warning: no material precedes this object; it is white\n");
     assert_messages("s.nff", LIT MATERIAL "p 3\n0 0 0\n1 1 1\n2 2 2\n" SPHERE,
-                    "8:1: warning: a polygon without area is never hit\n");
+                    "8:1: warning: a degenerate polygon is never hit\n");
     assert_messages("s.nff", LIT MATERIAL "p 4\n0 0 0\n4 4 0\n4 0 0\n0 3 0\n",
-                    "8:1: warning: the polygon crosses itself: filled as far as it can be\n");
+                    "8:1: warning: the polygon intersects itself; only parts are filled\n");
     assert_messages("s.nff", LIT, "warning: s.nff: no objects\n");
     assert_messages("s.nff", VIEW MATERIAL SPHERE, "warning: s.nff: no lights\n");
 }

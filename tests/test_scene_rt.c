@@ -136,7 +136,7 @@ TEST(test_axes_are_made_unit)
 TEST(test_zero_camera_direction)
 {
     assert_messages("s.rt", "C -50,0,20 0,0,0 70\nL 0,9,0 1\n" SPHERE,
-                    "1:12: warning: 'direction' is zero: looks along +z\n");
+                    "1:12: warning: 'direction' is zero; the camera looks along +z\n");
     Scene scene = scene_of_text("s.rt", "C 0,0,0 0,0,0 70\n");
     assert_vector(scene.camera.look_at, 0, 0, 1);
     scene_free(&scene);

@@ -83,7 +83,7 @@ TEST(binary_is_read)
     bytes[WHOLE - 1] = 1;
     file_write_bytes("a.stl", bytes, WHOLE + 3);
     assert_square("4:18: warning: a.stl: attributes of facets, such as colors, are not used\n"
-                  "4:18: warning: a.stl: 3 bytes behind the last facet are not used\n");
+                  "4:18: warning: a.stl: 3 bytes after the last facet are not used\n");
 }
 
 TEST(faults_have_their_place)

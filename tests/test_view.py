@@ -255,10 +255,10 @@ class View(TestCase):
         return shim_build("calls.so", read(ROOT / "tests/shims/calls.c"), "-ldl")
 
     def test_unwatched_files(self):
-        """If the system can watch no more files, a warning states that changes are not seen."""
+        """If the system can watch no more files, a warning states that changes will not be noticed."""
         write("unwatched", "")
         window = Window(self, LD_PRELOAD=self.failing_calls())
-        window.line("^glint: warning: changes of files are not seen: Too many open files")
+        window.line("^glint: warning: changes to files will not be noticed: Too many open files")
         window.check()
         window.close()
 
@@ -266,7 +266,7 @@ class View(TestCase):
         """Folders that cannot be watched are reported once, however many files they hold."""
         write("folders", "")
         window = Window(self, LD_PRELOAD=self.failing_calls())
-        warning = "^glint: warning: changes of .* are not seen: No space left"
+        warning = "^glint: warning: changes to .* will not be noticed: No space left"
         window.line(warning)
         window.saved()
         window.close()

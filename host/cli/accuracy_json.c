@@ -103,7 +103,7 @@ static void kinds_json(Json *json, const AccuracyErrors *errors)
         json_number(json, "bias", errors->shading.bias);
         json_end(json);
     } else {
-        missing_json(json, "shading", "no pixel shows a surface in the same way");
+        missing_json(json, "shading", "no pixel agrees with the reference");
     }
     if (errors->surface_pixels > 0) {
         json_begin_object(json, "t");

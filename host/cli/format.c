@@ -60,7 +60,7 @@ const char *report_options_check(void *common)
     if (options->output && options->format == FORMAT_TEXT)
         return "--output: the file's ending gives no format; use --format";
     if (options->format == FORMAT_BENCHMARK && !options->table->times)
-        return "--format benchmark is for times, which bench and accuracy measure";
+        return "only bench and accuracy support --format benchmark";
     return NULL;
 }
 

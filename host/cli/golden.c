@@ -71,7 +71,7 @@ static const char *options_check(void *golden_options)
     uint32_t *size = options->common.size, *bounces = &options->common.bounce_count;
     const bool has_any = size[0] > 0 || options->samples > 0 || *bounces != BOUNCES_UNSET;
     if (!options->writes && has_any)
-        return "--size, --samples and --bounces are for write; check takes those of the lines";
+        return "--size, --samples and --bounces apply to write; check uses the values in the file";
     if (size[0] == 0) memcpy(size, (const uint32_t[2]){320, 180}, sizeof options->common.size);
     if (options->samples == 0) options->samples = 1;
     if (*bounces == BOUNCES_UNSET) *bounces = BOUNCES_DEFAULT;

@@ -140,7 +140,7 @@ static bool key_read(CfgReader *reader, const Block *block, BlockValues *values,
     if (read && key == NORMAL && vector_is_zero(values->normal))
         return report_error(&reader->report, offset, "'normal' must not be zero");
     if (read && key == COLOR && vector_largest(values->color) > COLOR_MAX) {
-        report_warning(&reader->report, offset, "'color' exceeds 255, and is cut to it");
+        report_warning(&reader->report, offset, "'color' exceeds 255 and is clamped");
         values->color = vector_min(values->color, vector_all(COLOR_MAX));
     }
     return read && line_end(line);

@@ -222,10 +222,10 @@ static bool read_any_polygon(NffReader *reader, bool smooth)
     if (!read_corners(reader, smooth)) return false;
     switch (polygon_triangulate(reader->corners.items, reader->corners.count, &reader->triangles)) {
     case POLYGON_WITHOUT_AREA:
-        report_warning(&reader->report, offset, "a polygon without area is never hit");
+        report_warning(&reader->report, offset, "a degenerate polygon is never hit");
         break;
     case POLYGON_CROSSED:
-        report_warning(&reader->report, offset, "the polygon crosses itself: filled as far as it can be");
+        report_warning(&reader->report, offset, "the polygon intersects itself; only parts are filled");
         break;
     case POLYGON_CUT:
         break;

@@ -112,7 +112,7 @@ static bool read_camera(RtReader *reader, Camera *camera)
         !line_number(line, "fov", &range_half_turn, &fov_degrees) || !element_end(reader))
         return false;
     if (vector_is_zero(direction)) {
-        report_warning(&reader->report, offset, "'direction' is zero: looks along +z");
+        report_warning(&reader->report, offset, "'direction' is zero; the camera looks along +z");
         direction = (Vector3){0, 0, 1};
     }
     // Far from the origin a step of 1 may be lost in rounding.

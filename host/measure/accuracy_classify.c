@@ -43,7 +43,8 @@ Figure accuracy_figure(const AccuracyVariant *variant, AccuracyMeasure type)
     case ACCURACY_PATH:
         return (Figure){.value = sum_of(errors->path)};
     case ACCURACY_SHADING:
-        return (Figure){errors->shading.rmse, errors->shading_pixels > 0 ? NULL : "no pixel shows the same"};
+        return (Figure){errors->shading.rmse,
+                        errors->shading_pixels > 0 ? NULL : "no pixel agrees with the reference"};
     case ACCURACY_T:
         return (Figure){errors->t_relative.percentile_999, no_surface};
     case ACCURACY_NORMAL:

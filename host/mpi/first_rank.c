@@ -180,9 +180,8 @@ static void message_process(const Ranks *ranks, RankState *state, Scheduler *sch
     }
     const int rank = status->MPI_SOURCE;
     fprintf(stderr, "glint: warning: rank %d on %s: %s\n", rank, ranks->items[rank - 1].host,
-            state->failure[0] != '\0'
-                ? state->failure
-                : "it sent data that is not a band of its rows; the others continue without it");
+            state->failure[0] != '\0' ? state->failure
+                                      : "sent an unexpected message; the other ranks render its rows");
     state->is_dropped = true;
     state->rows = (BandRows){0}; // so that no later band is right
     film_free(&state->band);

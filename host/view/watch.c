@@ -86,7 +86,8 @@ static void watch_free(Watch *watch)
 
 static void failure_print(const char *files, const char *more, int error)
 {
-    fprintf(stderr, "glint: warning: changes of %s%s are not seen: %s\n", files, more, strerror(error));
+    fprintf(stderr, "glint: warning: changes to %s%s will not be noticed: %s\n", files, more,
+            strerror(error));
 }
 
 Watch *watch_open(void (*changed)(void *context, const char *path), void *context)

@@ -58,9 +58,8 @@ static void warn_of_triangles(MeshDraft *draft, const Mesh *mesh)
     if (degenerate_count > 0)
         draft_warn(draft, "triangles without area, which are never hit: %zu", degenerate_count);
     if (draft->crossed_count > 0)
-        draft_warn(draft,
-                   "polygons that cross themselves or are far from flat, filled as far as they can be: %zu",
-                   draft->crossed_count);
+        draft_warn(draft, "%zu polygon%s far from planar; only parts are filled", draft->crossed_count,
+                   draft->crossed_count == 1 ? " intersects itself or is" : "s intersect themselves or are");
 }
 
 // Bounds the triangles of all copies of mesh files that a scene names more than once, and so the cost of a

@@ -109,12 +109,12 @@ static void lights_add(Scene *scene, const MeshView *view, Bounds bounds, Report
     }
     if (unsound_fading_count > 0)
         report_warning(report, MESSAGE_WHOLE_FILE,
-                       "lights whose attenuation is negative or too large, which do not fade: %zu",
-                       unsound_fading_count);
+                       "%zu light%s a negative or excessive attenuation, which is ignored",
+                       unsound_fading_count, unsound_fading_count == 1 ? " has" : "s have");
     if (unsound_count > 0)
         report_warning(report, MESSAGE_WHOLE_FILE,
-                       "lights without a direction or with a number out of range, not used: %zu",
-                       unsound_count);
+                       "%zu light%s no direction or a value out of range and %s ignored", unsound_count,
+                       unsound_count == 1 ? " has" : "s have", unsound_count == 1 ? "is" : "are");
     if (sum == 0 || (sum >= darkest && sum <= brightest)) return;
     report_warning(
         report, MESSAGE_WHOLE_FILE,
@@ -140,7 +140,8 @@ static void scene_show(Scene *scene, const MeshView *view, Vector3 up, Report *r
     const bool has_camera = view->has_camera && camera_is_sound(&view->camera);
     if (view->has_camera && !has_camera)
         report_warning(report, MESSAGE_WHOLE_FILE,
-                       "the camera lacks a direction or has a number out of range: one frames the mesh");
+                       "the camera has no direction or a value out of range; "
+                       "a camera that frames the mesh is used instead");
     scene->camera = has_camera ? view->camera : camera_around(mesh, bounds_center(bounds), up);
     scene->background = vector_all(gray);
     lights_add(scene, view, bounds, report);

@@ -76,9 +76,8 @@ static void material_end(MtlReader *reader, MtlMaterial *material)
                                    ? material->dissolve.offset
                                    : material->transparency.offset;
     if (has_dissolve && has_transparency && fabs(1 - transparency - dissolve) > 1e-3)
-        report_warning(&reader->report, last_offset,
-                       "Tr %g does not fit d %g, which it subtracts from 1: d is used", transparency,
-                       dissolve);
+        report_warning(&reader->report, last_offset, "Tr %g contradicts d %g (Tr = 1 - d); d is used",
+                       transparency, dissolve);
     const double opacity = has_dissolve ? dissolve : has_transparency ? 1 - transparency : 1;
     if (opacity == 1) return;
     const TintedFactor specular = look->specular;

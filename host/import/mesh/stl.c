@@ -108,7 +108,7 @@ static bool binary_read(MeshDraft *draft)
     if (has_attributes) draft_warn(draft, "attributes of facets, such as colors, are not used");
     const size_t rest = source->length - HEADER_SIZE - count * FACET_SIZE;
     if (rest > 0)
-        draft_warn(draft, "%zu byte%s behind the last facet %s not used", rest, text_plural(rest),
+        draft_warn(draft, "%zu byte%s after the last facet %s not used", rest, text_plural(rest),
                    rest == 1 ? "is" : "are");
     return true;
 }

@@ -199,7 +199,7 @@ static void textures_check(YamlReader *reader, const Material *material, const Y
     if (size != node && material->image.texture == 0 && material->normal_map.texture == 0)
         report_error(&reader->report, size->offset, "'size' needs an 'image' or a 'normal_map'");
     if (strength != node && material->normal_map.texture == 0)
-        report_error(&reader->report, strength->offset, "'normal_strength' is that of a 'normal_map'");
+        report_error(&reader->report, strength->offset, "'normal_strength' needs a 'normal_map'");
 }
 
 static void material_append(YamlReader *reader, const YamlNode *node, const char *name)
