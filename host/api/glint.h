@@ -3,7 +3,7 @@
 // Functions that can fail return a GlintStatus. Functions with a `messages` parameter, which may be NULL, set
 // *messages to their warnings and errors, one or more lines each, or to NULL if there are none. The caller
 // frees it with glint_text_free. Messages about a scene begin with FILE:LINE:COLUMN. A device warns once if
-// its kernel cache cannot be used. The library itself prints nothing, except when memory runs out.
+// its kernel cache cannot be used. Apart from an out-of-memory message, the library prints nothing.
 //
 // Each struct begins with its size, which the caller sets to sizeof, so that later versions of the library
 // can add members. Members beyond the caller's size are read as 0. Pointers must not be NULL unless a comment

@@ -5,8 +5,8 @@
 
 #define COUNT_OF(array) (sizeof(array) / sizeof(array)[0])
 
-// A growing array, which is empty if it is zeroed. Any struct with these members is one, such as a struct
-// with an anonymous ARRAY_OF.
+// A growing array, which is empty if it is zeroed. Any struct with these members can be used as one, for
+// example a struct with an anonymous ARRAY_OF member.
 #define ARRAY_OF(Item)                                                                                       \
     struct {                                                                                                 \
         Item *items;                                                                                         \

@@ -33,7 +33,7 @@ static void exit_handler_register(void)
     if (atexit(pending_remove_all) != 0) fault("atexit failed");
 }
 
-// Gives a file its temporary, whose name it owns from then on.
+// Registers the file's temporary and takes ownership of its name.
 static void pending_add(OutputFile *output, char *temporary)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -45,7 +45,7 @@ static void pending_add(OutputFile *output, char *temporary)
     pthread_mutex_unlock(&pending_mutex);
 }
 
-// Forgets the temporary of a file, which may have none.
+// Unregisters the file's temporary, if it has one, and frees its name.
 static void pending_drop(OutputFile *output)
 {
     pthread_mutex_lock(&pending_mutex);

@@ -21,8 +21,8 @@ void stage_close(Stage *stage);
 // stage while the result is read.
 const HostSpan *stage_spans(const Stage *stage, size_t *count);
 
-// Sets the stage to `what`, such as "reading", of the file at `path`, which may be NULL, with nothing of
-// `total` done. A `total` of 0 is not counted. The first stage starts the operation.
+// Sets the stage to `what`, such as "reading", of the file at `path`, which may be NULL, with none of `total`
+// done. A `total` of 0 means that progress is not counted. The first stage starts the operation.
 void stage_begin(Stage *stage, const char *what, const char *path, size_t total);
 // Ends the operation.
 void stage_end(Stage *stage);

@@ -29,7 +29,7 @@ char *text_format_list(const char *format, va_list arguments) __attribute__((for
         formatted = text_format_list(format, arguments);                                                     \
         va_end(arguments);                                                                                   \
     } while (0)
-// Returns the locale C, whatever locale the process has set.
+// Returns the C locale, regardless of the process's locale.
 locale_t text_locale(void);
 const char *text_c(const Text *text); // never NULL
 void text_free(Text *text);           // frees and zeroes

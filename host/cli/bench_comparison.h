@@ -19,8 +19,8 @@ typedef struct {
     ReportTimes wall, processor;
 } RowTimes;
 
-// Compares a row of two reports, one of `row_count` that are compared. `is_cpu` is whether the device is one,
-// so that the process's processor time counts.
+// Compares a row of two reports, one of `row_count` that are compared. `is_cpu` tells whether the device is a
+// CPU, in which case the process's CPU time is also compared.
 RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
                           double tolerance);
 

@@ -15,8 +15,8 @@ typedef bool OptionReader(const Option *option, const char *value, void *options
 // with a message if that fails.
 typedef bool OptionEffect(const Option *option, void *options);
 
-// Checks options together. Returns what is wrong, which is printed as a usage error, "" if that was printed,
-// or NULL.
+// Checks options together. Returns the mistake, which the caller prints as a usage error, "" if it was
+// printed, or NULL if there is none.
 typedef const char *OptionCheck(void *options);
 
 struct Option {
@@ -99,7 +99,7 @@ OptionReader option_count;      // uint32_t: an integer from `low` to `high`
 OptionReader option_number;     // double, from `low` to `high`
 OptionReader option_size;       // uint32_t[2]: WxH pixels
 OptionReader option_work_group; // uint32_t[2]: WxH work-items
-OptionReader option_choice;     // an enum or uint32_t: of the name, or of the first if there is no value
+OptionReader option_choice;     // an enum or uint32_t: the named value, or the first without an argument
 OptionReader option_set;        // unsigned: one bit for each name of a comma-separated list
 
 enum { OPTION_TEXTS_MAX = 64 };

@@ -49,8 +49,8 @@ ShortText column_heading(const char *column);
 
 enum { REPORT_FORMAT, REPORT_OUTPUT, REPORT_JSON, REPORT_OPTION_COUNT };
 extern const Option report_options[REPORT_OPTION_COUNT];
-// Chooses the format by the file's ending if no other is given. It is a mistake if the ending gives none, or
-// if the format is for times and the command has none.
+// Chooses the format by the file's ending if no other is given. Returns a mistake if the ending names no
+// format, or if the format needs times and the command measures none.
 OptionCheck report_options_check;
 // The group of the options of CommonOptions.report, which must follow those of options that create folders,
 // since the file may be in one.

@@ -8,8 +8,8 @@
 
 static volatile sig_atomic_t interrupted, is_flag_read, is_held;
 
-// Two signals often arrive together, one for the process and one for its group. Only a third is a second
-// request of the user.
+// One Ctrl-C often arrives as two signals, one to the process and one to its group, so only a third signal
+// counts as a second request.
 static void interrupt_record(int signal_number)
 {
     if (!is_flag_read && !is_held) {
@@ -63,9 +63,9 @@ void interrupts_end_at_once(void)
 static bool (*other_interrupts)(void *context);
 static void *other_context;
 
-void interrupts_set_source(bool (*interrupts)(void *context), void *context)
+void interrupts_set_source(bool (*source)(void *context), void *context)
 {
-    other_interrupts = interrupts;
+    other_interrupts = source;
     other_context = context;
 }
 

@@ -12,11 +12,12 @@ void interrupts_ignore(void);
 void interrupts_flag(void);
 // Makes the signals end the process at once, until interrupts_flag is called.
 void interrupts_end_at_once(void);
-// Makes the signals set the flag until they are released, even if interrupts_end_at_once is called.
+// Makes the signals only set the flag until interrupts_release is called, even if interrupts_end_at_once is
+// called.
 void interrupts_hold(void);
 void interrupts_release(void);
-// Makes is_interrupted return true also if `interrupts` does, which may be NULL.
-void interrupts_set_source(bool (*interrupts)(void *context), void *context);
+// Makes is_interrupted also return true when `source` does. NULL removes the source.
+void interrupts_set_source(bool (*source)(void *context), void *context);
 
 bool is_interrupted(void);
 // Returns is_interrupted(). A renderer's `stop` function, which ignores its context.

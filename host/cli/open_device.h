@@ -18,7 +18,7 @@ const Device *device_find(DeviceList *devices, const char *selector);
 // Returns NULL with a message if there is none.
 const Device *device_choose_numbered(const DeviceList *devices, const char *selector, size_t number,
                                      MessageList *messages);
-// Sets what the options tell the drivers, such as --work-group and --build-options.
+// Applies the options that concern drivers, such as --work-group and --build-options.
 void devices_apply_options(DeviceList *devices, const CommonOptions *common);
 // Returns whether the device allows its work-group, and prints an error if not.
 bool work_group_is_allowed(const Device *device);

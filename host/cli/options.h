@@ -1,4 +1,4 @@
-// The options that commands share, and what follows from them: scenes, settings and messages.
+// The options that commands share, and the scenes, settings and messages derived from them.
 #pragma once
 
 #include "host/cli/format.h"

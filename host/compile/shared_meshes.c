@@ -41,7 +41,7 @@ static CompiledScene shared_mesh_compile(const CompiledScene *compiled, const Sc
     return part;
 }
 
-// Replaces an array by one that has room for more behind it.
+// Reallocates an array with room for `count` more items.
 static void array_extend(CompiledScene *compiled, FlatType type, size_t count)
 {
     FlatArray *array = &compiled->arrays[type];

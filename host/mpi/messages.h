@@ -97,8 +97,8 @@ void rest(void);
 int message_size(size_t bytes_left);
 // Broadcasts from the first of `ranks`.
 void broadcast(void *bytes, size_t size, MPI_Comm ranks);
-// Send and receive bytes in one message, even if there are none, or in several of the same tag. Receiving
-// rests until each message has arrived.
+// Send and receive bytes in one message, even if there are none, or in several of the same tag. receive_bytes
+// sleeps between polls until each message has arrived.
 void send_bytes(const void *bytes, size_t size, int rank, int tag);
 void receive_bytes(void *bytes, size_t size, int rank, int tag);
 bool has_message(int rank, int tag, MPI_Status *status);

@@ -132,7 +132,7 @@ static void job_run(RankRenderer *worker, const Job *job)
 
 void other_rank_run(int rank, size_t local_rank, int argument_count, char **arguments)
 {
-    interrupts_ignore(); // which reach all ranks: the first ends the render and the job
+    interrupts_ignore(); // signals reach every rank, but only the first rank acts on them
     RankRenderer worker = {.rank = rank, .local_rank = local_rank};
     Job job;
     while (broadcast(&job, sizeof job, MPI_COMM_WORLD), job.type != JOB_END) {

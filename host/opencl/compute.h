@@ -67,7 +67,7 @@ bool compute_check(Compute *compute, cl_int status, const char *call);
 bool compute_check_object(Compute *compute, const void *object, cl_int status, const char *call);
 void compute_fail(Compute *compute, const char *call, cl_int status, const char *detail, ...)
     __attribute__((format(printf, 4, 5)));
-// Unmaps a buffer, unless `mapped` is NULL. A failure matters only if a launch follows.
+// Unmaps a buffer, unless `mapped` is NULL. A failed unmap is reported at the next launch.
 void compute_unmap(Compute *compute, cl_mem buffer, const void *mapped);
 // Returns "CALL: STATUS (CODE) on DEVICE: detail" after a failure. The caller frees it.
 char *compute_failure_text(const Compute *compute);

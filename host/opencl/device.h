@@ -11,7 +11,8 @@
 
 // Receives the warnings about files of the kernel cache and of kernel folders, which affect no result.
 typedef struct {
-    // Called by each thread that builds programs, so perhaps by several at once. May move the messages away.
+    // Called on whichever thread builds programs, possibly on several at once. May take the messages with
+    // message_list_move.
     void (*deliver)(void *context, MessageList *warnings);
     void *context;
     atomic_bool cache_is_reported; // later warnings about the cache are dropped

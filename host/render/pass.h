@@ -36,7 +36,7 @@ void passes_receive_scene(Pass *const *passes, size_t count, CompiledScene *comp
 // device. Kernels read the earlier scene until pass_move.
 bool pass_compile(Pass *pass, const Scene *scene, const RenderSettings *settings, CompiledScene *fresh,
                   MessageList *messages);
-// Uploads the scene of pass_compile, takes ownership of it and changes the settings, those of the image.
+// Uploads the scene that pass_compile prepared, takes ownership of it, and adopts the image's settings.
 void pass_move(Pass *pass, CompiledScene *fresh, const RenderSettings *settings);
 
 // Returns the pass that re-renders this one's flagged pixels. The passes of a renderer are an array.

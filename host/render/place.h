@@ -25,5 +25,5 @@ Place list_place(const Pass *pass, uint32_t count);
 // the first step. Returns false after the last part.
 bool place_next(Place *part, const Place *whole, uint64_t pixels_max);
 uint64_t place_pixels(const Place *place);
-// Returns the number of words of a bit for each pixel of a band's work-items.
+// Returns how many 32-bit words hold one bit for each pixel of the place's work-items.
 size_t place_flag_words(const Place *place);

@@ -44,8 +44,8 @@ void renderer_close(Renderer *renderer);
 bool renderer_move(Renderer *renderer, const Scene *scene, const RenderSettings *settings,
                    MessageList *messages);
 
-// Returns scene_color_max of the renderer's scene, which must be `scene`. The renderer was opened alone, not
-// in a RendererSet of several.
+// Returns scene_color_max of the renderer's scene, which must be `scene`. The renderer must have been opened
+// alone, not as one of several in a RendererSet.
 double renderer_color_max(const Renderer *renderer, const Scene *scene);
 // Returns what all bands with the color and the AOVs of the set have in common.
 FilmHeader renderer_film_header(const Renderer *renderer, unsigned aovs);

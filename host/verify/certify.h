@@ -16,8 +16,9 @@ typedef struct {
 } CertifySample;
 
 // Computes one pixel, chosen by a hash, in each of about `count` equal parts of the image with these
-// settings, or every pixel if there are fewer. The settings' size, bounces and stop count. Uses all
-// processors. Returns false, with nothing to close, if settings->stop returned true.
+// settings, or every pixel if there are fewer. Only the settings' size, bounces, minimum contribution and
+// stop function are used. Uses all processors. Returns false, with nothing to close, if settings->stop
+// returned true.
 bool certify_sample_open(CertifySample *sample, const Scene *scene, const RenderSettings *settings,
                          size_t count);
 void certify_sample_close(CertifySample *sample);

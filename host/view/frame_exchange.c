@@ -16,8 +16,9 @@
 //  7. `ends` and `quits` are set once, in this order, and never cleared.
 //  8. Each change for which the loop may wait signals `changed`. Each one for which the window may wait calls
 //     `notify`.
-//  9. `is_stale` is set by each change of a file but the window's own, and cleared before the files are read.
-//     A change during the reading sets it again. `update.camera` is the camera of `camera_text`.
+//  9. `is_stale` is set by every change to a file except the window's own writes, and cleared before the
+//     files are read. A change during the reading sets it again. `update.camera` is the camera of
+//     `camera_text`.
 #include "host/view/frame_loop_state.h"
 
 #include "host/base/file.h"

@@ -117,7 +117,7 @@ void frame_publish(FrameLoop *loop, uint32_t samples);
 void scene_publish(FrameLoop *loop);
 // Publishes that the scene cannot be read or rendered.
 void refusal_publish(FrameLoop *loop);
-// Takes ownership of the text of the camera's file. The scene's files are about to be read.
+// Records that the scene's files are about to be read. Takes ownership of the camera file's text.
 void reading_begin(FrameLoop *loop, Text camera_text);
 // Exchanges the text that is being written into the camera's file, and the camera that it has, for the shared
 // ones. `old` is the text that it is derived from.

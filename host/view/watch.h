@@ -5,9 +5,9 @@
 
 typedef struct Watch Watch;
 
-// Calls `changed`, which must not use the watch, on a separate thread, with the path of the file as it was
-// added. The path is NULL if any file may have changed. Returns NULL and prints a warning if the system
-// cannot watch files.
+// Opens a watch that calls `changed` on a separate thread, with the path as passed to watch_add or
+// watch_only. `changed` must not call these functions. The path is NULL if any file may have changed. Returns
+// NULL and prints a warning if the system cannot watch files.
 Watch *watch_open(void (*changed)(void *context, const char *path), void *context);
 void watch_close(Watch *watch); // accepts NULL
 // watch_only watches this file alone, watch_add in addition to others. The file need not exist. Both accept
