@@ -4,26 +4,26 @@
 #include <stdlib.h>
 #include <string.h>
 
-bool struct_read(void *own, size_t own_size, const void *given, const char *type, MessageList *messages)
+bool struct_read(void *full, size_t full_size, const void *given, const char *type, MessageList *messages)
 {
     size_t size;
-    memset(own, 0, own_size);
+    memset(full, 0, full_size);
     if (!struct_has_size(given, sizeof size, type, messages)) return false;
     memcpy(&size, given, sizeof size);
-    for (size_t i = own_size; i < size; i++)
+    for (size_t i = full_size; i < size; i++)
         if (((const char *)given)[i] != 0)
             return message_error(messages, "a %s sets a member that glint %s does not know", type,
                                  glint_version());
-    memcpy(own, given, size < own_size ? size : own_size);
+    memcpy(full, given, size < full_size ? size : full_size);
     return true;
 }
 
-void struct_write(void *given, const void *own, size_t own_size)
+void struct_write(void *given, const void *full, size_t full_size)
 {
     size_t size;
     memcpy(&size, given, sizeof size);
     memset(given, 0, size);
-    memcpy(given, own, size < own_size ? size : own_size);
+    memcpy(given, full, size < full_size ? size : full_size);
     memcpy(given, &size, sizeof size);
 }
 

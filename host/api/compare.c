@@ -7,18 +7,18 @@
 #include <stdlib.h>
 
 // Copies a caller's pair, of any version of the interface. Returns false with a message if it is invalid.
-static bool pair_read(GlintImagePair *own, const GlintImagePair *given, MessageList *messages)
+static bool pair_read(GlintImagePair *read, const GlintImagePair *given, MessageList *messages)
 {
-    if (!struct_read(own, sizeof *own, given, "GlintImagePair", messages)) return false;
-    if (!real_is_known(own->real, messages)) return false;
+    if (!struct_read(read, sizeof *read, given, "GlintImagePair", messages)) return false;
+    if (!real_is_known(read->real, messages)) return false;
     const size_t row_max =
-        SIZE_MAX / sizeof(double) / (own->width ? own->width : 1) / (own->height ? own->height : 1);
-    if (own->width == 0 || own->height == 0 || own->channels == 0 || own->channels > row_max)
+        SIZE_MAX / sizeof(double) / (read->width ? read->width : 1) / (read->height ? read->height : 1);
+    if (read->width == 0 || read->height == 0 || read->channels == 0 || read->channels > row_max)
         return message_error(messages,
                              "the images have %u x %u pixels of %u channels; expected at least 1 each, and "
                              "at most the values that fit in memory",
-                             own->width, own->height, own->channels);
-    if (!own->reference || !own->image)
+                             read->width, read->height, read->channels);
+    if (!read->reference || !read->image)
         return message_error(messages, "a comparison needs a reference and an image");
     return true;
 }
@@ -79,7 +79,7 @@ GlintStatus glint_images_compare(const GlintImagePair *images, GlintImageMetrics
         free(reference.values);
         free(image.values);
     }
-    const GlintImageMetrics own = metrics_of(&found);
-    struct_write(metrics, &own, sizeof own);
+    const GlintImageMetrics full = metrics_of(&found);
+    struct_write(metrics, &full, sizeof full);
     return call_end(&list, NULL, GLINT_DONE, messages);
 }

@@ -5,17 +5,17 @@
 
 static void info_set(GlintDeviceInfo *info, const Device *device)
 {
-    GlintDeviceInfo own = {.index = device->index,
-                           .compute_units = device->compute_units,
-                           .memory_bytes = device->memory_bytes,
-                           .is_gpu = (device->type & CL_DEVICE_TYPE_GPU) != 0,
-                           .is_cpu = (device->type & CL_DEVICE_TYPE_CPU) != 0,
-                           .has_double = device->fp64,
-                           .is_usable = device_usable(device, NULL)};
-    snprintf(own.name, sizeof own.name, "%s", device->name);
-    snprintf(own.platform, sizeof own.platform, "%s", device->platform_name);
-    snprintf(own.driver, sizeof own.driver, "%s", device->driver);
-    struct_write(info, &own, sizeof own);
+    GlintDeviceInfo full = {.index = device->index,
+                            .compute_units = device->compute_units,
+                            .memory_bytes = device->memory_bytes,
+                            .is_gpu = (device->type & CL_DEVICE_TYPE_GPU) != 0,
+                            .is_cpu = (device->type & CL_DEVICE_TYPE_CPU) != 0,
+                            .has_double = device->fp64,
+                            .is_usable = device_usable(device, NULL)};
+    snprintf(full.name, sizeof full.name, "%s", device->name);
+    snprintf(full.platform, sizeof full.platform, "%s", device->platform_name);
+    snprintf(full.driver, sizeof full.driver, "%s", device->driver);
+    struct_write(info, &full, sizeof full);
 }
 
 GlintStatus glint_devices_list(GlintDeviceInfo *infos, size_t capacity, size_t *count, char **messages)

@@ -24,13 +24,14 @@ struct GlintTracer {
     Precision precision;
 };
 
-// Copies a caller's struct, which may be of another version of the interface. Returns false with a message
-// that names its type if its size is not set or if a member that this version does not know is not 0.
-bool struct_read(void *own, size_t own_size, const void *given, const char *type, MessageList *messages);
+// Copies a caller's struct, which may be of another version of the interface, to `full`, a struct of this
+// version. Returns false with a message that names its type if its size is not set or if a member that this
+// version does not know is not 0.
+bool struct_read(void *full, size_t full_size, const void *given, const char *type, MessageList *messages);
 
-// Copies a struct over the caller's, which may be of another version of the interface and keeps its size.
-// Members that this version does not know become 0.
-void struct_write(void *given, const void *own, size_t own_size);
+// Copies a struct of this version over the caller's, which may be of another version of the interface and
+// keeps its size. Members that this version does not know become 0.
+void struct_write(void *given, const void *full, size_t full_size);
 
 // Ends a call. Passes its messages to the caller, including the warnings and the failure of the device, which
 // may be NULL. Returns `status`, or the status of the failure.
@@ -67,7 +68,7 @@ static inline size_t batch_rays(const GlintTracer *tracer, size_t ray_count)
 }
 
 // Copies a caller's rays, of any version of the interface. Returns false with a message if they are invalid.
-bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages);
+bool rays_read(GlintRays *read, const GlintRays *given, MessageList *messages);
 
 // Reads `count` rays from `first` on and scales them (host/render/trace.h). Returns false with a message if
 // one is invalid.

@@ -85,15 +85,15 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
     MessageList list = {0};
     GlintRenderSettings given;
     GlintImage arrays;
-    RenderSettings own;
+    RenderSettings render_settings;
     if (!struct_read(&given, sizeof given, settings, "GlintRenderSettings", &list) ||
         !struct_read(&arrays, sizeof arrays, image, "GlintImage", &list) ||
-        !settings_read(&own, &given, &scene->scene, &list))
+        !settings_read(&render_settings, &given, &scene->scene, &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     Rendering rendering = {
         .eye = scene->scene.camera.position, .progress = given.progress, .context = given.context};
-    rendering.film = (Film){.width = own.width,
-                            .height = own.height,
+    rendering.film = (Film){.width = render_settings.width,
+                            .height = render_settings.height,
                             .light_count = (uint32_t)scene->scene.lights.count,
                             .real_size = sizeof(double)};
     const unsigned aovs = layers_set(&rendering.film, &arrays);
@@ -102,7 +102,7 @@ GlintStatus glint_render(GlintDevice *device, const GlintScene *scene, const Gli
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
     }
     pthread_mutex_lock(&device->mutex);
-    Renderer *renderer = device_renderer(device, &scene->scene, &own, &list);
+    Renderer *renderer = device_renderer(device, &scene->scene, &render_settings, &list);
     if (renderer) renderer_render(renderer, aovs, band_receive, &rendering);
     const GlintStatus status = !renderer              ? GLINT_WRONG_INPUT
                                : rendering.is_stopped ? GLINT_STOPPED

@@ -16,10 +16,10 @@ GlintStatus glint_tracer_open(GlintDevice *device, const GlintScene *scene,
     if (!struct_read(&given, sizeof given, settings, "GlintTraceSettings", &list) ||
         !precision_read(&precision, given.precision, &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
-    RenderSettings own = settings_of_image(1, 1, precision);
-    own.lanes = given.lanes;
+    RenderSettings render_settings = settings_of_image(1, 1, precision);
+    render_settings.lanes = given.lanes;
     pthread_mutex_lock(&device->mutex);
-    Renderer *renderer = device_renderer(device, &scene->scene, &own, &list);
+    Renderer *renderer = device_renderer(device, &scene->scene, &render_settings, &list);
     const GlintStatus status = call_end(&list, device, renderer ? GLINT_DONE : GLINT_WRONG_INPUT, messages);
     if (status == GLINT_DONE) {
         *tracer = memory_allocate_zeroed(1, sizeof **tracer);
@@ -168,11 +168,11 @@ static bool batches_trace(GlintTracer *tracer, const GlintRays *rays, const Trac
     return is_sound;
 }
 
-bool rays_read(GlintRays *own, const GlintRays *given, MessageList *messages)
+bool rays_read(GlintRays *read, const GlintRays *given, MessageList *messages)
 {
-    if (!struct_read(own, sizeof *own, given, "GlintRays", messages)) return false;
-    if (!real_is_known(own->real, messages)) return false;
-    if (own->count > 0 && (!own->origins || !own->directions))
+    if (!struct_read(read, sizeof *read, given, "GlintRays", messages)) return false;
+    if (!real_is_known(read->real, messages)) return false;
+    if (read->count > 0 && (!read->origins || !read->directions))
         return message_error(messages, "rays need origins and directions");
     return true;
 }
@@ -204,9 +204,10 @@ GlintStatus glint_trace_occlusion(GlintTracer *tracer, const GlintRays *rays, Gl
 {
     MessageList list = {0};
     GlintRays given;
-    GlintOcclusion own;
-    if (!rays_read(&given, rays, &list) || !struct_read(&own, sizeof own, occlusion, "GlintOcclusion", &list))
+    GlintOcclusion output;
+    if (!rays_read(&given, rays, &list) ||
+        !struct_read(&output, sizeof output, occlusion, "GlintOcclusion", &list))
         return call_end(&list, NULL, GLINT_WRONG_INPUT, messages);
-    const TraceArrays arrays = {.hits.certainty = own.certainty, .occluded = own.occluded};
+    const TraceArrays arrays = {.hits.certainty = output.certainty, .occluded = output.occluded};
     return call_trace(tracer, &given, &arrays, &list, messages);
 }

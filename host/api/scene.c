@@ -20,20 +20,20 @@ static GlintStatus scene_return(GlintScene **scene, Scene *read, bool is_read, M
 
 static bool options_read(SceneOptions *options, const GlintSceneOptions *given, MessageList *messages)
 {
-    GlintSceneOptions own = {0};
+    GlintSceneOptions read = {0};
     *options = (SceneOptions){.mesh_program = "glint"};
-    if (given && !struct_read(&own, sizeof own, given, "GlintSceneOptions", messages)) return false;
-    if (own.override_count > 0 && !own.overrides)
+    if (given && !struct_read(&read, sizeof read, given, "GlintSceneOptions", messages)) return false;
+    if (read.override_count > 0 && !read.overrides)
         return message_error(messages, "override_count is not 0, but overrides is NULL");
-    for (size_t i = 0; i < own.override_count; i++)
-        if (!own.overrides[i]) return message_error(messages, "overrides[%zu] is NULL", i);
-    if (!isfinite(own.frame)) return message_error(messages, "the frame is not finite");
-    options->overrides = own.overrides;
+    for (size_t i = 0; i < read.override_count; i++)
+        if (!read.overrides[i]) return message_error(messages, "overrides[%zu] is NULL", i);
+    if (!isfinite(read.frame)) return message_error(messages, "the frame is not finite");
+    options->overrides = read.overrides;
     options->override_name = "overrides";
-    options->override_count = own.override_count;
-    options->frame = own.frame;
-    options->camera = own.camera;
-    options->max_pixels = own.max_pixels;
+    options->override_count = read.override_count;
+    options->frame = read.frame;
+    options->camera = read.camera;
+    options->max_pixels = read.max_pixels;
     return true;
 }
 
@@ -42,8 +42,9 @@ GlintStatus glint_scene_load(const char *path, const GlintSceneOptions *options,
 {
     MessageList list = {0};
     Scene read = {0};
-    SceneOptions own;
-    const bool is_read = options_read(&own, options, &list) && scene_load(&read, path, &own, &list);
+    SceneOptions scene_options;
+    const bool is_read =
+        options_read(&scene_options, options, &list) && scene_load(&read, path, &scene_options, &list);
     return scene_return(scene, &read, is_read, &list, messages);
 }
 
@@ -52,12 +53,12 @@ GlintStatus glint_scene_parse(const char *text, size_t length, const char *name,
 {
     MessageList list = {0};
     Scene read = {0};
-    SceneOptions own;
+    SceneOptions scene_options;
     const Source source = {.file = name, .bytes = text, .length = length};
-    bool is_read = options_read(&own, options, &list);
-    if (is_read && own.camera)
+    bool is_read = options_read(&scene_options, options, &list);
+    if (is_read && scene_options.camera)
         is_read = message_error(&list, "only glint_scene_load takes the camera of another scene");
-    is_read = is_read && scene_read_yaml(&read, &source, &own, &list);
+    is_read = is_read && scene_read_yaml(&read, &source, &scene_options, &list);
     return scene_return(scene, &read, is_read, &list, messages);
 }
 
@@ -98,20 +99,20 @@ GlintStatus glint_scene_of_mesh(const GlintMesh *mesh, GlintScene **scene, char 
     bool is_read =
         struct_read(&given, sizeof given, mesh, "GlintMesh", &list) && mesh_is_sound(&given, &list);
     if (is_read) {
-        Mesh own = {.vertex_count = given.vertex_count, .triangle_count = given.triangle_count};
-        own.vertices = memory_allocate(given.vertex_count, sizeof *own.vertices);
-        own.triangles = memory_allocate(given.triangle_count, sizeof *own.triangles);
-        memcpy(own.triangles, given.triangles, given.triangle_count * sizeof *own.triangles);
-        if (given.normals) own.normals = memory_allocate(given.vertex_count, sizeof *own.normals);
-        is_read = vectors_read(own.vertices, given.real, given.vertices, given.vertex_count, &list) &&
+        Mesh copy = {.vertex_count = given.vertex_count, .triangle_count = given.triangle_count};
+        copy.vertices = memory_allocate(given.vertex_count, sizeof *copy.vertices);
+        copy.triangles = memory_allocate(given.triangle_count, sizeof *copy.triangles);
+        memcpy(copy.triangles, given.triangles, given.triangle_count * sizeof *copy.triangles);
+        if (given.normals) copy.normals = memory_allocate(given.vertex_count, sizeof *copy.normals);
+        is_read = vectors_read(copy.vertices, given.real, given.vertices, given.vertex_count, &list) &&
                   (!given.normals ||
-                   vectors_read(own.normals, given.real, given.normals, given.vertex_count, &list));
-        for (size_t i = 0; own.normals && i < own.vertex_count; i++)
-            if (!vector_is_zero(own.normals[i])) own.normals[i] = vector_normalize(own.normals[i]);
+                   vectors_read(copy.normals, given.real, given.normals, given.vertex_count, &list));
+        for (size_t i = 0; copy.normals && i < copy.vertex_count; i++)
+            if (!vector_is_zero(copy.normals[i])) copy.normals[i] = vector_normalize(copy.normals[i]);
         if (is_read)
-            scene_of_mesh(&read, &own);
+            scene_of_mesh(&read, &copy);
         else
-            mesh_free(&own);
+            mesh_free(&copy);
     }
     return scene_return(scene, &read, is_read, &list, messages);
 }

@@ -29,7 +29,7 @@ static bool budgets_read(const Option *option, const char *value, void *options)
     return option_list(option, value, option_number, list);
 }
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"reference", "FILE",
      "compare with the linear colors in FILE (.exr or .npy), which has the images' size or a multiple that "
      "is averaged (default: the image at double)",
@@ -56,7 +56,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint accuracy SCENE... [OPTIONS]\n\n"
              "Measures speed and error of scenes in every requested configuration. The reference takes the "
              "largest of --samples.\n",
-    .groups = {OPTIONS(options_own), VARIANT_OPTIONS, OPTIONS(perturb_option), REPORT_OPTIONS},
+    .groups = {OPTIONS(command_options), VARIANT_OPTIONS, OPTIONS(perturb_option), REPORT_OPTIONS},
     OPERANDS(SCENES, AccuracyOptions, scenes),
     .check = options_check};
 

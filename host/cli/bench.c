@@ -25,7 +25,7 @@ typedef struct {
     VariantOptions variant_options[OPTION_TEXTS_MAX];
 } BenchOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"against", "GLINT", "compare with another build, run alternately (default of --seconds: 30 per row)",
      option_text, offsetof(BenchOptions, against)},
     {"compare", "FILE", "compare with an earlier report (--json); claims less than --against", option_text,
@@ -140,7 +140,7 @@ static const CommandLine command_line = {
         "usage: glint bench SCENE... [OPTIONS]\n\n"
         "Benchmarks scenes in every requested configuration, interleaved. Exit status of a comparison: 0 "
         "same or faster,\n3 slower, 4 too noisy to decide.\n",
-    .groups = {OPTIONS(options_own), OPTIONS(precisions_option), VARIANT_OPTIONS, OPTIONS(driver_options),
+    .groups = {OPTIONS(command_options), OPTIONS(precisions_option), VARIANT_OPTIONS, OPTIONS(driver_options),
                OPTIONS(keep_kernels_option), REPORT_OPTIONS},
     OPERANDS(SCENES, BenchOptions, scenes),
     .check = options_check};

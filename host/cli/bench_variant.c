@@ -79,11 +79,11 @@ static bool rays_count(Compute *compute, const Variant *variant, BenchRow *row, 
 
 Device variant_device(const Device *device, const Variant *variant)
 {
-    Device own = *device;
-    if (variant->build_options) own.build_options = variant->build_options;
+    Device changed = *device;
+    if (variant->build_options) changed.build_options = variant->build_options;
     for (size_t i = 0; i < 2 && variant->work_group[0] > 0; i++)
-        own.work_group[i] = variant->work_group[i];
-    return own;
+        changed.work_group[i] = variant->work_group[i];
+    return changed;
 }
 
 // Returns the Compute that the variant renders with.
@@ -91,20 +91,20 @@ static Compute *variant_compute(Compute *compute, Variant *variant)
 {
     variant->compute = compute;
     if (!variant->build_options && variant->work_group[0] == 0) return compute;
-    variant->own_device = variant_device(compute->device, variant);
-    if (variant->build_options) variant->own_device.passports = device_passports_open();
-    variant->own = *compute;
-    variant->own.device = &variant->own_device;
-    return &variant->own;
+    variant->private_device = variant_device(compute->device, variant);
+    if (variant->build_options) variant->private_device.passports = device_passports_open();
+    variant->private_compute = *compute;
+    variant->private_compute.device = &variant->private_device;
+    return &variant->private_compute;
 }
 
 // Copies a failure of the variant's Compute to the command's, which owns what both share.
 static void variant_copy_failure(Variant *variant)
 {
-    if (!variant->own.context || !compute_ok(variant->compute)) return;
-    variant->compute->failure = variant->own.failure;
+    if (!variant->private_compute.context || !compute_ok(variant->compute)) return;
+    variant->compute->failure = variant->private_compute.failure;
     if (variant->compute->unmap_failure.call[0] == '\0')
-        variant->compute->unmap_failure = variant->own.unmap_failure;
+        variant->compute->unmap_failure = variant->private_compute.unmap_failure;
 }
 
 void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_builds)
@@ -211,6 +211,7 @@ bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row)
 void variant_close(Variant *variant)
 {
     renderer_close(variant->renderer);
-    if (variant->own.context && variant->build_options) device_passports_close(variant->own_device.passports);
+    if (variant->private_compute.context && variant->build_options)
+        device_passports_close(variant->private_device.passports);
     *variant = (Variant){0};
 }

@@ -15,8 +15,8 @@ typedef struct {
     Compute *compute; // the command's
     // With such options: copies of the device and of `compute` that have them and share the context and
     // queue. Build options also have separate passports.
-    Device own_device;
-    Compute own;
+    Device private_device;
+    Compute private_compute;
     Renderer *renderer; // NULL if it is not open or not available on the device
 } Variant;
 

@@ -11,7 +11,7 @@ typedef struct {
     bool clears;
 } CacheOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"clear", NULL, "remove all programs from the cache", option_flag, offsetof(CacheOptions, clears)}};
 
 static const CommandLine command_line = {
@@ -19,7 +19,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint cache [OPTIONS]\n\n"
              "Lists and checks the programs of the kernel cache, the least recently used first.\nExit status "
              "3: one is damaged or not private.\n",
-    .groups = {OPTIONS(options_own)}};
+    .groups = {OPTIONS(command_options)}};
 
 // Returns whether all entries can be trusted.
 static bool entries_print(const CacheEntries *entries)

@@ -35,9 +35,10 @@ typedef struct {
     uint32_t pixels;
 } CertifyOptions;
 
-static const Option options_own[] = {{"pixels", "N", "compare about N pixels (default: 2000)", option_count,
-                                      offsetof(CertifyOptions, pixels), NUMBERS(1, PIXELS_MOST)},
-                                     PRECISIONS_OPTION("all that fit")};
+static const Option command_options[] = {{"pixels", "N", "compare about N pixels (default: 2000)",
+                                          option_count, offsetof(CertifyOptions, pixels),
+                                          NUMBERS(1, PIXELS_MOST)},
+                                         PRECISIONS_OPTION("all that fit")};
 
 static const CommandLine command_line = {
     .command = "certify",
@@ -47,7 +48,7 @@ static const CommandLine command_line = {
         "pixels: "
         "objects, shadows, paths, colors.\nExit status 3: certified is wrong at a pixel that it does not "
         "list as uncertified.\n",
-    .groups = {OPTIONS(options_own), OPTIONS(size_option), OPTIONS(ray_options), SCENE_OPTIONS,
+    .groups = {OPTIONS(command_options), OPTIONS(size_option), OPTIONS(ray_options), SCENE_OPTIONS,
                OPTIONS(reference_option), OPTIONS(perturb_option), REPORT_OPTIONS},
     OPERANDS(SCENE, CertifyOptions, scene)};
 

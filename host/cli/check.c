@@ -22,7 +22,7 @@ typedef struct {
     uint32_t object; // UINT32_MAX if not given
 } CheckOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"object", "ID", "print one object and its line; IDs are those of glint trace", option_count,
      offsetof(CheckOptions, object), NUMBERS(0, UINT32_MAX - 1)}};
 
@@ -46,7 +46,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint check SCENE... [OPTIONS]\n\n"
              "Reports a scene's objects, lights, materials, bounds and kernel features, and warns of what is "
              "ignored. For several scenes it prints one line each.\n",
-    .groups = {OPTIONS(options_own), OPTION(report_options[REPORT_JSON]), OPTIONS(set_options),
+    .groups = {OPTIONS(command_options), OPTION(report_options[REPORT_JSON]), OPTIONS(set_options),
                OPTION(common_options[COMMON_LENIENT])},
     OPERANDS(SCENES, CheckOptions, scenes),
     .check = options_check};

@@ -26,14 +26,14 @@ static void devices_append(Text *key, const ImageOrigin *origin)
 {
     const Ranks *ranks = origin->ranks;
     for (size_t i = 0; i < origin->renderer_count; i++) {
-        Rank own = {0};
+        Rank local = {0};
         const RenderReport *report = renderer_report(origin->renderers[i]);
         const Device *reference = report->reference_device;
-        rank_set_device(&own, report->device);
-        model_append(key, &own, report->lanes);
+        rank_set_device(&local, report->device);
+        model_append(key, &local, report->lanes);
         if (!reference) continue;
-        rank_set_device(&own, reference);
-        model_append(key, &own, device_lanes(reference, true, 0));
+        rank_set_device(&local, reference);
+        model_append(key, &local, device_lanes(reference, true, 0));
     }
     for (size_t i = 0; ranks && i < ranks->remote.count; i++)
         if (ranks->items[i].lanes[PASS_ALL] > 0) // otherwise it cannot render

@@ -17,7 +17,7 @@ typedef struct {
     bool probes;
 } DevicesOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"probe", NULL, "measure the arithmetic now", option_flag, offsetof(DevicesOptions, probes)}};
 
 static const CommandLine command_line = {
@@ -25,7 +25,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint devices [OPTIONS]\n\n"
              "Lists every OpenCL device of every platform; * marks the default. Then prints\n"
              "what the arithmetic of each device really does, if that was measured.\n",
-    .groups = {OPTIONS(options_own), OPTION(report_options[REPORT_JSON]), OPTIONS(keep_kernels_option)}};
+    .groups = {OPTIONS(command_options), OPTION(report_options[REPORT_JSON]), OPTIONS(keep_kernels_option)}};
 
 static void devices_print_json(const DeviceList *list, const Device *chosen)
 {

@@ -31,7 +31,7 @@ typedef struct {
     double limits[LIMIT_COUNT]; // below 0 if not given
 } DiffOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"max-rmse", "E", "allow this RMSE, in linear light or in the units of other arrays", option_number,
      offsetof(DiffOptions, limits[LIMIT_RMSE]), NUMBERS(0, INFINITY)},
     {"max-flip", "E", "allow this mean FLIP", option_number, offsetof(DiffOptions, limits[LIMIT_FLIP]),
@@ -73,7 +73,7 @@ static const CommandLine command_line = {
     .usage = "usage: glint diff REFERENCE IMAGE [OPTIONS]\n\n"
              "Compares two images (PNG, JPEG, PPM, EXR or NPY) of the same size and kind. Exit status 0: "
              "equal, or within\nall limits that are given; 3: different, or beyond a limit.\n",
-    .groups = {OPTIONS(options_own), OPTIONS(max_pixels_option), REPORT_OPTIONS},
+    .groups = {OPTIONS(command_options), OPTIONS(max_pixels_option), REPORT_OPTIONS},
     OPERANDS(ANY, DiffOptions, images),
     .check = options_check};
 

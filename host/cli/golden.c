@@ -41,7 +41,7 @@ typedef struct {
     char *crop;        // the file that shows the box, or NULL
 } GoldenCheck;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"file", "FILE", "the file of hashes (default: golden.txt)", option_text, offsetof(GoldenOptions, file)},
     {"size", "WxH", "image size, for write (default: 320x180)", option_size,
      offsetof(GoldenOptions, common.size)},
@@ -89,7 +89,7 @@ static const CommandLine command_line = {
              "scenes with their lines, by default all scenes of the file. If an image differs, names the "
              "layer that differs first and\n"
              "the pixels, and writes these as SCENE-golden.png here. Exit status: 0 same, 3 different.\n",
-    .groups = {OPTIONS(options_own), OPTION(ray_options[RAY_BOUNCES]), OPTIONS(device_option),
+    .groups = {OPTIONS(command_options), OPTION(ray_options[RAY_BOUNCES]), OPTIONS(device_option),
                OPTIONS(common_options), OPTIONS(max_pixels_option), OPTIONS(driver_options), REPORT_OPTIONS},
     OPERANDS(ANY, GoldenOptions, scenes),
     .check = options_check};

@@ -21,8 +21,8 @@ static Text *note_begin(ImageNotes *notes, const char *key)
 static bool is_mixed(const ImageOrigin *origin)
 {
     const Device *first = renderer_report(origin->renderers[0])->device;
-    Rank own = {0};
-    rank_set_device(&own, first);
+    Rank local = {0};
+    rank_set_device(&local, first);
     bool differs = false;
     for (size_t i = 1; i < origin->renderer_count; i++) {
         const Device *device = renderer_report(origin->renderers[i])->device;
@@ -31,7 +31,8 @@ static bool is_mixed(const ImageOrigin *origin)
     }
     for (size_t i = 0; origin->ranks && i < origin->ranks->remote.count; i++) {
         const Rank *rank = &origin->ranks->items[i];
-        differs = differs || strcmp(rank->device, own.device) != 0 || strcmp(rank->driver, own.driver) != 0;
+        differs =
+            differs || strcmp(rank->device, local.device) != 0 || strcmp(rank->driver, local.driver) != 0;
     }
     return differs && origin->settings->precision != PRECISION_STRICT;
 }

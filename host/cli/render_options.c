@@ -165,7 +165,7 @@ static const char *const transfer_names[] = {"srgb", "none"}, *const bits_names[
 static const unsigned bits_values[] = {8, 16}, format_values[] = {IMAGE_PNG, IMAGE_PPM, IMAGE_NPY},
                       timing_styles[] = {TIMING_TEXT, TIMING_JSON, TIMING_TRACE};
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"output", "FILE",
      ".png, .ppm, .exr or .npy; a folder for several scenes; - with --format (default: the scene's name with "
      ".png)",
@@ -227,7 +227,7 @@ static const char *options_check(void *render_options)
 static const CommandLine command_line = {
     .command = "render",
     .usage = "usage: glint render SCENE... [OPTIONS] (SCENE -: YAML on standard input)\n",
-    .groups = {OPTIONS(options_own), OPTIONS(size_option), OPTIONS(ray_options), OPTIONS(set_options),
+    .groups = {OPTIONS(command_options), OPTIONS(size_option), OPTIONS(ray_options), OPTIONS(set_options),
                OPTIONS(devices_option), OPTIONS(reference_option), OPTIONS(precision_option),
                OPTIONS(common_options), OPTIONS(max_pixels_option), OPTIONS(driver_options),
                OPTIONS(perturb_option)},

@@ -51,7 +51,7 @@ static const Option archive_options[] = {{"output", "FILE", "the archive (defaul
                                          {"seconds", "MAX", "time limit of each step (default: 1800)",
                                           option_number, offsetof(ReportChoice, seconds),
                                           NUMBERS_ABOVE(0, SECONDS_MAX)}};
-static const Option precision_own[] = {PRECISION_OPTION(
+static const Option command_precision[] = {PRECISION_OPTION(
     "single, strict or double (default: all for verify, single for bench)", ARITHMETIC_COUNT)};
 static const Option page_option[] = {{"html", "FILE", "write a self-contained HTML page of this comparison",
                                       option_text, offsetof(ReportChoice, page)}};
@@ -102,7 +102,7 @@ static const CommandLine command_line = {
         "are built, which takes minutes. A step that\nfails or crashes is named in index.txt. Names of "
         "the user, the host and folders are left out. With CASE, glint verify\nruns only these cases.\n",
     .groups = {OPTIONS(archive_options),
-               OPTIONS(precision_own),
+               OPTIONS(command_precision),
                OPTIONS(device_option),
                OPTION(common_options[COMMON_LANES]),
                OPTIONS(driver_options),

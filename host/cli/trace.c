@@ -19,7 +19,7 @@ typedef struct {
     const char *scene, *rays, *output;
 } TraceOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"rays", "FILE",
      "one ray per line: ox oy oz dx dy dz [tmin tmax], decimal or C hexadecimal; - is standard input; # "
      "starts a comment",
@@ -45,7 +45,7 @@ static const CommandLine command_line = {
         "each number is rounded once to the precision. At certified, low,high,certainty follow: bounds of "
         "the exact t,\n"
         "and whether object and bounds are certain, certain in double, or uncertain.\n",
-    .groups = {OPTIONS(options_own), OPTIONS(precision_option), SCENE_OPTIONS, OPTIONS(driver_options),
+    .groups = {OPTIONS(command_options), OPTIONS(precision_option), SCENE_OPTIONS, OPTIONS(driver_options),
                OPTIONS(perturb_option)},
     OPERANDS(SCENE, TraceOptions, scene),
     .check = options_check};

@@ -253,14 +253,14 @@ bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute
 
 size_t variant_set_first(const VariantSet *set, size_t row)
 {
-    const RenderSettings *own = &set->variants[row].settings;
+    const RenderSettings *settings = &set->variants[row].settings;
     size_t first = row;
     int most = -1;
     for (size_t i = 0; i < set->count; i++) {
         if (set->variants[i].scene != set->variants[row].scene || set->variants[i].choice > 0) continue;
         const RenderSettings *other = &set->variants[i].settings;
-        const int common = (other->precision == own->precision) + (other->lanes == own->lanes) +
-                           (other->bvh == own->bvh) + (other->sample_count == own->sample_count);
+        const int common = (other->precision == settings->precision) + (other->lanes == settings->lanes) +
+                           (other->bvh == settings->bvh) + (other->sample_count == settings->sample_count);
         if (common <= most) continue;
         most = common;
         first = i;

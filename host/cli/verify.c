@@ -37,12 +37,12 @@ typedef struct {
     CommandOperands names; // of the cases, all if none is named
 } VerifyOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"quick", NULL, "a sixteenth of the random rays, and fewer pixels", option_flag,
      offsetof(VerifyOptions, quick)},
     {"lean", NULL, "build one small kernel per scene instead of one for all, for slow compilers", option_flag,
      offsetof(VerifyOptions, lean)}};
-static const Option precision_own[] = {
+static const Option command_precision[] = {
     PRECISION_OPTION("single, strict or double (default: all that the device has)", ARITHMETIC_COUNT)};
 
 // Returns the index of a case, or the number of cases if there is none of this name.
@@ -75,7 +75,7 @@ static const CommandLine command_line = {
         "usage: glint verify [CASE...] [OPTIONS]\n\n"
         "Runs the hard cases, or those named, on a device and checks each against its bound; exit status "
         "3 if any fails.\n",
-    .groups = {OPTIONS(precision_own), OPTIONS(options_own), OPTIONS(device_option),
+    .groups = {OPTIONS(command_precision), OPTIONS(command_options), OPTIONS(device_option),
                OPTION(common_options[COMMON_LANES]), OPTION(common_options[COMMON_NO_CACHE]),
                OPTIONS(driver_options), OPTIONS(keep_kernels_option), OPTIONS(perturb_option),
                REPORT_OPTIONS},

@@ -18,7 +18,7 @@ typedef struct {
     bool writes_camera;
 } ViewOptions;
 
-static const Option options_own[] = {
+static const Option command_options[] = {
     {"size", "WxH", "width and height of the window in pixels (default: the scene's own, else 1280 wide)",
      option_size, offsetof(ViewOptions, common.size)},
     {"samples", "N", "samples per pixel once the camera rests (default: 16)", option_count,
@@ -50,7 +50,7 @@ static const CommandLine command_line = {
     .command = "view",
     .usage = "usage: glint view SCENE [OPTIONS]\n",
     .usage_print = keys_print,
-    .groups = {OPTIONS(options_own), OPTIONS(ray_options), OPTIONS(precision_option), SCENE_OPTIONS},
+    .groups = {OPTIONS(command_options), OPTIONS(ray_options), OPTIONS(precision_option), SCENE_OPTIONS},
     OPERANDS(SCENE, ViewOptions, scene),
     .check = options_check};
 

@@ -48,8 +48,8 @@ static void row_fill(const CompiledScene *compiled, Vector3 common_origin, CullS
         Outside outside = outside_bvh(compiled, type);
         for (size_t i = outside.first; i < outside.end; i++) {
             const void *primitive = flat_array_at(&compiled->arrays[FLAT_FIRST_SHAPE + type], i);
-            const CullSlack own = {slack.squared, type == TYPE_INSTANCES ? slack.distance : 0};
-            *row++ = cull_sphere(primitive_bounding_sphere(type, primitive), common_origin, own);
+            const CullSlack slack_of_type = {slack.squared, type == TYPE_INSTANCES ? slack.distance : 0};
+            *row++ = cull_sphere(primitive_bounding_sphere(type, primitive), common_origin, slack_of_type);
         }
     }
 }

@@ -226,9 +226,10 @@ static void sides_find(void *context, size_t begin, size_t end)
         for (uint32_t k = 0; k < 3; k++) {
             const uint32_t across = triangles->across[3 * i + k];
             if (across == NONE) continue;
-            const uint32_t *own = triangles->all.triangles[i], *others = triangles->all.triangles[across / 3];
-            const Side of_neighbor = side_of(triangles, own, others[across % 3]),
-                       of_this = side_of(triangles, others, own[k]);
+            const uint32_t *corners = triangles->all.triangles[i],
+                           *other_corners = triangles->all.triangles[across / 3];
+            const Side of_neighbor = side_of(triangles, corners, other_corners[across % 3]),
+                       of_this = side_of(triangles, other_corners, corners[k]);
             uint32_t sides = 0;
             if (of_this == BEHIND) sides |= NEIGHBOR_HAS_THIS_BEHIND;
             if (of_neighbor == IN_FRONT) sides |= NEIGHBOR_IN_FRONT;

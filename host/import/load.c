@@ -121,13 +121,13 @@ static bool camera_load(Scene *scene, const SceneOptions *options, MessageList *
         if (strncmp(options->overrides[i], "camera", 6) == 0 && strchr(".[=", options->overrides[i][6]))
             return message_error(messages, "%s %s: the camera is that of '%s'", options->override_name,
                                  options->overrides[i], options->camera);
-    SceneOptions own = *options;
-    own.camera = NULL;
-    own.override_count = 0;
+    SceneOptions camera_options = *options;
+    camera_options.camera = NULL;
+    camera_options.override_count = 0;
     scene_file_named(options, options->camera);
     Scene other;
     MessageList found = {0};
-    const bool is_read = file_load(&other, options->camera, &own, &found);
+    const bool is_read = file_load(&other, options->camera, &camera_options, &found);
     if (is_read) {
         scene->camera = other.camera;
         scene->animation.has_keys |= other.animation.has_keys;

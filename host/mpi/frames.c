@@ -80,8 +80,8 @@ static void marker_make(const RenderCommand *command, char *name)
 static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
 {
     char marker[MARKER_BYTES] = "";
-    const uint64_t own = command ? files_hash(command, call) : 0;
-    uint64_t hash = own;
+    const uint64_t local_hash = command ? files_hash(command, call) : 0;
+    uint64_t hash = local_hash;
     const bool can_render = command && !uses_standard_streams(command) &&
                             render_devices_open(&command->open, &command->options.common);
     if (is_first) {
@@ -90,7 +90,7 @@ static bool files_are_shared(RenderCommand *command, Call call, bool is_first)
     }
     broadcast(marker, sizeof marker, MPI_COMM_WORLD);
     broadcast(&hash, sizeof hash, MPI_COMM_WORLD);
-    int sees = can_render && own == hash && marker[0] != '\0' && access(marker, F_OK) == 0, all_see;
+    int sees = can_render && local_hash == hash && marker[0] != '\0' && access(marker, F_OK) == 0, all_see;
     MPI_Allreduce(&sees, &all_see, 1, MPI_INT, MPI_LAND, MPI_COMM_WORLD);
     if (is_first && marker[0] != '\0') unlink(marker);
     if (is_first) interrupts_release();

@@ -36,7 +36,7 @@ typedef struct {
     bool is_open;
     Renderer *renderer; // NULL: cannot render, for a reason in `messages` or the device
     MessageList messages;
-    Rank own;
+    Rank self;
 } RankRenderer;
 
 static void device_close_quietly(RankRenderer *worker)
@@ -53,9 +53,9 @@ static void device_close_quietly(RankRenderer *worker)
 // Prepares for another image. Reopens a device that failed.
 static void worker_begin(RankRenderer *worker, const Job *job, const char *selector)
 {
-    Rank *own = &worker->own;
-    *own = (Rank){0};
-    gethostname(own->host, sizeof own->host - 1);
+    Rank *self = &worker->self;
+    *self = (Rank){0};
+    gethostname(self->host, sizeof self->host - 1);
     Compute *compute = &worker->device.compute;
     if (worker->is_open && !compute_ok(compute)) device_close_quietly(worker);
     if (!worker->is_open) {
@@ -69,21 +69,21 @@ static void worker_begin(RankRenderer *worker, const Job *job, const char *selec
             device_list_close(&worker->device.devices);
     }
     if (!worker->is_open) {
-        snprintf(own->failure, sizeof own->failure, "%s", worker->messages.items[0].text);
+        snprintf(self->failure, sizeof self->failure, "%s", worker->messages.items[0].text);
         return;
     }
     const RenderSettings settings = settings_of_job(&job->settings);
     worker->renderer = renderer_open_empty(compute, &settings, worker->renderer, &worker->messages);
-    rank_set_device(own, compute->device);
+    rank_set_device(self, compute->device);
     for (PixelPass pass = PASS_ALL; pass < PASS_COUNT; pass++)
-        own->lanes[pass] = renderer_lanes(worker->renderer, pass);
+        self->lanes[pass] = renderer_lanes(worker->renderer, pass);
 }
 
 // Receives a scene. All ranks of its variant take part, even those that can no longer render.
 static void scene_receive(RankRenderer *worker, SceneVariant variant)
 {
     CompiledScene compiled;
-    const bool takes = worker->own.lanes[variant.pass] == variant.lanes;
+    const bool takes = worker->self.lanes[variant.pass] == variant.lanes;
     scene_broadcast(&compiled, worker->rank, takes);
     if (!takes) return;
     if (!worker->renderer) {
@@ -98,7 +98,7 @@ static void scene_receive(RankRenderer *worker, SceneVariant variant)
 // TAG_END, which would otherwise end the next job.
 static void worker_render(RankRenderer *worker, unsigned aovs)
 {
-    char failure[sizeof worker->own.failure] = "";
+    char failure[sizeof worker->self.failure] = "";
     bool has_ended = false;
     const BandQueue queue = {
         .acquire = rows_acquire, .deliver = band_send, .has_ended = end_poll, .context = &has_ended};
@@ -122,7 +122,7 @@ static void job_run(RankRenderer *worker, const Job *job)
     broadcast(selector, job->selector_size, MPI_COMM_WORLD);
     worker_begin(worker, job, job->selector_size > 0 ? selector : NULL);
     free(selector);
-    MPI_Gather(&worker->own, sizeof worker->own, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
+    MPI_Gather(&worker->self, sizeof worker->self, MPI_BYTE, NULL, 0, MPI_BYTE, 0, MPI_COMM_WORLD);
     while (broadcast(&order, sizeof order, MPI_COMM_WORLD), order.type == ORDER_SCENE)
         scene_receive(worker, order.variant);
     if (order.type == ORDER_START) worker_render(worker, job->aovs);

@@ -206,13 +206,13 @@ static void difference_report(const char *path, const char *key, const char *fou
         const char *value = key_value(key, line, name_length, &length);
         const char *other = key_value(found, line, name_length, &other_length);
         if (length == other_length && strncmp(value, other, length) == 0) continue;
-        char *own = value_text(value, length), *others = value_text(other, other_length);
+        char *expected = value_text(value, length), *stored = value_text(other, other_length);
         message_error(
             messages,
             "the checkpoint '%s' belongs to another image (%.*s: %s, not %s); remove it or name another file",
-            path, (int)name_length, line, others, own);
-        free(own);
-        free(others);
+            path, (int)name_length, line, stored, expected);
+        free(expected);
+        free(stored);
         return;
     }
     damage_report(path, messages); // the key in the file has further lines

@@ -14,16 +14,17 @@
 void pass_open(Pass *pass, PixelPass type, Compute *compute, const RenderSettings *settings,
                RenderReport *report)
 {
-    const RenderSettings own = settings_of_pass(settings, type);
-    const bool is_double = own.precision == PRECISION_DOUBLE;
-    *pass = (Pass){.type = type, .compute = compute, .settings = own, .report = report};
-    pass->lanes = device_lanes(compute->device, is_double, own.lanes);
-    pass->certifies = own.precision == PRECISION_CERTIFIED || type == PASS_FLAGGED;
-    pass->passport = arithmetic_passport(compute, own.precision, pass->lanes, own.no_cache);
+    const RenderSettings pass_settings = settings_of_pass(settings, type);
+    const bool is_double = pass_settings.precision == PRECISION_DOUBLE;
+    *pass = (Pass){.type = type, .compute = compute, .settings = pass_settings, .report = report};
+    pass->lanes = device_lanes(compute->device, is_double, pass_settings.lanes);
+    pass->certifies = pass_settings.precision == PRECISION_CERTIFIED || type == PASS_FLAGGED;
+    pass->passport =
+        arithmetic_passport(compute, pass_settings.precision, pass->lanes, pass_settings.no_cache);
     pass->scene = (DeviceScene){.compute = compute,
                                 .is_double = is_double,
-                                .moves = own.moves,
-                                .hashes = own.hashes_scene,
+                                .moves = pass_settings.moves,
+                                .hashes = pass_settings.hashes_scene,
                                 .hash = HASH_START};
     pass->kernels = (Kernels){.scene = &pass->scene,
                               .settings = &pass->settings,

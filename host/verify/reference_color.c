@@ -122,10 +122,10 @@ static void add_surface(PathTree *tree, const ShadedPoint *surface, Color weight
         tree->object = surface->index;
         tree->distance = (double)surface->scale;
     }
-    const ReferenceColor own = shaded_color(tree->world, surface, (double)margin, tree->shadows);
+    const ReferenceColor shaded = shaded_color(tree->world, surface, (double)margin, tree->shadows);
     tree->shadows = NULL;
-    tree->sum = vector_add(tree->sum, vector_multiply(own.color, weight));
-    margin_reduce(&tree->margin, own.margin);
+    tree->sum = vector_add(tree->sum, vector_multiply(shaded.color, weight));
+    margin_reduce(&tree->margin, shaded.margin);
     tree->has_texture = tree->has_texture || surface->material->image.texture > 0;
 }
 

@@ -152,9 +152,9 @@ static Color light_passed(const ReferenceScene *world, const ShadedPoint *surfac
     if (sinks && surface->is_lifted) {
         ReferenceRay whole = *shadow;
         whole.tmin = -shadow->tmin;
-        const ReferenceHit own = reference_hit_object(surface->object, &whole);
-        margin_reduce(margin, own.margin);
-        sinks = own.found;
+        const ReferenceHit self_hit = reference_hit_object(surface->object, &whole);
+        margin_reduce(margin, self_hit.margin);
+        sinks = self_hit.found;
     }
     Color passed = sinks ? material_passing(surface->material) : vector_all(1);
     for (size_t i = 0; i < scene->objects.count; i++) {

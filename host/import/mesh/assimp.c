@@ -344,7 +344,7 @@ static void view_add(Importer *importer, const struct aiNode *node, const Affine
 
 static bool node_add(Importer *importer, const struct aiNode *node, const Affine *parent)
 {
-    const Affine own = affine_of_node(&node->mTransformation), affine = affine_multiply(parent, &own);
+    const Affine local = affine_of_node(&node->mTransformation), affine = affine_multiply(parent, &local);
     view_add(importer, node, &affine);
     for (unsigned i = 0; i < node->mNumMeshes; i++)
         if (node->mMeshes[i] < importer->file->mNumMeshes &&

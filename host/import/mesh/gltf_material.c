@@ -229,15 +229,15 @@ static void emission_set(Gltf *gltf, const GltfItem *item, const GltfSurface *su
     }
     if (vector_is_zero(emission)) return;
     // an emissive texture is shown if it is the only texture or the same as the base color texture
-    const json_t *own = json_object_get(surface->emissive_texture.json, "index"),
-                 *other = json_object_get(surface->base_texture.json, "index");
-    if (!own) {
+    const json_t *emissive = json_object_get(surface->emissive_texture.json, "index"),
+                 *base_color = json_object_get(surface->base_texture.json, "index");
+    if (!emissive) {
         look->emission = emission;
         return;
     }
-    if (!other && mean_of(base) == 0)
+    if (!base_color && mean_of(base) == 0)
         texture_read(gltf, &surface->emissive_texture, TEXTURE_COLORS, &material->texture);
-    if (material->texture.number == 0 || (other && !json_equal(own, other))) {
+    if (material->texture.number == 0 || (base_color && !json_equal(emissive, base_color))) {
         gltf_lose(gltf, GLTF_EMISSIVE_TEXTURE, item);
     } else if (texture_can_emit(gltf, item, material,
                                 mean_of((double[]){emission.x, emission.y, emission.z}))) {

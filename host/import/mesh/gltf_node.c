@@ -272,9 +272,9 @@ static bool node_add(Gltf *gltf, size_t index, const Affine *parent, unsigned de
     if (gltf->is_visited[index]) return gltf_fails(gltf, &node, "stands at two places of the scene");
     if (depth > DEPTH_MAX) return gltf_fails(gltf, &node, "lies more than %d nodes deep", DEPTH_MAX);
     gltf->is_visited[index] = true;
-    Affine own, affine;
-    if (!transform_read(gltf, &node, &own)) return false;
-    affine = affine_multiply(parent, &own);
+    Affine local, affine;
+    if (!transform_read(gltf, &node, &local)) return false;
+    affine = affine_multiply(parent, &local);
     if (skin.json) gltf_lose(gltf, GLTF_SKIN, &skin);
     view_add(gltf, &node, &affine);
     size_t mesh_index = SIZE_MAX;

@@ -115,20 +115,20 @@ static void children_join(const Includes *includes, Joined *joined, size_t secti
 static void pair_join(const Includes *includes, Joined *joined, size_t section, uint32_t key)
 {
     YamlReader *reader = includes->reader;
-    const uint32_t value = node_at(includes, key)->next, own = joined->values[section];
+    const uint32_t value = node_at(includes, key)->next, existing = joined->values[section];
     const YamlType type = sections[section].type;
     const bool is_joined = type != YAML_SCALAR;
     if (is_joined && node_at(includes, value)->type != type) {
         expected_report(reader, sections[section].name, type == YAML_SEQUENCE ? "a list" : "a mapping",
                         node_at(includes, value));
-    } else if (own == 0) {
+    } else if (existing == 0) {
         joined->values[section] = value;
         if (is_joined && node_at(includes, value)->child_count > 0) {
             yaml_children_unshare(&reader->tree, value);
             joined->joined[section] = last_child(includes, value);
         }
         pair_append(includes, joined, key);
-    } else if (is_joined && node_at(includes, own)->type == type) {
+    } else if (is_joined && node_at(includes, existing)->type == type) {
         children_join(includes, joined, section, value);
     }
 }

@@ -49,9 +49,9 @@ static void hit_oval(const Object *object, const ReferenceRay *ray, ReferenceHit
     const Inverse inverse = inverse_of(object);
     const Object unit = oval_unit(object);
     const Quad3 from = quad3_subtract(ray->origin, quad3(object->as.oval.center));
-    const ReferenceRay own = {axes_coordinates(inverse.rows, from),
-                              axes_coordinates(inverse.rows, ray->direction), ray->tmin, ray->tmax};
-    units[unit.type]->hit(&unit, &own, hit);
+    const ReferenceRay unit_ray = {axes_coordinates(inverse.rows, from),
+                                   axes_coordinates(inverse.rows, ray->direction), ray->tmin, ray->tmax};
+    units[unit.type]->hit(&unit, &unit_ray, hit);
     hit->margin = hit->margin == UNBOUNDED ? UNBOUNDED : hit->margin / inverse.norm;
     if (!hit->found) return;
     Quad length;
