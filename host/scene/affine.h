@@ -4,7 +4,7 @@
 #include "host/scene/vector.h"
 #include <stdbool.h>
 
-// Three rows of a matrix, the last column the translation.
+// The first three rows of a 4x4 matrix, whose last column is the translation.
 typedef struct {
     double rows[3][4];
 } Affine;
@@ -15,20 +15,21 @@ extern const Affine affine_identity;
 Affine affine_multiply(const Affine *a, const Affine *b);
 // Scales, then rotates about x, y and z in this order by degrees, then translates.
 Affine affine_of_steps(Vector3 scale, Vector3 rotate, Vector3 translate);
-// Rotates by degrees, counterclockwise if the axis points to the viewer. The axis is not zero.
+// Rotates by degrees, counterclockwise if the axis points to the viewer. The axis must not be zero.
 Affine affine_about(Vector3 axis, double degrees);
 Vector3 affine_point(const Affine *affine, Vector3 p);
 Vector3 affine_direction(const Affine *affine, Vector3 v);
 double affine_determinant(const Affine *affine);
-// Transforms a triangle's vertices and, as unit vectors, its normals, of which those that are zero stay zero.
-// A mirroring transform inverts the winding; the corners b and c change places to keep the outer side.
+// Transforms a triangle's vertices and its normals. The normals become unit vectors, or stay zero if they are
+// zero. If the transform mirrors, exchanges the corners b and c to keep the outer side.
 void affine_triangle(const Affine *affine, Vector3 vertices[3], Vector3 normals[3]);
-// Transforms normals: the transposed inverse times |determinant|.
+// Returns the transform for normals, which is the transposed inverse times |determinant|.
 Affine affine_for_normals(const Affine *affine);
-// Transforms a normal to a unit vector by what affine_for_normals returns; one that is zero stays zero.
+// Transforms a normal by the result of affine_for_normals. Returns a unit vector, or zero if the normal is
+// zero.
 Vector3 affine_normal(const Affine *for_normals, Vector3 normal);
 
-// The scales of a transform across an axis and the vector that the unit axis becomes.
+// The scale of a transform across an axis, and the vector that the unit axis becomes.
 typedef struct {
     double across;
     Vector3 along;

@@ -4,7 +4,7 @@
 #include "host/scene/vector.h"
 
 typedef struct {
-    Vector3 min, max; // min > max: empty
+    Vector3 min, max; // a box is empty if min > max
 } Bounds;
 
 static inline Bounds bounds_empty(void)
@@ -34,7 +34,7 @@ static inline Bounds bounds_join(Bounds a, Bounds b)
     return (Bounds){vector_min(a.min, b.min), vector_max(a.max, b.max)};
 }
 
-// Returns the intersection, which is empty where the boxes are apart.
+// Returns the intersection, which is empty if the boxes are disjoint.
 static inline Bounds bounds_intersect(Bounds a, Bounds b)
 {
     Bounds both = {vector_max(a.min, b.min), vector_min(a.max, b.max)};

@@ -4,23 +4,23 @@
 
 #include "host/scene/scene.h"
 
-// Degrees: elevation above the horizon, azimuth from north to east.
+// The sun's position in degrees: its elevation above the horizon, and its azimuth from north to east.
 typedef struct {
     double elevation, azimuth;
 } SunPosition;
 
-// The turbidities for which the sky is defined: 2 for very clear air, 10 for haze.
+// The turbidities for which the sky is defined, from very clear air to haze.
 #define TURBIDITY_MIN 2.0
 #define TURBIDITY_MAX 10.0
 
 // Returns the days from 2000-01-01 12:00 UTC to the beginning of a day of the Gregorian calendar.
 double days_from_epoch(int year, int month, int day);
 
-// Returns where the sun appears to be, for degrees of latitude and longitude, which is positive to the east,
-// and days from the epoch.
+// Returns the sun's apparent position for a latitude and a longitude in degrees, the latter positive to the
+// east, at a time in days from the epoch.
 SunPosition sun_position(double latitude, double longitude, double days);
 
-// Returns the color of a directional light that is the sun. It vanishes as the sun sets.
+// Returns the color of the sun as a directional light. The color fades to black as the sun sets.
 Color sun_color(double elevation, double turbidity);
 
 // Returns an image of all directions, with the sun's azimuth in its middle. Below the horizon it shows the

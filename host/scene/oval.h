@@ -4,18 +4,18 @@
 #include "host/scene/affine.h"
 #include "host/scene/scene.h"
 
-// Makes a sphere, disc, cylinder, cone, torus or paraboloid an oval that has the same points.
+// Converts a sphere, disc, cylinder, cone, torus or paraboloid to an oval with the same points.
 void oval_make(Object *object);
 
 // Transforms an oval. Among the maps that give the same points it chooses one that stretches little. Returns
 // true.
 bool oval_transform(Object *object, const Affine *affine);
 
-// Returns whether the axes' lengths and directions leave enough bits of a mapped ray.
+// Returns whether the axes' lengths and directions are moderate enough for a mapped ray to stay accurate.
 bool oval_is_moderate(const Object *object);
 
-// Returns the unit shape around 0 and z, which has the radius 1 where it is widest, and its middle or apex at
-// 0.
+// Returns the unit shape, which lies around the z axis with its middle or apex at 0 and has the radius 1
+// where it is widest.
 Object oval_unit(const Object *oval);
 
 // Returns the map from the unit shape to the oval.

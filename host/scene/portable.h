@@ -1,6 +1,7 @@
-// Functions of a double whose values reach the flat arrays. The C library's own functions differ in the last
-// bit between processors, and on one processor between sets of instructions. Rounded from 113 bits they give
-// the nearest double, except in about one case of 2^59, so that a scene has the same arrays everywhere.
+// Functions of a double whose results do not depend on the processor, so that a scene has the same flat
+// arrays everywhere. The C library's functions for double differ in the last bit between processors, and on
+// one processor between instruction sets. Its functions of 113 bits, rounded to double, give the nearest
+// double in all but about one case of 2^59.
 #pragma once
 
 #include "host/scene/quad.h"
@@ -41,7 +42,8 @@ static inline Vector3 vector_rotated(Vector3 v, Vector3 axis, double angle)
     return vector_add(vector_add(vector_scale(v, cosine), across), along);
 }
 
-// Turns a vector about a unit axis, counterclockwise seen from the axis' tip.
+// Returns a vector turned about a unit axis by an angle in degrees, counterclockwise as seen from the axis'
+// tip.
 static inline Vector3 vector_turned(Vector3 v, Vector3 axis, double degrees)
 {
     return vector_rotated(v, axis, fmod(degrees, 360) * (M_PI / 180));
@@ -52,8 +54,9 @@ static inline double portable_log2(double value)
     return (double)QUAD_CALL(log2)((Quad)value);
 }
 
-// Returns exp(value) within 2^-50, 0 below -700, for values up to 700: a Taylor polynomial of the remainder
-// of ln 2, whose operations have the same result everywhere. It takes a hundredth of the time of a Quad's.
+// Returns exp(value) within 2^-50 for values up to 700, or 0 below -700. Evaluates a Taylor polynomial of the
+// remainder modulo ln 2, whose operations have the same result everywhere, in a hundredth of the time of a
+// Quad's exponential.
 static inline double portable_exponential(double value)
 {
     if (value < -700) return 0;

@@ -69,7 +69,7 @@ static inline Quad quad_absolute(Quad a)
     return a < 0 ? -a : a;
 }
 
-// Returns the sum of |a_i b_i|, to which roundings of a . b are proportional.
+// Returns the sum of |a_i b_i|, to which rounding errors of a . b are proportional.
 static inline Quad quad3_dot_magnitude(Quad3 a, Quad3 b)
 {
     return quad_absolute(a.x * b.x) + quad_absolute(a.y * b.y) + quad_absolute(a.z * b.z);
@@ -87,8 +87,8 @@ static inline Quad quad_maximum(Quad a, Quad b)
 
 // Returns the square root, or 0 where `a` is not positive. With a = near^2 + rest, the root is near + rest /
 // (near + root), and near + root is 2 near + rest / (2 near) to three times the bits of a double. This takes
-// half the time of the C library's function, which handles what is outside the range of a double. A start
-// from a long double would give different last bits on different processors.
+// half the time of the C library's function, which handles values outside the range of a double. A start from
+// a long double would give different last bits on different processors.
 static inline Quad quad_root(Quad a)
 {
     if (!(a > 0)) return 0;
@@ -110,7 +110,7 @@ static inline Quad3 quad3_unit(Quad3 a)
     return length > 0 ? quad3_scale(a, 1 / length) : a;
 }
 
-// Returns the world axis least aligned with `a`, the first of equals.
+// Returns the world axis least aligned with `a`, or the first if several are.
 static inline Quad3 quad3_least_axis(Quad3 a)
 {
     Quad x = quad_absolute(a.x), y = quad_absolute(a.y), z = quad_absolute(a.z);

@@ -13,7 +13,7 @@ typedef struct {
     double x, y, z;
 } Vector3;
 
-// Returns the vector of three numbers in a row, such as a pixel's in a film.
+// Returns the vector of three consecutive numbers, such as a pixel of a film.
 static inline Vector3 vector_from(const double parts[3])
 {
     return (Vector3){parts[0], parts[1], parts[2]};
@@ -45,7 +45,7 @@ static inline Vector3 vector_multiply(Vector3 a, Vector3 b)
     return (Vector3){a.x * b.x, a.y * b.y, a.z * b.z};
 }
 
-// Return the lesser, or the greater, of each component.
+// Return the lesser or the greater of each component.
 static inline Vector3 vector_min(Vector3 a, Vector3 b)
 {
     return (Vector3){b.x < a.x ? b.x : a.x, b.y < a.y ? b.y : a.y, b.z < a.z ? b.z : a.z};
@@ -67,7 +67,7 @@ static inline double vector_mean(Vector3 a)
     return (a.x + a.y + a.z) / 3;
 }
 
-// Returns whether no component's magnitude exceeds `largest`; false for NaN.
+// Returns whether no component is NaN or has a magnitude above `largest`.
 static inline bool vector_is_within(Vector3 a, double largest)
 {
     return fabs(a.x) <= largest && fabs(a.y) <= largest && fabs(a.z) <= largest;
@@ -89,8 +89,8 @@ static inline Vector3 triangle_normal(Vector3 a, Vector3 b, Vector3 c)
     return vector_cross(vector_subtract(b, a), vector_subtract(c, a));
 }
 
-// Returns `a` divided by 2^exponent, the least power of two above its largest component; 0 for the zero
-// vector.
+// Returns `a` divided by 2^exponent, the least power of two above its largest component. Returns the zero
+// vector unchanged.
 static inline Vector3 vector_scaled_down(Vector3 a, int *exponent)
 {
     frexp(vector_largest(a), exponent);
@@ -132,7 +132,7 @@ static inline bool vectors_equal(Vector3 a, Vector3 b)
     return a.x == b.x && a.y == b.y && a.z == b.z;
 }
 
-// Returns the world axis least aligned with a direction, the first of x, y, z where several are.
+// Returns the world axis least aligned with a direction, or the first of x, y and z if several are.
 static inline Vector3 vector_least_aligned_axis(Vector3 direction)
 {
     double x = fabs(direction.x), y = fabs(direction.y), z = fabs(direction.z);
