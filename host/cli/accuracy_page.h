@@ -1,5 +1,5 @@
-// Collects the data that the HTML report of glint accuracy needs in addition to its JSON: the variants'
-// names, the images and their differences.
+// Collects the data that the HTML report of glint accuracy needs in addition to its JSON, which are the
+// variants' names, the images and their differences.
 #pragma once
 
 #include "host/base/json.h"

@@ -14,7 +14,7 @@ typedef struct {
 } AgainstOptions;
 
 // Compares each variant's frame time with the other program's, and prints the report. `device` must be the
-// one that both programs choose. Returns the exit status.
+// device that both programs choose. Returns the exit status.
 int bench_against(const AgainstOptions *options, VariantSet *set, const Device *device);
 
 // Runs a worker: for each line of standard input, runs every variant once and prints the seconds of its

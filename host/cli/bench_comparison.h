@@ -8,8 +8,8 @@
 // The comparison of a row, or the reason why there is none.
 typedef struct {
     Comparison frame;     // compares frame times
-    Comparison processor; // compares the processes' processor times
-    bool has_processor;   // true for two reports with a CPU device
+    Comparison processor; // compares the processes' CPU times
+    bool has_processor;   // whether both reports have a CPU device
     Verdict verdict;      // follows from both
     const char *why_not;  // NULL if there are comparisons
 } RowComparison;
@@ -19,8 +19,8 @@ typedef struct {
     ReportTimes wall, processor;
 } RowTimes;
 
-// Compares a row of two reports, one of `row_count` that are compared. `is_cpu` tells whether the device is a
-// CPU, in which case the process's CPU time is also compared.
+// Compares a row of two reports. `row_count` rows are compared in total. `is_cpu` tells whether the device is
+// a CPU, in which case the process's CPU time is also compared.
 RowComparison row_compare(const RowTimes *newer, const RowTimes *older, bool is_cpu, size_t row_count,
                           double tolerance);
 

@@ -11,7 +11,7 @@ typedef struct {
     const Device *device;
     const VariantSet *set;
     bool lists_launches;
-    const RowComparison *comparisons; // of the rows with the baseline, or NULL
+    const RowComparison *comparisons; // of the rows with those of the baseline, or NULL
 } BenchReport;
 
 void bench_print_text(const BenchReport *report, FILE *stream);

@@ -7,14 +7,14 @@
 
 typedef struct {
     const Scene *scene;
-    size_t choice; // the number of its --variant, from 0
+    size_t choice; // the index of its --variant
     RenderSettings settings;
-    // Options of --variant for the driver: NULL and 0 if not given.
+    // The driver options of --variant, which are NULL and 0 if not given.
     const char *build_options;
     uint32_t work_group[2];
     Compute *compute; // the command's
-    // With such options: copies of the device and of `compute` that have them and share the context and
-    // queue. Build options also have separate passports.
+    // If the variant has driver options, copies of the device and of `compute` that have these options and
+    // share the context and queue. If it has build options, the device also has separate passports.
     Device private_device;
     Compute private_compute;
     Renderer *renderer; // NULL if it is not open or not available on the device
@@ -28,9 +28,9 @@ void variant_open(Compute *shared, Variant *variant, BenchRow *row, bool timing_
 // Runs the variant once and adds its times to `times`, or discards them if it is NULL, for warm-ups. Returns
 // false if the render failed or the user interrupted.
 bool variant_run(Variant *variant, BenchTimes *times);
-// Renders frames for a second or more, from about one step of the counter to another, and stores the mean
-// energy of one in the row: idle readings are about a 21st of the time, and each end is off by at most the
-// frames between two readings. Returns false if a render failed or the user interrupted.
+// Renders frames for a second or more, from about one step of the energy counter to another, and stores the
+// mean energy of a frame in the row. About a 21st of the time is spent on idle readings, and each end is off
+// by at most the frames between two readings. Returns false if a render failed or the user interrupted.
 bool variant_run_energy(Variant *variant, EnergyMeter *meter, BenchRow *row);
-// Closes the variant and sets it to zeros. Accepts a variant of zeros.
+// Closes the variant and zeroes it. Accepts a zeroed variant.
 void variant_close(Variant *variant);

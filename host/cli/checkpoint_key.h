@@ -1,4 +1,4 @@
-// Collects everything that the bits of an image depend on as the key of its checkpoint.
+// Composes the key of a checkpoint, which holds everything that the bits of its image depend on.
 #pragma once
 
 #include "host/base/text.h"

@@ -20,8 +20,8 @@ enum { RESULT_NAMES_MAX = 8, RESULT_VALUES_MAX = 16 };
 // Describes a command's results as rows.
 typedef struct {
     const char *command;
-    // The array of rows, or one array in each object of another, such as "scenes.variants". With "" the
-    // document is the only row.
+    // The path of the array of rows, such as "scenes.variants" for one array in each object of another. If it
+    // is "", the document is the only row.
     const char *rows;
     // The columns that name a row, and the others, up to NULL, as "path" or "heading=path". The path names a
     // member, with dots between members, such as "frame_ms.median". It is looked up in the row, then in the
@@ -30,7 +30,7 @@ typedef struct {
     // The paths of verdicts, up to NULL, and the value with which a row has failed: "true", "false" or a
     // text. The first verdict that the row has counts.
     const char *verdicts[2], *failed;
-    // The paths of times in milliseconds, one per row or one per run, for FORMAT_BENCHMARK. NULL if the
+    // The paths of times in milliseconds for FORMAT_BENCHMARK, one per row or one per run, or NULL if the
     // command measures none.
     const char *times, *processor_times;
     const char *seconds; // the path of the seconds that the row took, for FORMAT_JUNIT, or NULL

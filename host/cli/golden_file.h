@@ -8,7 +8,7 @@
 enum { TILE_COLUMNS = 12, TILE_ROWS = 8, TILES = TILE_COLUMNS * TILE_ROWS };
 enum { HASHED_COUNT = 6 };
 
-// The hashed layers in the order in which an image is computed, since the first that differs explains the
+// The hashed layers in the order in which an image is computed. The first layer that differs explains the
 // others.
 extern const Layer hashed_layers[HASHED_COUNT];
 
@@ -21,7 +21,7 @@ typedef struct {
 
 typedef struct {
     ARRAY_OF(GoldenLine);
-    Text comments; // the user's
+    Text comments; // written by the user
 } GoldenFile;
 
 // Reads a file into a zeroed GoldenFile. Returns false with messages if it cannot be read or a line is

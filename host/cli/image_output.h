@@ -6,8 +6,7 @@
 
 typedef struct ImageOutput ImageOutput;
 
-// Opens the output. Its files are opened with the first band, and their notes name the devices of all
-// renderers.
+// Opens the output. The first band opens its files, whose notes name the devices of all renderers.
 ImageOutput *image_output_open(const ImageOutputOptions *options, const ImageOrigin *origin);
 // Encodes a copy of the band while the caller continues, unless options.synchronous. The messages belong to
 // the output until it is committed or abandoned. Returns false if this band or an earlier one could not be
@@ -17,12 +16,12 @@ bool image_output_write(ImageOutput *output, const Film *band, MessageList *mess
 double image_output_bytes(const ImageOutput *output);
 // Returns the counts of all bands so far at `certified`.
 RerenderCounts image_output_rerenders(const ImageOutput *output);
-// Puts all files in place and frees the output. Returns false with a message if a file could not be put in
-// place. Sets *seconds to the time spent on encoding and writing, even if other work ran at the same time.
+// Moves all files into place and frees the output. Returns false with a message if a file could not be moved.
+// Sets *seconds to the time spent on encoding and writing, even if other work ran at the same time.
 bool image_output_commit(ImageOutput *output, MessageList *messages, double *seconds);
 void image_output_abandon(ImageOutput *output);
 
-// Writes PREFIX.color.npy, PREFIX.t.npy and so on, each layer of the film in the precision it was computed
-// in. Without lights there is no PREFIX.shadow.npy. Returns false with a message if a file could not be
+// Writes PREFIX.color.npy, PREFIX.t.npy and so on, each layer of the film in the precision in which it was
+// computed. Without lights there is no PREFIX.shadow.npy. Returns false with a message if a file could not be
 // written.
 bool film_save(const Film *film, const char *prefix, MessageList *messages);

@@ -1,4 +1,4 @@
-// Handles the signals by which the user interrupts a command: SIGINT, SIGTERM and SIGHUP.
+// Handles SIGINT, SIGTERM and SIGHUP, the signals by which the user interrupts a command.
 #pragma once
 
 #include <stdbool.h>
@@ -20,5 +20,5 @@ void interrupts_release(void);
 void interrupts_set_source(bool (*source)(void *context), void *context);
 
 bool is_interrupted(void);
-// Returns is_interrupted(). A renderer's `stop` function, which ignores its context.
+// A renderer's `stop` function. Returns is_interrupted() and ignores the context.
 bool interrupts_stop(void *context);

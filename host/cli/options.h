@@ -9,13 +9,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// The options that several commands share, of which each command offers some. They come first in the struct
-// of every command that offers any.
+// The options that several commands share, of which each command offers some. They are the first member of
+// the struct of every command that offers any.
 typedef struct {
     const char *device, *reference_device;
     Precision precision;
-    bool has_precision;  // whether --precision is given
-    unsigned precisions; // a set, in commands that measure several
+    bool has_precision;  // whether --precision was given
+    unsigned precisions; // a set for commands that measure several
     uint32_t lanes;      // 0 for the device's default
     BvhChoice bvh;
     bool no_cache, lenient;
@@ -31,7 +31,7 @@ typedef struct {
     OptionTexts overrides;                // --set, in order
     const char *camera;                   // the scene of --camera, NULL if not given
     double frame;                         // of an animated scene
-    Stage *stage;                         // records what takes time; may be NULL
+    Stage *stage;                         // records long operations; may be NULL
     ReportOptions report;
 } CommonOptions;
 
@@ -86,8 +86,9 @@ void messages_print_once(MessageList *messages, MessageList *printed, const char
 // Prints and frees messages. Errors in an .rt file follow the line `Error` that miniRT's testers expect.
 void messages_print(MessageList *messages, const char *path);
 
-// Returns settings for a full image with the common options: one sample, the scene not shifted to the eye.
+// Returns settings for a full image with the common options and one sample. The scene is not shifted to the
+// eye.
 RenderSettings settings_whole(const CommonOptions *common, uint32_t width, uint32_t height);
-// Returns settings for a full image of the scene, which chooses the size that the options leave open: one
-// sample, the scene shifted to the eye, stopped when the user interrupts.
+// Returns settings for a full image of the scene with one sample. The scene chooses a size that the options
+// leave open, and is shifted to the eye. The render stops when the user interrupts.
 RenderSettings settings_of_scene(const CommonOptions *common, const Scene *scene);

@@ -5,7 +5,7 @@
 #include "host/base/json.h"
 #include "host/base/text.h"
 
-// Appends a template, a file of host/cli/page/, with its placeholders filled: {{report}} and {{extras}} with
-// that JSON, any other with the file of host/cli/page/ that it names. `extras` is data that only the page
-// needs, or NULL if the template does not name it. Frees both.
+// Appends a template, which is a file of host/cli/page/, and fills its placeholders. {{report}} and
+// {{extras}} become that JSON, and any other placeholder becomes the file of host/cli/page/ that it names.
+// `extras` is data that only the page needs, or NULL if the template does not name it. Frees both JSON texts.
 void page_append(Text *page, const char *template, Json *report, Json *extras);

@@ -7,7 +7,7 @@
 
 void passports_json(Json *json, const Device *device);          // adds the array "passports"
 void passports_refusals_json(Json *json, const Device *device); // adds the array "refused"
-// Prints each property of the device's arithmetic, or nothing if no passport is known.
+// Prints every property of the device's arithmetic, or nothing if no passport is known.
 void passports_print(const Device *device);
 // Prints the properties that are not sound.
 void passports_remark(const Device *device, FILE *stream);

@@ -10,15 +10,15 @@ typedef struct {
     char step[96];
 } Progress;
 
-// Opens the progress and makes signals set a flag (interrupts_flag).
+// Opens the progress and calls interrupts_flag.
 void progress_open(Progress *progress, bool quiet);
-// Returns the remaining time, extrapolated from the fraction that is done (above 0, at most 1), or a negative
-// number if it is not known yet. The first second does not count, since it may contain a kernel's build or a
-// checkpoint's bands.
+// Returns the remaining time, or a negative number if it is not known yet. Extrapolates it from the fraction
+// that is done, which is above 0 and at most 1. The first second does not count, since it may contain a
+// kernel's build or a checkpoint's bands.
 double progress_seconds_left(Progress *progress, double fraction_done);
 void progress_show(Progress *progress, double fraction_done);
 // Shows the progress with the name of the next step, such as "building row 2 of 8".
 void progress_step(Progress *progress, double fraction_done, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
-// Erases the line. Signals still only set the flag.
+// Erases the progress. Signals still only set the flag.
 void progress_close(Progress *progress);

@@ -19,15 +19,14 @@ static inline void rank_set_device(Rank *rank, const Device *device)
     snprintf(rank->driver, sizeof rank->driver, "%s, %s", device->platform_name, device->driver);
 }
 
-// The ranks. `begin` is called before the functions of `remote`, and `start` before its last.
+// The ranks. `begin` must be called before the functions of `remote`, and `start` before the last of them.
 typedef struct Ranks {
     RemoteWorkers remote; // excludes the first rank, which is this process
     Rank *items;          // one per remote worker
-    FilmHeader film;      // describes the image once it is rendered
-    // Asks all ranks for their devices. Returns false with a message if one of them has none; all ranks then
-    // stop.
+    FilmHeader film;      // describes the image after it is rendered
+    // Asks all ranks for their devices. Returns false with a message if a rank has none. All ranks then stop.
     bool (*begin)(struct Ranks *ranks, const RenderSettings *settings, unsigned aovs,
                   const char *device_selector, MessageList *messages);
-    // Starts serving the ranks if they `can_start`, else ends their job.
+    // Starts serving the ranks if `can_start` is set, otherwise ends their job.
     void (*start)(bool can_start);
 } Ranks;

@@ -12,12 +12,12 @@ typedef struct {
     int status;         // of the images so far
 } RenderCommand;
 
-// Reads the command line. Returns NULL if help was requested or a mistake was printed; *status is then the
-// exit status.
+// Reads the command line. Returns NULL and sets *status to the exit status if help was requested or a mistake
+// was printed.
 RenderCommand *render_command_open(int argument_count, char **arguments, int *status);
 
 // Returns false with a message, before anything is rendered, if an image would overwrite a file that one of
-// several scenes is read from. Reads those scenes whose image exists.
+// several scenes is read from. Reads only the scenes whose image exists.
 bool render_command_check_overwrites(RenderCommand *command);
 const char *render_command_scene(const RenderCommand *command, size_t index);
 
@@ -25,8 +25,8 @@ const char *render_command_scene(const RenderCommand *command, size_t index);
 int render_command_run(RenderCommand *command, size_t index, Ranks *ranks);
 // Merges a scene's status into the command's.
 void render_command_record(RenderCommand *command, int status);
-// Renders the scenes from `first` on until the command ends, and merges their statuses. This must be the
-// command's last call before the ones below.
+// Renders the scenes from `first` on until the command ends, and merges their statuses. Only the functions
+// below may be called afterwards.
 void render_command_run_from(RenderCommand *command, size_t first, Ranks *ranks);
 
 // Warns of each failed device whose share the others rendered, which is not a failure of the command.

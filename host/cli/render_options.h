@@ -10,13 +10,13 @@ typedef struct {
     CommonOptions common;
     CommandOperands scenes;
     const char *scene;         // the current scene
-    const char *checkpoint;    // with several frames, their pattern
-    ImageOutputOptions output; // with several scenes, its path is their folder; of frames, their pattern
+    const char *checkpoint;    // the file, or a pattern for several frames
+    ImageOutputOptions output; // the path is a folder for several scenes, and a pattern for several frames
     uint32_t sample_count;
     uint32_t region[4];                // x, y, width, height
     uint32_t first_frame, frame_count; // of an animation; a count of 0 if not given
     bool has_all_frames, has_region, has_transfer, has_format, quiet, skips_existing;
-    bool has_several;   // scenes, or frames
+    bool has_several;   // whether there are several scenes or frames
     ErrorBudget budget; // a limit of 0 means none
     TimingStyle timing;
 } RenderOptions;
@@ -24,9 +24,9 @@ typedef struct {
 // Returns OPTIONS_READ, or the exit status if help was requested or a usage fault was printed.
 int render_options_read(RenderOptions *options, int argument_count, char **arguments);
 
-// The place of the frame's number in a pattern of names, %d, or %0Nd for at least N digits.
+// The place of the frame's number in a pattern of names, which is %d, or %0Nd for at least N digits.
 typedef struct {
-    const char *start, *end; // of the directive; NULL if there is none
+    const char *start, *end; // of the directive, or NULL if there is none
     int digits;
 } FramePlace;
 

@@ -6,8 +6,8 @@
 #include "host/opencl/device.h"
 #include "host/render/renderer.h"
 
-// Opens a report, whose first members are the version of its schema, that of glint and, unless `device` is
-// NULL, the device.
+// Opens a report. Its first members are the versions of its schema and of glint and, unless `device` is NULL,
+// the device.
 Json *report_json_open(int schema, const Device *device);
 void text_json(Json *json, const char *key, Text text);          // frees the text
 void summary_json(Json *json, const char *key, Summary seconds); // in milliseconds
@@ -16,7 +16,7 @@ void unavailable_json(Json *json, const char *reason);
 // Adds an object with the reason for a missing value.
 void missing_json(Json *json, const char *key, const char *reason);
 void figure_json(Json *json, const char *key, double scale, Figure figure);
-// Adds board, place on the PCI bus and UUID, each null if unknown.
+// Adds the board, the place on the PCI bus and the UUID, each of which is null if unknown.
 void device_identity_json(Json *json, const Device *device);
 void counts_json(Json *json, const char *key, const size_t *counts, size_t count);
 void numbers_json(Json *json, const char *key, const double *numbers, size_t count);

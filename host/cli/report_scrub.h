@@ -16,7 +16,7 @@ typedef struct {
     size_t count;
 } Scrubber;
 
-// Finds the words: the folder and the home folders, and the names of the user and the host.
+// Finds the words, which are the folder, the home folders, and the names of the user and the host.
 Scrubber scrubber_open(const char *folder);
 void scrubber_close(Scrubber *scrubber);
 // Returns the text with these words replaced, and with PATH instead of every other absolute path. The name of

@@ -1,6 +1,6 @@
-// The shutter of a frame: while it is open, samples show the scene at several times, whose colors accumulate
-// to motion blur (Haeberli, Akeley, The accumulation buffer: hardware support for high-quality rendering,
-// Computer Graphics 24(4), 1990).
+// The shutter of a frame. While it is open, samples show the scene at several times, and their colors
+// accumulate to motion blur (Haeberli, Akeley, The accumulation buffer: hardware support for high-quality
+// rendering, Computer Graphics 24(4), 1990).
 #pragma once
 
 #include "host/cli/progress.h"
@@ -11,19 +11,19 @@ typedef struct {
     double frame, duration;    // in frames
     uint32_t sample_count;     // of a pixel
     uint32_t time, time_count; // a count of 1 means that nothing accumulates
-    double *sums;              // of the region's colors over the earlier times, divided by sample_count
+    double *sums;              // the region's colors of the earlier times, summed and divided by sample_count
     RerenderCounts rerenders;  // of the earlier times
     Progress progress;         // over all times
     bool is_estimated;         // whether the render's time was estimated
 } Shutter;
 
-// Opens the shutter at its first time. `scene` is that of the frame.
+// Opens the shutter at its first time. `scene` is the scene at the frame.
 Shutter shutter_open(const Scene *scene, uint32_t sample_count);
 void shutter_close(Shutter *shutter);
 
-// Returns the time of the scene, in frames: the middle of its samples' part of the duration.
+// Returns the time of the scene in frames, which is the middle of its samples' share of the duration.
 double shutter_frame(const Shutter *shutter);
-// Returns whether the time is the last that is rendered, which is the one in the middle.
+// Returns whether the time is the last to be rendered, which is the middle one.
 bool shutter_is_last(const Shutter *shutter);
 // Sets which of the samples show the scene at this time.
 void shutter_choose_samples(Shutter *shutter, RenderSettings *settings);

@@ -1,4 +1,4 @@
-// Compares reports of glint bench, from several devices, versions or days, row by row.
+// Compares reports of glint bench from several devices, versions or days, row by row.
 #pragma once
 
 #include "host/base/json.h"
@@ -12,8 +12,8 @@ typedef struct {
     const char *path;
     Baseline *baseline;
     const char *why_not;                 // why none of its rows has a verdict, or NULL
-    double mean_ratio;                   // geometric, of frame times
-    size_t ratio_count;                  // of rows that both have
+    double mean_ratio;                   // the geometric mean of the ratios of frame times
+    size_t ratio_count;                  // how many rows both have
     size_t verdicts[VERDICT_FASTER + 1]; // rows by verdict
 } SideReport;
 

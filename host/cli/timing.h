@@ -14,9 +14,9 @@ static inline bool timing_uses_stdout(TimingStyle style)
 
 typedef struct {
     double frame;    // NAN without --frames
-    bool is_several; // a JSON report is one line of several
+    bool is_several; // whether the JSON report is one line of several
     double parse_seconds, encode_seconds;
-    const Pilot *pilot;       // chose the precision, or NULL
+    const Pilot *pilot;       // the pilot that chose the precision, or NULL
     double render_seconds;    // from the first band to the last, builds included
     RerenderCounts rerenders; // only at `certified`
     Stage *stage;             // keeps its spans; NULL unless they are wanted

@@ -11,7 +11,7 @@ enum { SAMPLE_CHOICES_MAX = 16 };
 
 typedef struct {
     CommonOptions common;
-    unsigned lanes, bvhs; // sets; empty lanes mean the device's default
+    unsigned lanes, bvhs; // sets, where empty lanes mean the device's default
     uint32_t samples[SAMPLE_CHOICES_MAX];
     size_t sample_choices; // 0 for one sample
     double seconds;        // 0 for the default
@@ -57,7 +57,7 @@ void variant_set_fit_lanes(VariantSet *set, const Device *device);
 bool variant_set_start(VariantSet *set, Compute *compute, bool timing_builds, Progress *progress);
 // Runs every variant once. Returns false if the user interrupted or the device failed.
 bool variant_set_round(VariantSet *set, bool warm_up);
-// The fractions of a row's work that are done once it is open, and once it is measured.
+// The fractions of a row's work that are done after it is opened, and after it is measured.
 extern const double variants_opened_fraction, variants_measured_fraction;
 // Measures the variants interleaved (A B C A B C …), so that drift affects all alike, until the times
 // converge or a share of options->seconds passes. If `is_benchmark`, also times the builds unless
@@ -66,10 +66,10 @@ extern const double variants_opened_fraction, variants_measured_fraction;
 bool variant_set_measure(VariantSet *set, const VariantOptions *options, Compute *compute, bool is_benchmark,
                          Progress *progress);
 bool variant_set_any_measured(const VariantSet *set);
-// Returns the row with which a variant is compared: the row of the same scene and the first --variant that
-// has most of precision, lanes, BVH and samples in common, the earliest of several.
+// Returns the row with which a variant is compared. Among the rows of the same scene and the first --variant,
+// it is the earliest that has most of precision, lanes, BVH and samples in common.
 size_t variant_set_first(const VariantSet *set, size_t row);
-// Returns the share that is done if rows are opened, measured and compared one set after another: all rows
-// before those of the set, and the fraction of the set's rows.
+// Returns the fraction of all rows that is done if one set after another is opened, measured and compared. It
+// counts the rows before those of the set, and the fraction of the set's rows.
 double variant_set_fraction(const VariantSet *set, double fraction_done);
 void variant_set_close(VariantSet *set);

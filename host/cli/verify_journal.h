@@ -11,7 +11,7 @@ typedef enum { CASE_PENDING, CASE_RUNNING, CASE_DONE, CASE_CRASHED } CaseState;
 typedef struct {
     CaseState state;
     bool is_printed;
-    VerifyResult result; // for a crashed case, only the name and the title
+    VerifyResult result; // only the name and the title if the case crashed
     double start_seconds, seconds;
     char crash[CRASH_TEXT_SIZE]; // what happened
 } CaseRecord;
@@ -37,6 +37,6 @@ void child_end_with(pid_t parent);
 // Returns a zeroed journal, which lives until the process ends.
 VerifyJournal *verify_journal_open(void);
 // Calls `work` in a child process. If the child ends while a case is running, records the case as crashed and
-// calls `work` in another child, which continues with the pending cases. Returns in the last child the exit
-// status of `work`, in the parent the child's. No OpenCL call may have been made before.
+// calls `work` in another child, which continues with the pending cases. Returns the exit status of `work` in
+// the last child, and that child's exit status in the parent. No OpenCL call may have been made before.
 int verify_journal_work(VerifyJournal *journal, int (*work)(void *context), void *context);

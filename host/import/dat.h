@@ -18,13 +18,13 @@ typedef struct {
     bool has_resolution, has_camera;
     bool dims_clear; // opacity dims what a transparent surface shows, as in VMD
     ARRAY_OF(DatTexture) textures;
-    uint32_t *slots; // of a hash table: 1 + index of a texture; 0: free
+    uint32_t *slots; // of a hash table, each 1 + index of a texture, or 0 if free
     size_t slot_count;
 } DatReader;
 
 // Skips the next word if it is the keyword, and returns whether it is.
 bool dat_skip(DatReader *reader, const char *keyword);
-// Adds a warning once, however often the source repeats its cause.
+// Adds a warning once, regardless of how often the source repeats its cause.
 void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
@@ -32,7 +32,7 @@ void dat_warn(DatReader *reader, size_t offset, const char *format, ...)
 // missing.
 bool dat_expect(DatReader *reader, const char *keyword);
 bool dat_number(DatReader *reader, const char *keyword, double *value);
-// Reads a vector. Tachyon's coordinates are left-handed: z is negated.
+// Reads a vector and negates its z, since Tachyon's coordinates are left-handed.
 bool dat_vector(DatReader *reader, const char *keyword, Vector3 *vector);
 // Reads a vector without a keyword; `name` is for errors.
 bool dat_coordinates(DatReader *reader, const char *name, Vector3 *vector);

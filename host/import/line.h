@@ -6,9 +6,9 @@
 
 typedef struct {
     Report *report;
-    size_t start, at, end; // of the line; read position; its end or comment
+    size_t start, at, end; // the line's start, the read position, and the line's end or comment
     size_t next;           // start of the next line
-    char comment;          // that starts a comment, or '\0'
+    char comment;          // the character that starts a comment, or '\0'
     bool joins_blanks;     // vectors may have blanks next to their commas
 } Line;
 
@@ -29,10 +29,11 @@ bool line_reach_word(Line *line);
 
 // Moves to the next word of the line, or to its end, and returns the offset there.
 size_t line_skip_blanks(Line *line);
-// Returns the next word, empty at the end of the line. Words are separated by spaces and tabs.
+// Returns the next word, which is empty at the end of the line. Words are separated by spaces and tabs.
 Word line_peek(const Line *line);
 Word line_peek_vector(const Line *line); // as line_comma_vector reads it
-// Return the next word of this or a later line, empty at the end of the source. free_peek leaves it unread.
+// Return the next word of this line or a later one, which is empty at the end of the source. free_peek leaves
+// the word unread.
 Word free_peek(Line *line);
 Word free_word(Line *line);
 Word line_word(Line *line);
@@ -41,8 +42,8 @@ bool word_is_in_any_case(Word word, const char *text);
 bool words_equal(Word a, Word b);
 bool word_is_number(Word word); // accepts numbers that are out of range
 
-// Reads a value that messages call `name`, whose numbers lie in the range; NULL allows any. Reports an error
-// and returns false if it is missing or invalid.
+// Reads a value that messages call `name`. Its numbers must lie in the range, unless that is NULL. Reports an
+// error and returns false if it is missing or invalid.
 typedef bool LineReader(Line *line, const char *name, const Range *range, void *value);
 
 // A value and the member of a struct that holds it.

@@ -1,4 +1,4 @@
-// Reads scene files; the name's ending chooses the reader.
+// Reads scene files. The ending of the file's name chooses the reader.
 #pragma once
 
 #include "host/base/stage.h"
@@ -6,21 +6,21 @@
 #include "host/scene/scene.h"
 
 typedef struct {
-    bool lenient; // skip unknown elements of .rt with a warning
-    // Values that replace those of a YAML scene or are added to it, in order: PATH=VALUE, such as
-    // camera.fov=60.
+    bool lenient; // skips unknown elements of .rt with a warning
+    // Values that replace those of a YAML scene or are added to it, in this order. Each is PATH=VALUE, such
+    // as camera.fov=60.
     const char *const *overrides;
     size_t override_count;
     const char *override_name; // names their source in messages
     double frame;              // of an animated YAML scene
     uint32_t max_pixels;       // of each image; 0 for the default
-    const char *camera;        // the path of another scene, whose camera replaces the scene's; NULL: none
-    // Called with each mesh, image and scene that the file names, before it is read; NULL: not wanted.
+    const char *camera;        // the path of a scene whose camera replaces the scene's, or NULL
+    // Called with each mesh, image and scene that the file names before it is read, unless it is NULL.
     void (*file_named)(void *context, const char *path);
     void *context;
-    Stage *stage; // shows what is being read; NULL: not wanted
-    // The program that assimp_process_main serves, searched in PATH. It reads the formats of assimp. NULL:
-    // this process's program.
+    Stage *stage; // shows what is being read, or NULL
+    // The program that reads assimp's formats by assimp_process_main. It is searched in PATH. NULL means this
+    // process's program.
     const char *mesh_program;
 } SceneOptions;
 
@@ -52,6 +52,6 @@ bool scene_read_mesh(Scene *scene, const char *path, const SceneOptions *options
 // Makes a scene of a gray mesh, a camera that frames it and two lights. Takes ownership of the mesh.
 void scene_of_mesh(Scene *scene, Mesh *mesh);
 
-// Decodes the images of a scene without errors, closes its reader's report, warns of causes of a black
-// image, and frees the scene if there are errors.
+// Decodes the images of a scene unless there are errors, closes its reader's report and warns of causes of a
+// black image. Returns false and frees the scene if there are errors.
 bool scene_finish(Scene *scene, Report *report, const SceneOptions *options);

@@ -4,8 +4,8 @@
 #include "host/import/report.h"
 #include <stddef.h>
 
-// Larger magnitudes are rejected and smaller ones read as 0, so that no product of a few numbers overflows or
-// underflows a double.
+// Larger magnitudes are rejected and smaller ones are read as 0, so that no product of a few numbers
+// overflows or underflows a double.
 #define NUMBER_MAX 1e30
 #define NUMBER_MIN 1e-30
 
@@ -24,7 +24,7 @@ typedef struct {
 
 // Returns the number of the word's bytes that a message shows.
 int word_shown(Word word);
-// The word in a message, for printf's %.*s.
+// The arguments of printf's %.*s that show the word in a message.
 #define WORD_TEXT(word) word_shown(word), (word).text
 
 typedef struct {

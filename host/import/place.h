@@ -9,9 +9,9 @@ typedef ARRAY_OF(size_t) Offsets; // ascending
 
 typedef struct {
     Offsets line_starts;
-    Offsets file_starts, file_lines; // and the index of each file's first line
+    Offsets file_starts, file_lines; // the start of each file, and the index of its first line
     size_t end;                      // past the last file
-    size_t object_count;             // of the objects that have their lines
+    size_t object_count;             // of the objects whose lines are stored
 } Places;
 
 // Finds the lines of a source and of the sources after it, up to `end`, which may be NULL.

@@ -1,11 +1,12 @@
-// Caches compiled programs on disk, in $XDG_CACHE_HOME/glint, else $HOME/.cache/glint. A path that is not
-// absolute is ignored, as the XDG Base Directory Specification requires (0.8, "Basics"); without either
-// there is no cache. An entry is named by the hash of its key and contains the whole key, so that keys are
-// never confused. Many processes can use the cache, because entries are written to a temporary and renamed.
-// Entries are machine code. The folder and its files are used only if they belong to the user and nobody
-// else may access them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a file of
-// the folder). No function fails because of an entry. An untrusted entry counts as absent, with one warning
-// per receiver, and is replaced if the folder can be trusted. An entry that cannot be written is discarded.
+// Caches compiled programs on disk in $XDG_CACHE_HOME/glint or, without that variable, in $HOME/.cache/glint.
+// A path that is not absolute is ignored, as the XDG Base Directory Specification requires (0.8, "Basics");
+// without either there is no cache. An entry is named by the hash of its key and contains the whole key, so
+// that keys are never confused. Many processes can use the cache, because entries are written to a temporary
+// and renamed. Entries are machine code. The folder and its files are used only if they belong to the user
+// and nobody else may access them, and an entry only if its keyed hash is right (BLAKE2b; the hash's key is a
+// file of the folder). No function fails because of an entry. An untrusted entry counts as absent, with one
+// warning per receiver, and is replaced if the folder can be trusted. An entry that cannot be written is
+// discarded.
 #pragma once
 
 #include "host/base/text.h"
@@ -13,8 +14,8 @@
 #include <stdint.h>
 #include <time.h>
 
-// Loads the key's entry into `binary`, which must be empty. Returns false if no trusted entry exists. Here
-// and below `warnings` may be NULL.
+// Loads the key's entry into `binary`, which must be empty. Returns false if no trusted entry exists.
+// `warnings` may be NULL in all functions.
 bool cache_load(const char *key, Text *binary, WarningReceiver *warnings);
 // Replaces the key's entry, and trims the cache to CACHE_BYTES_MAX. An entry above CACHE_ENTRY_BYTES_MAX is
 // discarded.
@@ -26,8 +27,8 @@ void cache_trim(uint64_t bytes_max, WarningReceiver *warnings);
 
 typedef struct {
     char *name;        // of the file
-    char *device;      // from the entry's key; NULL with a fault, or if another version of glint wrote it
-    const char *fault; // why the entry is not trusted; NULL: it is
+    char *device;      // from the entry's key, or NULL with a fault or if another version of glint wrote it
+    const char *fault; // why the entry is not trusted, or NULL if it is
     uint64_t size;
     struct timespec used;
 } CacheEntry;

@@ -3,7 +3,7 @@
 
 #include "host/opencl/compute.h"
 
-// A launch as it is requested, before it is fitted to the device.
+// A launch as the caller requests it, before it is fitted to the device.
 typedef struct {
     cl_kernel kernel;
     const ProgramRequest *request; // of the kernel's program

@@ -5,7 +5,7 @@
 #include "host/base/embedded.h"
 #include "host/opencl/compute.h"
 
-// The files of kernels/: "render.cl", "sphere.h", …; ended by a NULL name.
+// The files of kernels/, such as "render.cl" and "sphere.h". A NULL name ends the list.
 extern const EmbeddedFile kernel_files[];
 
 // Returns `prelude`, then `root` with each quoted include expanded the first time and replaced by an empty

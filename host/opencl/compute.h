@@ -13,10 +13,10 @@
 #include "host/opencl/device.h"
 
 typedef struct {
-    char call[40];   // the OpenCL function, or the host's work; empty: none failed
-    cl_int status;   // CL_SUCCESS: the call nevertheless returned NULL, unless is_of_host
-    bool is_of_host; // no call failed, and the detail names the failure
-    char *detail;    // more about the failure, such as a build log; NULL: nothing
+    char call[40];   // the OpenCL function or the host's work, empty if nothing failed
+    cl_int status;   // CL_SUCCESS means that the call returned NULL, unless is_of_host
+    bool is_of_host; // whether the host's work failed, which the detail names
+    char *detail;    // more about the failure, such as a build log, or NULL
 } ComputeFailure;
 
 // The latest value of a kernel's argument.
@@ -32,8 +32,8 @@ typedef struct Compute {
     cl_context context;
     cl_command_queue queue;              // in order, profiling on
     ComputeFailure failure;              // the first
-    ComputeFailure unmap_failure;        // the first of an unmap; a failure of the Compute at the next launch
-    struct Compute *reference;           // another device, for work in double; NULL: this one does it
+    ComputeFailure unmap_failure;        // the first of an unmap, which the next launch makes the Compute's
+    struct Compute *reference;           // another device for work in double, or NULL if this one does it
     ARRAY_OF(CapturedArgument) captured; // empty unless the device has a capture folder
 } Compute;
 
@@ -77,9 +77,9 @@ char *compute_unmap_failure_text(const Compute *compute);
 typedef struct {
     const char *root;    // the embedded file to compile, such as "render.cl"
     const char *prelude; // definitions placed before the text (features, LANES, precision)
-    // Definitions that keep functions out of line, for a second build if the first fails. NULL: none.
+    // Definitions that keep functions out of line, for a second build if the first fails, or NULL for none.
     const char *out_of_line_prelude;
-    const char *kernel;  // the build fails if it cannot be created; NULL: none is created
+    const char *kernel;  // the build fails if it cannot be created; NULL creates none
     const char *options; // compiler flags only
     const char *launch;  // kernel and work-group size for the cache's key, such as "render 8x1"; or NULL
     bool no_cache;
@@ -87,7 +87,7 @@ typedef struct {
 
 typedef struct {
     cl_program program;
-    cl_kernel kernel;    // the request's; NULL: none, or the caller owns it
+    cl_kernel kernel;    // the request's, or NULL if there is none or the caller owns it
     uint64_t text_hash;  // of the composed text, prelude included
     bool is_out_of_line; // built with the out-of-line prelude
     double build_seconds;
@@ -98,10 +98,11 @@ typedef struct {
 void program_options_append(Text *text, const Device *device, const char *options);
 
 // Composes the text (each quoted include expanded once, with #line), then loads the program from the cache
-// (host/opencl/cache.h) or builds it. The key consists of text, options, launch (NULL: the work-group of
-// --work-group), device name, driver, platform version and the cache's format version. `no_cache` also
-// bypasses PoCL's cache. Returns false on failure. If the text does not compile, the detail has the build
-// log and the file in which the composed text was saved. If both builds fail, the first failure is kept.
+// (host/opencl/cache.h) or builds it. The key consists of the text, the options, the launch (or --work-group
+// if it is NULL), the device's name, the driver, the platform's version and the version of the cache's
+// format. `no_cache` also bypasses PoCL's cache. Returns false on failure. If the text does not compile, the
+// detail has the build log and the file in which the composed text was saved. If both builds fail, the first
+// failure is kept.
 bool program_build(Compute *compute, const ProgramRequest *request, Program *program);
 // Writes the program to the cache unless it came from there. Call it after the first launch has ended,
 // because PoCL compiles a kernel at its first launch, a binary holds only the kernels launched by then, and
@@ -139,15 +140,16 @@ cl_mem buffer_adopt(Compute *compute, size_t size, void *bytes);
 
 // The time of a command by its event and by the host's clock.
 typedef struct {
-    const Device *device; // the next four are times of its clock, which starts at an arbitrary moment
-    double queued_seconds, submitted_seconds, start_seconds, end_seconds; // 0: the runtime has none
+    const Device *device; // its clock, which starts at an arbitrary moment, has the next four times
+    double queued_seconds, submitted_seconds, start_seconds, end_seconds; // 0 if the runtime has none
     double event_seconds;      // end - start; 0 where the runtime reports zeros
     double host_seconds;       // from enqueue until the host sees it complete
     double host_start_seconds; // clock_seconds() before the enqueue
-    bool trusted;       // false: zeros, a mere counter, end before start, or event longer than host_seconds
-    const char *fault;  // of the device's timer by its passport, which makes the time untrusted; NULL: none
-    cl_uint dimensions; // 0: not a kernel
-    size_t global[3], local[3]; // work-items, and those of a group; local 0: the runtime's choice
+    // False for zeros, a mere counter, an end before the start, or an event longer than host_seconds.
+    bool trusted;
+    const char *fault;  // of the device's timer by its passport, which makes the time untrusted, or NULL
+    cl_uint dimensions; // 0 if the command is not a kernel
+    size_t global[3], local[3]; // work-items, and those of a group, which are 0 if the runtime chose
 } LaunchTime;
 
 // Compares an event's timestamps (nanoseconds of the device clock) with the host's seconds. The event's time

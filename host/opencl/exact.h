@@ -1,5 +1,5 @@
-// Computes exact results of one operation in float or double, whatever the host's evaluation method. Every
-// value is a double; `is_double` is the format to which it is rounded.
+// Computes exact results of one operation in float or double, regardless of the host's evaluation method.
+// Every value is a double, which is rounded to double if `is_double` is set and to float otherwise.
 #pragma once
 
 #include <stdbool.h>

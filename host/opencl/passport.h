@@ -15,9 +15,9 @@ typedef enum { SUBNORMALS_KEPT, SUBNORMALS_FLUSHED, SUBNORMALS_MIXED } Subnormal
 
 // The results of division or of the square root.
 typedef struct {
-    double largest_ulp;          // the largest error; infinite where a result is not finite
-    uint64_t count, wrong_count; // wrong: not correctly rounded
-    bool is_exhaustive;          // all mantissas of a binade are among them
+    double largest_ulp;          // the largest error, infinite if a result is not finite
+    uint64_t count, wrong_count; // a wrong result is not correctly rounded
+    bool is_exhaustive;          // whether all mantissas of a binade are among them
     bool is_repaired;            // the function that kernels call returned only correctly rounded results
 } RoundedResults;
 
@@ -31,8 +31,8 @@ typedef enum {
 
 typedef struct {
     TimerFault fault;
-    double tick_nanoseconds;   // how long one unit lasts by the host's clock; 0: unknown
-    uint64_t step_nanoseconds; // the greatest common divisor of all times; 0: unknown
+    double tick_nanoseconds;   // how long one unit lasts by the host's clock, 0 if unknown
+    uint64_t step_nanoseconds; // the greatest common divisor of all times, 0 if unknown
 } TimerFindings;
 
 // The passport of one mode at one vector width.
@@ -43,16 +43,16 @@ typedef struct {
     bool uses_fma;     // HAS_FMA of kernels, set if fma is fused and its cost below the limit
     bool fma_is_fused; // fma of the device
     bool fma_is_exact; // fma of the kernels, perhaps emulated
-    double fma_cost;   // its time over that of a product and a sum; 0: not fused, not measured
+    double fma_cost;   // its time over that of a product and a sum, 0 if not fused or not measured
     bool contracts, two_sum_is_exact, two_product_is_exact;
     RoundingMode rounding;
     RoundedResults quotients, roots;
-    bool has_promised_rounding; // of quotients and roots: the build has an option that asks for it
+    bool has_promised_rounding; // whether the build has an option that asks for it in quotients and roots
     Subnormals subnormals;
     bool has_promised_subnormals;
     bool has_infinities_and_nans, converts_exactly;
     TimerFindings timer;
-    double build_seconds, seconds; // of the kernel; of the measurement
+    double build_seconds, seconds; // of the kernel's build and of the measurement
 } Passport;
 
 // The maximum seconds of a measurement, except on devices that are too slow even for the fewest operands.

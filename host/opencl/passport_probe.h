@@ -7,7 +7,7 @@
 #include "kernels/probes.h"
 
 enum {
-    OPERANDS_MAX = 256,   // of a probe; a multiple of any LANES
+    OPERANDS_MAX = 256,   // of a probe, a multiple of any LANES
     RESULTS_MAX = 1 << 19 // of a launch
 };
 
@@ -54,7 +54,8 @@ void operands_write(Measurement *measurement, const Operands *operands, size_t c
 // Launches a probe over `count` lanes, at most RESULTS_MAX.
 LaunchTime probe_launch(Measurement *measurement, cl_uint probe, cl_uint first, cl_uint round_count,
                         cl_uint operand_count, cl_uint count);
-// Runs a probe of at most OPERANDS_MAX operands. Returns false if the device failed; all results are 0 then.
+// Runs a probe of at most OPERANDS_MAX operands. If the device failed, sets all results to 0 and returns
+// false.
 bool probe_run(Measurement *measurement, cl_uint probe, const Operands *operands, size_t count,
                Results *results);
 

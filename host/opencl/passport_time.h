@@ -4,8 +4,8 @@
 #include "host/opencl/passport_probe.h"
 
 // Returns the ratio of fma's time to that of a product and a sum, each without the time of an empty launch.
-// Each time is the least of alternating launches, with more of them if fma seems slow, which may be chance.
-// Sets timed_rounds.
+// Each time is the shortest of alternating launches, of which there are more if fma seems slow, since that
+// may be chance. Sets timed_rounds.
 double fma_cost(Measurement *measurement);
 
 // Sets the passport's timer from all launches so far and some more. Call fma_cost first.

@@ -37,7 +37,7 @@ typedef struct {
     const MeshImport *import;
     Scene *scene;
     Source source; // the file
-    Stage *stage;  // of its bytes; may be NULL
+    Stage *stage;  // counts its bytes; may be NULL
     DraftPlaces places;
     Report report; // of the file
 
@@ -96,8 +96,8 @@ static inline bool draft_add_vertex(MeshDraft *draft, Vector3 position, size_t u
     return true;
 }
 
-// Adds the index of the next corner, position first; `offset` is its place in the file. An index that the
-// file defines later is checked at the end.
+// Adds an index of the next corner. The position's index must be added first. `offset` is the index's place
+// in the file. draft_check checks an index of a value that the file defines later.
 static inline void draft_add_index(MeshDraft *draft, DraftPart part, uint32_t index, size_t offset)
 {
     if (index >= draft_part_count(draft, part)) draft_record_index(draft, part, index, offset);

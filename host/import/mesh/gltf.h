@@ -16,7 +16,7 @@ typedef struct {
 typedef struct {
     const char *bytes;
     size_t length;
-    Text owned;            // of what was decoded or read; empty where the bytes are the GLB file's
+    Text owned;            // the bytes if they were decoded or read, or empty if they are the GLB file's
     uint64_t device, file; // of an external file
 } GltfBuffer;
 
@@ -24,7 +24,7 @@ enum { UV_SETS_MAX = 255 };
 
 // A material's texture and its mapping.
 typedef struct {
-    uint32_t number; // of the scene; 0: none
+    uint32_t number; // of the scene's texture, or 0 for none
     size_t uv_set;
     double uv_rows[2][3]; // from the file's texture coordinates to those of the texture
     TextureWrap wraps[2]; // along u and v
@@ -36,8 +36,8 @@ typedef struct {
     bool is_read;
     GltfTexture texture, normals;
     double textured_ambient; // the ambient factor with the texture
-    bool texture_emits;      // by that factor, in place of the emission
-    uint32_t scene_index[2]; // without and with the texture; DRAFT_NONE: not added yet
+    bool texture_emits;      // whether it emits light by textured_ambient instead of the emission
+    uint32_t scene_index[2]; // without and with the texture, DRAFT_NONE before it is added
 } GltfMaterial;
 
 // Features that glint does not show. Each causes one warning, which names the first place in the file.
@@ -68,14 +68,14 @@ typedef struct {
     MeshDraft *draft;
     json_t *root;
     GltfBuffer binary;   // the BIN chunk of a GLB file
-    GltfBuffer *buffers; // one for each of the file's; not read yet where `bytes` is NULL
+    GltfBuffer *buffers; // one for each of the file's, where `bytes` is NULL before it is read
     size_t buffer_count;
-    size_t byte_count, element_count; // of the buffers, and of the accessors as often as they are read
+    size_t byte_count, element_count; // of the buffers, and of the accessors each time that they are read
     GltfMaterial *materials;          // one for each of the file's, then the default
-    uint32_t *images; // the texture of each image as colors and as normals; DRAFT_NONE: not read yet
+    uint32_t *images; // the textures of each image as colors and as normals, DRAFT_NONE before they are read
     bool *is_visited; // by node
-    unsigned losses;  // bits
-    bool is_optional; // errors in what is read now are warnings
+    unsigned losses;  // a bit for each GltfLoss that was warned of
+    bool is_optional; // whether errors in what is being read are warnings
 } Gltf;
 
 // Reports an error at the item, or a warning while `is_optional` is set. Always returns false.

@@ -6,7 +6,7 @@
 #include "host/scene/affine.h"
 #include "host/scene/mesh.h"
 
-// The source of shading normals, which is the file if it has any, nothing, or the file and else the
+// The source of shading normals. It is the file if it has any, nothing, or the file and otherwise the
 // triangles around each vertex.
 typedef enum { SMOOTH_AS_FILE, SMOOTH_NEVER, SMOOTH_ALWAYS } MeshSmoothing;
 
@@ -18,14 +18,14 @@ typedef struct {
 } MeshView;
 
 typedef struct {
-    const char *path; // to open, and in messages
+    const char *path; // of the file, also in messages
     Affine transform; // has an inverse
     MeshSmoothing smoothing;
-    bool own_materials; // the file's materials join the scene's
-    MeshView *view;     // filled where the file is the whole scene; else NULL
+    bool own_materials; // whether the file's materials are added to the scene's
+    MeshView *view;     // filled if the file is the whole scene, otherwise NULL
     const SceneOptions *options;
     Report *report; // of the scene
-    size_t offset;  // of the file's name in the scene, or MESSAGE_WHOLE_FILE where the file is the scene
+    size_t offset;  // of the file's name in the scene, or MESSAGE_WHOLE_FILE if the file is the scene
 } MeshImport;
 
 // Returns whether glint reads meshes with the name's ending.

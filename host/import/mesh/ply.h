@@ -14,7 +14,7 @@ typedef struct {
 
 typedef struct {
     Word name;
-    const PlyType *type, *count_type; // `count_type`: of a list's length; NULL: not a list
+    const PlyType *type, *count_type; // count_type is of a list's length, or NULL for a single value
 } PlyProperty;
 
 typedef struct {

@@ -40,7 +40,8 @@ typedef struct {
 typedef struct Field Field;
 typedef struct Items Items;
 
-// Reads the value of `field` at `node` into `target`; reports an error and returns false if it is invalid.
+// Reads the value of `field` at `node` into `target`. Reports an error and returns false if the value is
+// invalid.
 typedef bool FieldReader(YamlReader *reader, const Field *field, const YamlNode *node, void *target);
 
 // A bit set of a mapping's alternative forms. Keys of different forms exclude each other.
@@ -54,9 +55,9 @@ struct Field {
     const char *name;
     FieldReader *read;
     size_t offset;      // in the target struct
-    unsigned forms;     // that have it, or none if all have it; and REQUIRED if it is required in them
-    const Range *range; // of its values; NULL: any
-    const Items *items; // of read_items
+    unsigned forms;     // the forms that have this field (0 for all), plus REQUIRED if those forms need it
+    const Range *range; // of its values, or NULL for any
+    const Items *items; // for read_items
 };
 
 // The lists of exactly `count` values of `size` bytes that read_items reads with `read`.

@@ -9,28 +9,28 @@
 
 typedef enum { YAML_SCALAR, YAML_SEQUENCE, YAML_MAPPING } YamlType;
 
-// A node, which is small because a scene of ten million spheres has 120 million of them.
+// A node. It is small because a scene of ten million spheres has 120 million of them.
 typedef struct {
-    uint32_t offset, end; // of the first byte in the source, and past the last
-    uint32_t next;        // sibling; 0: none
+    uint32_t offset, end; // the offsets of its first byte in the source and past its last
+    uint32_t next;        // sibling, or 0 for none
     union {
-        uint32_t first; // child; 0: none
-        uint32_t text;  // scalar: start of its text in the tree's texts
+        uint32_t first; // child, or 0 for none
+        uint32_t text;  // the start of a scalar's text in the tree's texts
     };
-    uint32_t child_count; // mapping: keys and values
+    uint32_t child_count; // a mapping's keys and values both count
     YamlType type;
 } YamlNode;
 
 typedef struct {
-    ARRAY_OF(YamlNode) nodes; // root first
+    ARRAY_OF(YamlNode) nodes; // the root is the first
     Text texts;               // of all scalars, each ended by a NUL
     bool has_aliases;
 } YamlTree;
 
-// Adds the nodes of the report's source to the tree, root first, with offsets that begin at `base`. Reports
-// errors and returns false if the text is malformed, empty, nested too deeply, or has several documents or
-// tags, or if all texts are larger than 2 GiB. The stage, which may be NULL, is set to the bytes that were
-// read.
+// Adds the nodes of the report's source to the tree, the root first, with offsets that begin at `base`.
+// Reports errors and returns false if the text is malformed, empty, nested too deeply, or has several
+// documents or tags, or if all texts are larger than 2 GiB. The stage, which may be NULL, is set to the bytes
+// that were read.
 bool yaml_tree_read(YamlTree *tree, Report *report, size_t base, Stage *stage);
 // Adds the value that begins at a byte of the source, and skips the bytes before it.
 bool yaml_value_read(YamlTree *tree, Report *report, size_t base, size_t start);

@@ -26,10 +26,10 @@ char *yaml_read_path(YamlReader *reader, const char *name, const YamlNode *node)
 FieldReader read_transform;
 
 typedef struct {
-    const YamlNode *node; // NULL: there is none
+    const YamlNode *node; // NULL if there is none
     SunPosition position;
     double angle; // of its disc
-    bool shines;  // is a light
+    bool shines;  // whether it is a light
 } Sun;
 
 typedef struct {
