@@ -11,8 +11,8 @@ typedef enum { MESSAGE_WARNING, MESSAGE_ERROR } MessageSeverity;
 
 typedef struct {
     MessageSeverity severity;
-    char *file;            // as the user named it; NULL: no file
-    unsigned line, column; // from 1; 0: unknown; the column counts characters (UTF-8 code points)
+    char *file;            // as the user named it, or NULL for no file
+    unsigned line, column; // from 1, or 0 if unknown; the column counts UTF-8 code points
     char *text;            // one line, no newline, no "error:" prefix
     char *source_line;     // the line itself for the caret, or NULL
 } Message;

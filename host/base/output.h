@@ -14,7 +14,7 @@ typedef struct OutputFile {
     int folder; // of the target; undefined where the target is written directly, a device or a pipe
     bool has_folder, is_private, is_finished;
     const char *name;                // of the target in its folder
-    char *temporary;                 // the name in the folder until the rename; NULL: none
+    char *temporary;                 // the name in the folder until the rename, or NULL
     struct OutputFile *next_pending; // another file with a temporary
 } OutputFile;
 

@@ -12,7 +12,7 @@
 // A child: an inner node's index, or `count` primitives from `first` of the order below.
 typedef struct {
     Bounds box;
-    uint32_t first, count; // count 0: `first` is the node's index
+    uint32_t first, count; // if count is 0, `first` is the node's index
 } BvhChild;
 
 typedef struct {
@@ -23,7 +23,7 @@ typedef struct {
 // tested at once. A range of these types that fits is divided only by type.
 typedef struct {
     unsigned size_max;   // of other leaves
-    unsigned block_size; // 0: kernels read no blocks
+    unsigned block_size; // 0 if kernels read no blocks
     bool counts_blocks;  // splits are chosen by numbers of blocks, not of primitives; needs a block_size
 } BvhLeaves;
 

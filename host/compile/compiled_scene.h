@@ -45,7 +45,7 @@ typedef struct {
     double flatten_seconds;   // everything else in scene_compile or scene_move
     // The results of stages that later ones and the header need.
     CompiledTexture *textures;       // one for each of the scene's textures
-    struct InstancePlan *instances;  // NULL: no mesh is shared
+    struct InstancePlan *instances;  // NULL if no mesh is shared
     uint32_t bvh_counts[TYPE_COUNT]; // primitives in the BVH, the first of their arrays
     Bounds bvh_bounds;               // of these; 0 if there are none
     uint32_t cull_sphere_count;      // per common origin

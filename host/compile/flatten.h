@@ -8,7 +8,7 @@ typedef struct {
     CompiledScene *compiled;
     const Scene *scene;
     Rounding rounding;
-    void *moved;         // the flat struct to replace, as another eye saw it; NULL: they are appended
+    void *moved;         // the flat struct to replace, as another eye saw it, or NULL to append
     size_t part;         // index of a mesh's triangle
     FeatureSet features; // needed by primitives beyond those of their types
     size_t counts[TYPE_COUNT], normals_count, uvs_count, entry_count; // so far

@@ -41,7 +41,7 @@ typedef struct {
     bool shift_to_eye;         // positions are relative to the eye; else as they are
     bool hashes_primitives;    // sets CompiledScene.primitives_hash
     bool is_preview;           // scene_move leaves the arrays as the last eye saw them, and takes no time
-    // Reused from an earlier compilation of the same textures, whose arrays are then left empty; NULL: none.
+    // Reused from an earlier compilation of the same textures, whose arrays are then left empty, or NULL.
     const struct CompiledTexture *textures;
-    Stage *stage; // NULL: not wanted
+    Stage *stage; // may be NULL
 } CompileSettings;

@@ -31,11 +31,11 @@ typedef struct {
     // made->axis if it has an axis or normal. Updates the radius and the axis if it chooses others.
     void (*randomize)(RandomShape *made, unsigned form, Random *random);
 
-    // Sets the bounds of a primitive. Returns false if it is unbounded. NULL: always unbounded.
+    // Sets the bounds of a primitive. Returns false if it is unbounded. NULL means always unbounded.
     bool (*primitive_bounds)(const void *primitive, Bounds *bounds);
-    // Returns the bounding sphere. NULL: that of primitive_bounds.
+    // Returns the bounding sphere. NULL means that of primitive_bounds.
     BoundingSphere (*bounding_sphere)(const void *primitive);
-    // Sets a point and the normal, not unit, of a flat primitive. NULL: not flat.
+    // Sets a point and a normal of any length of a flat primitive. NULL means not flat.
     void (*plane)(const void *primitive, Vector3 *point, Vector3 *normal);
     // Returns the largest magnitude of an unbounded primitive's numbers, as distances from the origin.
     double (*largest_coordinate)(const void *primitive);

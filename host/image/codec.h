@@ -24,7 +24,7 @@ typedef struct Encoder {
     bool (*rows)(ImageWriter *writer, const void *const *arrays, uint32_t row_count, MessageList *messages);
     bool (*end)(ImageWriter *writer, MessageList *messages); // after the last row; may be NULL
     void (*free)(ImageWriter *writer); // frees `state`, which may be incomplete or NULL; may be NULL
-    // after any row; NULL: notes are lost
+    // Called after any row. If it is NULL, notes are lost.
     bool (*note)(ImageWriter *writer, const ImageNote *note, MessageList *messages);
 } Encoder;
 

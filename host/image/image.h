@@ -86,7 +86,7 @@ typedef struct {
     float *alpha; // PNG, EXR: of each pixel, which its values do not show; NULL: all are opaque
     Transfer transfer;
     bool display;    // 8 or 16 bit display values, scaled to 0..1, curve not undone
-    bool data;       // no light: NPY of other than 3 channels, EXR without colors or luminance
+    bool data;       // not light, in an NPY of other than 3 channels or an EXR without colors or luminance
     bool integers;   // NPY of <u4 or |u1 and EXR of uint, such as numbers of objects
     double *doubles; // the values whose type floats cannot hold (NPY of <f8 or <u4, EXR of uint), or NULL
 } Image;

@@ -81,7 +81,7 @@ typedef struct {
     enum { JOB_END, JOB_FRAMES, JOB_IMAGE } type;
     JobSettings settings; // of an image, like the members below
     unsigned aovs;
-    size_t selector_size; // of the device selector with its NUL, which follows; 0: none
+    size_t selector_size; // of the device selector with its NUL, which follows, or 0 for none
 } Job;
 
 typedef struct {

@@ -8,7 +8,7 @@
 
 // The permitted error of t at each tier, where it is not the tier's.
 typedef struct {
-    double ulps[TIER_COUNT];   // 0: the tier's
+    double ulps[TIER_COUNT];   // 0 for the tier's
     double within[TIER_COUNT]; // in units of t; takes precedence over ulps
 } VerifyLimits;
 
@@ -19,16 +19,16 @@ typedef struct {
 typedef struct {
     Vector3 origin, direction;
     double tmin;
-    const char *decided_tiers;  // NULL: those of the set
-    const VerifyLimits *limits; // NULL: those of the set
-    double tangent_t;           // not 0: t of a tangent, which counts as a hit
+    const char *decided_tiers;  // NULL for those of the set
+    const VerifyLimits *limits; // NULL for those of the set
+    double tangent_t;           // t of a tangent, which counts as a hit, or 0
 } VerifyRay;
 
 typedef struct {
     const char *name;    // the case's name
-    const char *objects; // YAML; NULL: built by scene_make
+    const char *objects; // YAML, or NULL if scene_make builds them
     void (*scene_make)(Scene *);
-    const VerifyRay *rays; // NULL: a family's first ray_count
+    const VerifyRay *rays; // NULL for a family's first ray_count rays
     RayFamily family;
     size_t ray_count;
     size_t checked_count; // of a family: rays with exact answers; all have their points and normals checked

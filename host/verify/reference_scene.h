@@ -7,7 +7,7 @@
 
 typedef struct {
     Scene scene;             // shares the lights, materials and textures of the scene it was made of
-    BoundingSphere *spheres; // NULL: none, for a scene without meshes and with few rays
+    BoundingSphere *spheres; // NULL for a scene without meshes and with few rays
 } ReferenceScene;
 
 ReferenceScene reference_scene_open(const Scene *scene); // the scene must outlive it

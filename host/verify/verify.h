@@ -41,7 +41,7 @@ typedef struct {
     size_t off_surface; // hits whose point is too far from the surface
     size_t wrong_normals; // normals that are not the surface's
     size_t differing;     // answers whose bits depend on something irrelevant
-    double worst, bound;  // the error with the largest ratio to its bound; 0, 0: none
+    double worst, bound;  // the error with the largest ratio to its bound, both 0 without one
     const char *unit;     // of both
     double worst_position_ratio,
         worst_normal_ratio; // the largest errors of points and normals over their bounds
@@ -51,14 +51,14 @@ typedef struct {
 bool verify_holds(const VerifyResult *result);
 
 typedef struct {
-    // Returns whether to run a case, whose name and title are set; NULL: run all.
+    // Returns whether to run a case, whose name and title are set. NULL runs all.
     bool (*start)(void *context, const VerifyResult *result);
     // Returns whether to continue with the next case.
     bool (*receive)(void *context, const VerifyResult *result);
     void *context;
 } VerifySink;
 
-// The names of the cases to run; NULL: all.
+// The names of the cases to run, or NULL for all.
 typedef struct {
     char *const *names;
     size_t count;

@@ -33,7 +33,7 @@ typedef struct {
 // The facts of the pixel under the cursor.
 typedef struct {
     double at[2];     // the cursor, in pixels
-    char *text;       // NULL: not shown, or not known yet
+    char *text;       // NULL if not shown or not known yet
     unsigned request; // the request whose image the text describes
     bool are_shown;
     bool needs_probe; // the loop has not been asked about the pixel
@@ -93,7 +93,7 @@ void scene_frame_show(Window *window, int64_t frame);
 void play_toggle(Window *window);
 // Shows the frame that is due, once the last one is shown.
 void play(Window *window);
-int time_line_height(const Window *window); // in pixels; 0: there is none
+int time_line_height(const Window *window); // in pixels, or 0 if there is none
 // Returns whether a position in pixels is in the time line.
 bool is_in_time_line(const Window *window, const double at[2]);
 // Shows the frame at a position.
