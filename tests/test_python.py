@@ -574,7 +574,7 @@ class Errors(unittest.TestCase):
             (folder / "mesh.mtl").write_text("newmtl a\\nd 0.25\\nTr 0.5\\n")
             with warnings.catch_warnings(record=True) as caught:
                 glint.load(folder / "mesh.obj")
-            print(*("Tr 0.5 does not fit d 0.25" in str(warning.message) for warning in caught))"""
+            print(*("Tr 0.5 contradicts d 0.25" in str(warning.message) for warning in caught))"""
         with tempfile.TemporaryDirectory() as folder:
             subprocess.run(["localedef", "-f", "UTF-8", "-i", "de_DE", f"{folder}/de_DE.UTF-8"], check=True, stdout=subprocess.DEVNULL)
             process = subprocess.run([sys.executable, "-c", program, folder], capture_output=True, text=True, check=False,
