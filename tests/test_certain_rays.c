@@ -166,6 +166,30 @@ TEST(rays_along_axes_and_sides_are_certain)
     assert_true(sum.certain > sum.in_double + sum.uncertain && sum.hits > sum.certain / 4);
 }
 
+// Half of a chord of the cylinder's circle is too long for float, in units of t. The small sphere keeps the
+// unit of length.
+TEST(rays_almost_along_a_huge_cylinder_miss)
+{
+    if (!probe_has(PRECISION_CERTIFIED)) skip();
+    Object objects[] = {
+        {.type = SHAPE_SPHERE, .as.sphere = {.center = {0, -3, 0}, .radius = 1e-16}},
+        {.type = SHAPE_CYLINDER,
+         .as.cylinder = {
+             .from = {0, 7e13, 0}, .axis = {0, 6e13, 0}, .radius = 1.4e14, .finite = true, .caps = true}}};
+    Material material;
+    Scene scene = scene_of_shapes(objects, 2, &material);
+    enum { RAYS = 64 };
+    TraceRay rays[RAYS];
+    for (int i = 0; i < RAYS; i++) {
+        const double side = (1.6e14 + 0.35e14 * (i % 8) / 7) / sqrt(2),
+                     slope = 4.9e-6 * pow(2, i / 56.0) / sqrt(2);
+        ray_set(&rays[i], (Vector3){side, 0, side}, (Vector3){-slope, 1, -slope});
+    }
+    const Counts counts = rays_check(&scene, rays, RAYS);
+    assert_true(counts.certain > 0 && counts.in_double > 0);
+    assert_int_equal(counts.uncertain + counts.hits, 0);
+}
+
 // A bumpy sheet of triangles. Rays aim at its vertices, at its edges and, along the sheet, at its
 // silhouettes.
 TEST(mesh_edges_are_certain)

@@ -9,9 +9,9 @@
 typedef struct {
     Vector q;
     real squared_q;
-    mask slanted;                         // q is well above its error; in other lanes `middle` is 0
-    real inverse_squared, inverse_length; // 1 / |q|^2 and at least 1 / |q|, or 0
-    Vector closest;                       // the ray's point closest to the axis, seen from there
+    mask slanted;        // q is well above its error; in other lanes `middle` is 0
+    real inverse_length; // 1 / |q| within 12 u, or 0
+    Vector closest;      // the ray's point closest to the axis, seen from there
     real squared_distance, middle;
     real middle_error; // bounds the error of that point, which grows by round->error_per_t per t
 } CylinderLine;
@@ -24,14 +24,15 @@ static inline CylinderLine cylinder_line(const Round *round, const Ray *ray)
     // twice, since the axis' length, which is off by 14 u, leaves a part of the height
     line.q = round_across(round, round_across(round, ray->direction));
     line.squared_q = vector_dot(line.q, line.q);
-    line.slanted = line.squared_q > (real)(64) * (round->error_per_t * round->error_per_t);
-    const real inverse = real_divide((real)(1), lanes_select(line.slanted, line.squared_q, (real)(1)));
-    line.inverse_squared = lanes_select(line.slanted, inverse, (real)(0));
-    line.inverse_length = real_sqrt(line.inverse_squared) * BOUND_SLACK;
-    const real first = -vector_dot(round_across(round, round->start), line.q) * line.inverse_squared;
+    line.slanted = line.squared_q >
+                   real_fma((real)(64) * round->error_per_t, round->error_per_t, (real)(SMALLEST_RATIO));
+    const real inverse = real_divide((real)(1), lanes_select(line.slanted, line.squared_q, (real)(1))),
+               inverse_squared = lanes_select(line.slanted, inverse, (real)(0));
+    line.inverse_length = real_sqrt(inverse_squared);
+    const real first = -vector_dot(round_across(round, round->start), line.q) * inverse_squared;
     const Vector x = vector_fma(ray->direction, first, round->start),
                  near = round_across(round, round_across(round, x));
-    const real step = -vector_dot(near, line.q) * line.inverse_squared;
+    const real step = -vector_dot(near, line.q) * inverse_squared;
     line.closest = vector_fma(line.q, step, near);
     line.squared_distance = vector_dot(line.closest, line.closest);
     line.middle = first + step;
@@ -48,7 +49,7 @@ static inline CylinderLine cylinder_line(const Round *round, const Ray *ray)
 static inline real cylinder_half_chord(const CylinderLine *line, real radius)
 {
     const real squared = real_fma(radius, radius, -line->squared_distance);
-    return real_sqrt(real_max(squared, (real)(0)) * line->inverse_squared);
+    return real_sqrt(real_max(squared, (real)(0))) * line->inverse_length;
 }
 
 // Bounds the error of the line's points up to this t from the middle.
@@ -62,13 +63,13 @@ static inline real cylinder_place(const Round *round, const CylinderLine *line, 
 static inline CertainInterval cylinder_interval(const Round *round, const Ray *ray, mask lanes, Interval part)
 {
     const real zero = (real)(0), u = (real)(UNIT_ROUNDOFF), radius = round->radius, end = ray_end_above(ray);
-    const real more = (real)(1 + 16 * UNIT_ROUNDOFF), less = (real)(1 - 16 * UNIT_ROUNDOFF);
+    const real more = (real)(1 + 32 * UNIT_ROUNDOFF), less = (real)(1 - 32 * UNIT_ROUNDOFF);
     const CylinderLine line = cylinder_line(round, ray);
     const real from = real_max(part.near, ray->tmin), to = real_min(part.far, end);
     const real reach = real_max(fabs(from), fabs(to)) + fabs(line.middle);
     // Farther from the middle a slanted line's distance from the axis is at least 8/5 of the radius and its
     // error.
-    real span = (real)(2) * (radius + line.middle_error) * line.inverse_length;
+    real span = (real)(2) * (radius + line.middle_error) * line.inverse_length * more;
     span = cylinder_half_chord(&line, radius + cylinder_place(round, &line, real_min(span, reach))) * more;
     const real place = cylinder_place(round, &line, lanes_select(line.slanted, real_min(span, reach), reach));
     const real outer = radius + place, inner = real_max(radius - place, zero),
@@ -76,7 +77,8 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
     CertainInterval interval;
     interval.perhaps = lanes & !(line.slanted & (outer * outer < squared));
     interval.certain = interval.perhaps & line.slanted & (inner * inner > squared);
-    const real along = u * real_fma((real)(6) * outer, line.inverse_length, (real)(3) * fabs(line.middle));
+    const real along =
+        u * real_fma((real)(6) * outer, line.inverse_length * more, (real)(3) * fabs(line.middle));
     const real outer_half = real_fma(more, cylinder_half_chord(&line, outer), along),
                inner_half = real_fma(less, cylinder_half_chord(&line, inner), -along),
                root_half = cylinder_half_chord(&line, radius);
@@ -93,13 +95,15 @@ static inline CertainInterval cylinder_interval(const Round *round, const Ray *r
         const real most = (real)(LARGEST);
         real_replace(&interval.outer.near, parallel, -most);
         real_replace(&interval.outer.far, parallel, most);
-        real_replace(&interval.inner.near, parallel, from);
-        real_replace(&interval.inner.far, parallel, to);
+        real_replace(&interval.inner.near, parallel, part.near);
+        real_replace(&interval.inner.far, parallel, part.far);
         real_replace(&interval.roots.near, parallel, -most);
         real_replace(&interval.roots.far, parallel, most);
     }
-    interval.certain = interval.certain & (interval.inner.near < interval.inner.far);
-    interval.perhaps = interval.perhaps & (interval.outer.far >= ray->tmin) & (interval.outer.near <= end);
+    // The bounds hold only between `from` and `to`. Where numbers overflow, nothing is known.
+    interval.certain =
+        interval.certain & (interval.inner.near < interval.inner.far) & (interval.inner.near <= to);
+    interval.perhaps = interval.perhaps & !((interval.outer.far < from) | (interval.outer.near > to));
     return interval;
 }
 

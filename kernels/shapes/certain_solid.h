@@ -167,7 +167,7 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
         slab = round_slab(round, ray, solid->low, solid->high);
         slab.outer = intervals_common(slab.outer, part);
         slab.perhaps = slab.outer.near <= slab.outer.far;
-        lanes = lanes & slab.perhaps;
+        lanes = lanes & slab.perhaps & !ray_excludes(ray, slab.outer.near, slab.outer.far);
         if (!lanes_any(lanes)) return certain_miss();
     }
     const CertainInterval side =
