@@ -11,18 +11,20 @@ typedef struct {
     Pair moment_on_axis, squared_axis; // E . w; w . w
 } AxialRay;
 
-static inline ALWAYS_INLINE AxialRay axial_ray(uint4 id, Vector foot, Vector axis, const Ray *ray)
+// Sets the numbers. Oclgrind does not know what clang makes of an inlined function that returns a struct.
+static inline ALWAYS_INLINE void axial_ray_set(AxialRay *axial, uint4 id, Vector foot, Vector axis,
+                                               const Ray *ray)
 {
     const PairVector f = pair_vector_difference(ray->origin, foot), d = pair_vector_of(ray->direction),
                      w = pair_vector_of(axis), moment = pair_vector_cross(f, ray->direction);
     const PairVector from = has_eye_power(id) ? pair_vector_of(ray->origin) : f;
-    return (AxialRay){pair_vector_cross(f, axis),
-                      pair_vector_cross(d, axis),
-                      moment,
-                      pair_vector_dot_vector(from, axis),
-                      pair_vector_dot_vector(d, axis),
-                      pair_vector_dot_vector(moment, axis),
-                      pair_vector_dot(w, w)};
+    *axial = (AxialRay){pair_vector_cross(f, axis),
+                        pair_vector_cross(d, axis),
+                        moment,
+                        pair_vector_dot_vector(from, axis),
+                        pair_vector_dot_vector(d, axis),
+                        pair_vector_dot_vector(moment, axis),
+                        pair_vector_dot(w, w)};
 }
 
 // Returns (o x w) . ((o - 2 F) x w), the difference of m . m from its value at the eye. A rounding of

@@ -41,7 +41,8 @@ static inline EndedCrossings paraboloid_crossings(const Paraboloid *shape, const
     const Vector axis = vector_of(shape->axis_end), foot = paraboloid_foot(shape);
     const real half_k = (real)(0.5f * shape->apex_k.w), k = (real)(shape->apex_k.w);
     const bool has_power = has_eye_power(shape->id);
-    const AxialRay axial = axial_ray(shape->id, foot, axis, ray);
+    AxialRay axial;
+    axial_ray_set(&axial, shape->id, foot, axis, ray);
     const PairVector m = axial.m, q = axial.q;
     const Pair squared_m = pair_vector_dot(m, m), a = pair_vector_dot(q, q),
                bend = pair_scale(axial.rise, half_k), b = pair_subtract(pair_vector_dot(m, q), bend);

@@ -28,9 +28,13 @@ static inline real revolution_polish(const RevolutionQuadric *quadric, real t)
 static inline Interval revolution_slab(const Revolution *shape, const Ray *ray)
 {
     const Vector base = vector_of(shape->base_radius), axis = vector_of(shape->axis_slope);
-    const AxialRay axial = axial_ray(shape->id, base, axis, ray);
-    real from = axial.height.high, towards = axial.rise.high;
-    if (!IS_COMPENSATED) {
+    real from, towards;
+    if (IS_COMPENSATED) {
+        AxialRay axial;
+        axial_ray_set(&axial, shape->id, base, axis, ray);
+        from = axial.height.high;
+        towards = axial.rise.high;
+    } else {
         from = vector_dot(has_eye_power(shape->id) ? ray->origin : vector_subtract(ray->origin, base), axis);
         towards = vector_dot(ray->direction, axis);
     }

@@ -44,8 +44,8 @@ static inline RevolutionQuadric revolution_quadric_compensated(const Revolution 
                                                                const Ray *ray)
 {
     const real radius = (real)(shape->base_radius.w), slope = (real)(shape->axis_slope.w);
-    const AxialRay axial =
-        axial_ray(shape->id, vector_of(shape->base_radius), vector_of(shape->axis_slope), ray);
+    AxialRay axial;
+    axial_ray_set(&axial, shape->id, vector_of(shape->base_radius), vector_of(shape->axis_slope), ray);
     const PairVector m = axial.m, q = axial.q;
     Pair g = pair_of(radius), h = pair_of((real)(0));
     PairVector v = {pair_scale(q.x, radius), pair_scale(q.y, radius), pair_scale(q.z, radius)};

@@ -34,18 +34,18 @@ static inline SphereQuadratic sphere_quadratic_near(const Sphere *sphere, const 
     return quadratic;
 }
 
-// Returns the quadratic for all rays. Far from the closest approach the discriminant is a r^2 - |E|^2
+// Sets the quadratic for all rays. Far from the closest approach the discriminant is a r^2 - |E|^2
 // (Lagrange's identity), off by about 10 u a r^2 at any distance.
-static inline ALWAYS_INLINE SphereQuadratic sphere_quadratic(const Sphere *sphere, const Ray *ray)
+static inline ALWAYS_INLINE void sphere_quadratic_set(SphereQuadratic *quadratic, const Sphere *sphere,
+                                                      const Ray *ray)
 {
     const real radius = (real)(sphere->center_radius.w);
     const PairVector to_center = pair_vector_difference(vector_of(sphere->center_radius), ray->origin);
-    SphereQuadratic quadratic = sphere_quadratic_near(sphere, ray);
-    const Vector moment = quadratic.moment = pair_vector_cross_once(to_center, ray->direction);
-    const mask is_far = !(quadratic.b * quadratic.b < ray->squared * radius * radius);
-    real_replace(&quadratic.discriminant, is_far,
+    *quadratic = sphere_quadratic_near(sphere, ray);
+    const Vector moment = quadratic->moment = pair_vector_cross_once(to_center, ray->direction);
+    const mask is_far = !(quadratic->b * quadratic->b < ray->squared * radius * radius);
+    real_replace(&quadratic->discriminant, is_far,
                  real_fma(ray->squared * radius, radius, -vector_dot(moment, moment)));
-    return quadratic;
 }
 
 // Returns the lanes whose rays start outside the sphere and leave it outward. b and c are the coefficients
@@ -90,7 +90,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 
     real discriminant;
     if (IS_COMPENSATED) {
-        const SphereQuadratic compensated = sphere_quadratic(sphere, ray);
+        SphereQuadratic compensated;
+        sphere_quadratic_set(&compensated, sphere, ray);
         discriminant = compensated.discriminant;
         b = compensated.b;
         c = compensated.c;
@@ -119,7 +120,8 @@ static inline mask sphere_hit(const Sphere *sphere, const Ray *ray, real *t)
 static inline Vector sphere_normal(const Sphere *sphere, const Ray *ray, real t)
 {
     if (!IS_COMPENSATED) return vector_normalize(ray_point_from(ray, vector_of(sphere->center_radius), t));
-    const SphereQuadratic quadratic = sphere_quadratic(sphere, ray);
+    SphereQuadratic quadratic;
+    sphere_quadratic_set(&quadratic, sphere, ray);
     real inverse = real_divide((real)(1), ray->squared);
     Vector l = vector_scale(vector_cross(quadratic.moment, ray->direction), inverse);
     real h = real_sqrt(real_max(quadratic.discriminant, (real)(0))) * inverse;
