@@ -170,9 +170,8 @@ static inline CertainHit round_solid_hit(const RoundSolid *solid, uint4 id, bool
         lanes = lanes & slab.perhaps & !ray_excludes(ray, slab.outer.near, slab.outer.far);
         if (!lanes_any(lanes)) return certain_miss();
     }
-    const CertainInterval side =
-        is_cylinder ? cylinder_interval(round, ray, lanes, intervals_common(slab.outer, part))
-                    : round_interval(round, ray, lanes, part, solid->is_finite);
+    const CertainInterval side = is_cylinder ? cylinder_interval(round, ray, lanes, slab.outer)
+                                             : round_interval(round, ray, lanes, part, solid->is_finite);
     return round_first_hit(id.y, ray, &side, &slab, leaves);
 }
 
